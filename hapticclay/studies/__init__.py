@@ -1,4 +1,4 @@
-"""Questions that take many runs."""
+"""Studies that need many runs."""
 
 import lazy_loader
 

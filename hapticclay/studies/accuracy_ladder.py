@@ -1,7 +1,7 @@
-"""Error against run time of one scenario, over a ladder of steps: which setting is the cheapest.
+"""Error against run time of one scenario over a ladder of steps, to find the cheapest setting.
 
-Errors are counted against a run of the same scenario at a far finer step, whose own error is
-estimated as that of a run to an asked error.
+The reference is a run of the same scenario at a far finer step. Its own error is estimated as for a
+run to a requested error.
 """
 
 from __future__ import annotations
@@ -41,13 +41,14 @@ SAMPLED = "sampled, Ts = dt"
 
 @dataclass(frozen=True)
 class Setting:
-    """One way to run the scenario, its errors and its cost.
+    """One setting of the scenario, with its errors and cost.
 
     Attributes:
-        series: "fast", "accurate", or SAMPLED, another system than the continuous one.
+        series: "fast", "accurate", or SAMPLED, which is a different system from the continuous one.
         dt: step [s].
-        time: largest error of the border times [s]; None where none or other borders are crossed.
-        position: largest error of the position [m]; None where the run ends otherwise.
+        time: largest error of the crossing times [s]; None if no border or other borders are
+            crossed.
+        position: largest error of the position [m]; None if the run ends with another status.
         wall: run time [s], a median.
         status: how the run ended, or why there is none.
     """
@@ -60,7 +61,7 @@ class Setting:
     status: str
 
     def error(self, unit: str) -> float | None:
-        """Its error.
+        """Error of the setting.
 
         Args:
             unit: "s" for border times, "m" for positions.
@@ -76,10 +77,10 @@ class Ladder:
         scenario: what was run.
         engine: "native" or "python".
         settings: all, series by series, from the longest step on.
-        reference: what errors are counted against, in words.
-        left: estimated error of the reference, by unit; None where nothing bounds it.
-        simulated: time that the reference simulates [s].
-        notes: what a reader must know.
+        reference: description of the reference run.
+        left: estimated error of the reference, by unit; None if no bound is known.
+        simulated: simulated time of the reference [s].
+        notes: remarks for the reader.
     """
 
     scenario: Scenario
@@ -95,7 +96,7 @@ class Ladder:
         return [u for u in ("s", "m") if any(x.error(u) is not None for x in self.settings)]
 
     def shown(self, setting: Setting, unit: str) -> float | None:
-        """The error of a setting where it is clear of that of the reference; else None.
+        """The error of a setting if it clearly exceeds that of the reference; else None.
 
         Args:
             setting: one of them.
@@ -105,14 +106,14 @@ class Ladder:
         return error if error and error >= CLEAR * (left or 0.0) else None
 
     def cheapest(self, unit: str) -> dict[float, Setting]:
-        """The setting of least run time by asked error; sampled control is no setting of another.
+        """The fastest setting by requested error; sampled control replaces no continuous setting.
 
         Args:
             unit: "s" or "m".
         """
         out = {}
         for asked in ASKED:
-            # an error that is not clear of the reference's is at most so large
+            # bound for an error that does not clearly exceed that of the reference
             least = CLEAR * (self.left[unit] or 0.0)
             fit = [
                 x
@@ -166,8 +167,8 @@ def accuracy_ladder(
 ) -> Ladder:
     """Runs a scenario at a ladder of steps, with both integrators.
 
-    A continuous scenario also runs under sampled control with Ts = dt; one that is sampled keeps
-    its Ts, which its steps divide.
+    A continuous scenario also runs under sampled control with Ts = dt. A sampled scenario keeps its
+    Ts, and its steps divide Ts.
 
     Args:
         scenario: what to run; its dt and integrator are replaced.
@@ -240,11 +241,11 @@ def _rungs(scenario: Scenario, top: float, quick: bool) -> list[tuple[str, Scena
 
 
 class Reference(NamedTuple):
-    """What errors are counted against.
+    """The reference run and its error.
 
     Attributes:
         record: of the finest run.
-        left: its own error, by unit; None where nothing bounds it.
+        left: its own error, by unit; None if no bound is known.
         notes: on that error.
     """
 

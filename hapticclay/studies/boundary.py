@@ -1,4 +1,4 @@
-"""The boundary of stability found by running the arm, and why it differs from the analytic ones."""
+"""The stability boundary found by simulation, and why it differs from the analytic ones."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from ..theory.roots import first_failure
 from . import growth
 
 SMALL_PUSH = 1e-4  # [m/s] initial velocity that leaves the arm linear
-LARGE_PUSH = 0.05  # [m/s] initial velocity that a hand gives
-PUSH_TIME = 0.01  # [s] in which a force takes the place of such a velocity
+LARGE_PUSH = 0.05  # [m/s] initial velocity of a push by hand
+PUSH_TIME = 0.01  # [s] duration of a force that replaces such a velocity
 GROWTH_SPAN = 1.2  # [s] length of a run whose growth rate is read
-CLASSIFIED_SPANS = (2.0, 8.0, 32.0)  # [s] longer while the motors are in their limits
-BRACKET = 2e-3  # boundaries are found to this share
+CLASSIFIED_SPANS = (2.0, 8.0, 32.0)  # [s] longer runs while the motors are saturated
+BRACKET = 2e-3  # relative accuracy of boundaries
 
 Subject = TypeVar("Subject")
 
@@ -40,19 +40,19 @@ Subject = TypeVar("Subject")
 @named
 @dataclass(frozen=True)
 class PushedLoop(Loop):
-    """A loop to be run: the handle pushed along its axis, in clay all around it.
+    """A loop to simulate: the handle is pushed along its axis in uniform clay.
 
     The other axis has the printed servo and no compensator.
 
     Attributes:
         b: clay on both axes [N.s/m].
-        k: stiffness of it on both axes, with its rest where the handle starts [N/m].
+        k: stiffness of the clay on both axes, at rest at the initial position of the handle [N/m].
         K: compensator gain, > 0, at most 1e6.
-        inertia_shaping: as in Scenario; without it the arm's mobility takes the place of the gain
-            of Sh.
-        pose: place of the handle, from its nominal position [m].
-        push: velocity of the handle at the start [m/s]. Where C does not integrate no state of it
-            goes with a velocity; a constant force then would give it to a free handle in PUSH_TIME.
+        inertia_shaping: as in Scenario; without it the arm's mobility replaces the gain of Sh.
+        pose: position of the handle relative to its nominal position [m].
+        push: velocity of the handle at the start [m/s]. If C has no integrator, no state of C
+            matches a velocity; a constant force then replaces the push, one that gives a free
+            handle this velocity in PUSH_TIME.
         torque_limit: of the motors [N.m].
         arm: the two-link arm.
     """
@@ -71,12 +71,12 @@ class PushedLoop(Loop):
 
     @classmethod
     def of(cls, scenario: Scenario, axis: str = "x", b: float | None = None) -> PushedLoop:
-        """The loop of one axis of a scenario as one to be run, its clay all around the handle.
+        """A runnable loop of one axis of a scenario, in uniform clay.
 
         Args:
-            scenario: whose arm, servo, compensator, hand and control it has.
+            scenario: source of arm, servo, compensator, hand and control.
             axis: "x" or "y".
-            b: clay [N.s/m]; None for that of the scenario with the least gain limit.
+            b: clay [N.s/m]; None for the damping of the scenario with the least gain limit.
 
         Raises:
             ParameterError: as `Loop.of`; or the gain is 0, or hardware other than a delay is given.
@@ -103,7 +103,7 @@ class PushedLoop(Loop):
         )
 
     def scenario(self, t_max: float = GROWTH_SPAN, stop_when_unstable: bool = True) -> Scenario:
-        """Build the scenario of a run of it.
+        """Build the scenario of a run of the loop.
 
         Args:
             t_max: length of the run [s].
@@ -137,7 +137,7 @@ class PushedLoop(Loop):
 
     @property
     def linear(self) -> Loop:
-        """The linear loop of it at the nominal pose."""
+        """The linear loop at the nominal pose."""
         return replace(Loop.of(self.scenario(), self.axis, self.b), k=self.k)
 
     @property
@@ -147,7 +147,7 @@ class PushedLoop(Loop):
 
 
 def of_scenario(subject: Subject | Scenario, axis: str) -> Subject | PushedLoop:
-    """The loop of an axis of a scenario, as a study runs it; any other subject as it is.
+    """Converts a scenario to the loop of an axis that a study runs; other subjects are unchanged.
 
     Args:
         subject: a scenario, a loop or a wall.
@@ -159,8 +159,8 @@ def of_scenario(subject: Subject | Scenario, axis: str) -> Subject | PushedLoop:
 def classify_run(loop: PushedLoop) -> str:
     """Class of a run of the loop: "stable", "limit cycle" (bounded by the motors) or "diverges".
 
-    Growth is that of a linear motion, so a run whose motors are in their limits at its end is
-    repeated for longer.
+    The growth rate assumes linear motion, so a run that ends with saturated motors is repeated for
+    longer.
 
     Args:
         loop: the loop.
@@ -200,10 +200,10 @@ def find_crossing(rate: Callable[[float], float], guess: float, most: float) -> 
 
 
 def crossing_search(guess: float, most: float) -> Generator[float, float, float]:
-    """The search of `find_crossing`, for several side by side: yields x, takes the rate at it.
+    """The search of `find_crossing` as a generator, to batch searches: yields x, receives its rate.
 
-    Each rate is a run, and may be infinite, so this is a secant on a ratio within a bracket, two
-    runs a step, and not `brentq`.
+    Each rate needs a run and may be infinite. Hence a bracketed secant method on a ratio, two runs
+    per step, instead of `brentq`.
 
     Args:
         guess: start of the search.
@@ -245,7 +245,7 @@ def crossing_search(guess: float, most: float) -> Generator[float, float, float]
 
 
 def simulated_gain(loop: PushedLoop, guess: float | None = None, most: float = 200.0) -> float:
-    """Gain K above which the oscillation of a run grows; the loop's own K does not matter.
+    """Gain K above which the oscillation of a run grows; the loop's own K is ignored.
 
     Args:
         loop: all but K.
@@ -258,7 +258,7 @@ def simulated_gain(loop: PushedLoop, guess: float | None = None, most: float = 2
 
 
 def simulated_damping(loop: PushedLoop, guess: float, most: float = 1e5) -> float:
-    """Clay b [N.s/m] above which the oscillation of a run grows; the loop's own b does not matter.
+    """Clay b [N.s/m] above which the oscillation of a run grows; the loop's own b is ignored.
 
     Args:
         loop: all but b.
@@ -269,7 +269,7 @@ def simulated_damping(loop: PushedLoop, guess: float, most: float = 1e5) -> floa
 
 
 def simulated_stiffness(loop: PushedLoop, guess: float | None = None, most: float = 1e7) -> float:
-    """Clay's k [N/m] above which the oscillation of a run grows; the loop's own k does not matter.
+    """Clay's k [N/m] above which the oscillation of a run grows; the loop's own k is ignored.
 
     Args:
         loop: all but k.
@@ -288,7 +288,7 @@ def _simulated(loop: PushedLoop, field: str, guess: float, most: float) -> float
 
 
 def nominal_limit(loop: PushedLoop) -> float:
-    """Largest stable K of the linear loop at the nominal pose; the loop's own K does not matter.
+    """Largest stable K of the linear loop at the nominal pose; the loop's own K is ignored.
 
     Args:
         loop: all but K.
@@ -299,8 +299,8 @@ def nominal_limit(loop: PushedLoop) -> float:
 def pose_matrix(loop: PushedLoop) -> np.ndarray:
     """The linear loop of both axes at the handle's pose.
 
-    Without shaping W = Lambda^-1 of that pose takes the place of the gains of Sh, and couples the
-    axes (docs/equations.md, section 3).
+    Without shaping W = Lambda^-1 of that pose replaces the gains of Sh and couples the axes
+    (docs/equations.md, section 3).
 
     Args:
         loop: the loop.
@@ -342,7 +342,7 @@ def pose_limit(loop: PushedLoop, most: float = 200.0) -> float:
         K; inf if there is none up to most, 0 if it is below 1e-3.
     """
     first, second = (pose_matrix(replace(loop, K=K)) for K in (1.0, 2.0))
-    # It is linear in K, unless a force that goes straight through C meets the hand's mass.
+    # It is linear in K, unless direct feedthrough of C acts on the hand's mass.
     straight = len(loop.compensator.num) == len(loop.compensator.den) and loop.hand.mass > 0.0
 
     def stable(K: float) -> bool:
@@ -370,15 +370,15 @@ def continuous_stable(loop: PushedLoop) -> bool:
 def explain_disagreement(loop: PushedLoop, stable: bool) -> str:
     """Cause of a difference between a run and the continuous linear loop at the nominal pose.
 
-    One property of the run is changed at a time, and two if no single one will do, until the run
-    does what theory says.
+    One property of the run is changed at a time, then two at a time, until the run agrees with
+    theory.
 
     Args:
         loop: the loop of the run.
         stable: whether the run settles.
 
     Returns:
-        Names of the properties; "not found" if no two will do.
+        Names of the properties; "not found" if no pair explains the difference.
     """
     changes: list[tuple[str, dict]] = [
         ("saturation", dict(torque_limit=(1e6, 1e6))),

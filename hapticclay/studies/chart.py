@@ -1,4 +1,4 @@
-"""A chart as data: named curves over labelled axes, for whatever draws or prints it."""
+"""A chart as data: named curves over labelled axes, independent of how it is drawn or printed."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Chart:
     Attributes:
         name: of its file.
         title: in a few words.
-        caption: what is seen.
+        caption: description of the content.
         x: label of the x axis, with its unit.
         y: label of the y axis, with its unit.
         curves: in the order in which they are drawn.
@@ -51,7 +51,7 @@ class Chart:
     log: LogAxes = ""
 
     def tables(self) -> dict[str, dict[str, Any]]:
-        """The numbers that it shows, a table a curve."""
+        """The numbers of the chart, one table per curve."""
         return {
             (c.name or f"curve {i}"): {self.x: c.x, self.y: c.y} for i, c in enumerate(self.curves)
         }

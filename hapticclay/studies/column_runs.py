@@ -1,4 +1,4 @@
-"""Runs that differ in columns of numbers, as a data set on disk that survives anything."""
+"""Runs that differ in columns of numbers, as a data set on disk that survives interruptions."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from ..simulation.column_batch import Columns, simulate_columns
 from . import sweep
 
 SCHEMA = "hapticclay-columns-1"
-CHUNK = 10_000  # runs of a file: a second or two of short ones
-ENDS = "p", "v", "fh", "fe", "b"  # of a summary, a column an axis
+CHUNK = 10_000  # runs per file: one or two seconds of short runs
+ENDS = "p", "v", "fh", "fe", "b"  # columns of a summary, one per axis
 
 
 @checked
@@ -38,18 +38,18 @@ def run_columns(
     scheduler: str | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> int:
-    """Runs a scenario with columns of numbers in place of some fields, and stores the ends.
+    """Runs a scenario with columns of numbers in place of some fields, and stores the final states.
 
-    As `simulate_columns`, chunk by chunk on processes or on a cluster: each chunk is a Parquet file
-    in the folder, so that memory holds one chunk a process, and the same call makes those that an
-    interruption left. `read_sweep` reads the folder.
+    As `simulate_columns`, chunk by chunk on processes or on a cluster. Each chunk is a Parquet file
+    in the folder, so memory holds one chunk per process. After an interruption the same call makes
+    the missing chunks. `read_sweep` reads the folder.
 
     Args:
         base: as in `simulate_columns`.
         columns: as in `simulate_columns`.
         out: the folder.
-        chunk: runs of a file, the most that a killed process loses.
-        workers: processes on this machine; None for one a core.
+        chunk: runs per file, the most that a killed process loses.
+        workers: processes on this machine; None for one per core.
         scheduler: address of a dask scheduler to use instead.
         progress: called with the number of runs of each finished chunk.
 
@@ -60,7 +60,7 @@ def run_columns(
         ParameterError: as by `simulate_columns`; or the folder holds other runs, or cannot be
             written, or a package is missing.
         ChildProcessError: a worker here was killed.
-        ConnectionError: the scheduler has gone.
+        ConnectionError: the connection to the scheduler is lost.
     """
     plan, folder, done = ColumnRuns(base, columns, chunk), Path(out), 0
     with sweep.claimed(plan, folder) as (_, todo):
@@ -104,14 +104,14 @@ class ColumnRuns:
         return range(number * self.chunk, min((number + 1) * self.chunk, len(self)))
 
     def chunk_rows(self, number: int) -> list[dict[str, Any]]:
-        """Makes the runs of one file; a row each.
+        """Makes the runs of one file, one row per run.
 
         Args:
             number: of the file, from 0.
         """
         runs = self.chunk_runs(number)
         part = {name: x[runs.start : runs.stop] for name, x in self.columns.items()}
-        # a worker is one of several processes, one a core
+        # a worker is one of several processes, one per core
         threads = None if multiprocessing.parent_process() is None else 1
         made = table_of_ends(simulate_columns(self.base, part, threads=threads))
         table = {"run": list(runs), **{name: x.tolist() for name, x in part.items()}, **made}
@@ -124,7 +124,7 @@ class ColumnRuns:
         return {**first, "end_time": 0.0, "steps": 0, **ends, "energy_residual": 0.0}
 
     def described(self) -> dict[str, Any]:
-        """All of it as data; of the columns their names and a fingerprint."""
+        """The runs as plain data; the columns by their names and a fingerprint."""
         values = hashlib.sha256()
         for x in self.columns.values():
             values.update(x.tobytes())
@@ -132,7 +132,7 @@ class ColumnRuns:
         return {"schema": SCHEMA, **told, "chunk": self.chunk, "values": values.hexdigest()}
 
     def digest(self) -> str:
-        """Fingerprint of the runs, and of the release that makes them."""
+        """Fingerprint of the runs and of the hapticclay release."""
         text = json.dumps({**self.described(), "release": versions()["hapticclay"]}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 

@@ -27,10 +27,10 @@ from ..theory.loops import TIMING, Loop
 from ..theory.mbk import dynamic_range, least_mass
 from .zwidth import ZRegion, zwidth
 
-MOST_COMPARED = 5  # as many looks as curves have
+MOST_COMPARED = 5  # the number of distinct curve styles
 COMPARED_HANDS = hand_boxes.Box((0.0, 1.0), (0.0, 5.0), (0.0, 300.0))  # of the worst case
-SLOW = 1e-4  # [rad/s] at which motion counts as steady
-FELT_AT = (1.0, 10.0)  # [Hz] at which the table has the impedance, below and above the loop's swing
+SLOW = 1e-4  # [rad/s] frequency taken as steady motion
+FELT_AT = (1.0, 10.0)  # [Hz] of the impedance in the table, below and above the resonance
 RANGE_AT = np.geomspace(0.5, 30.0, 41)  # [Hz] of the dynamic range
 LEAST_DECAY = 10.0  # [1/s] B/M of the least mass: that of the paper's compensator
 PUSHED = 0.01  # [m/s] of a device in its run
@@ -48,11 +48,11 @@ class Compared:
     Attributes:
         name: of the file.
         subject: the scenario, or the wall on its device.
-        loop: of a scenario, one axis; None for a wall.
+        loop: one axis of a scenario; None for a wall.
         numbers: key numbers by name and unit; NaN where there is none.
         settings: every field by dotted name.
         record: its run.
-        region: of a wall, the stiffness and damping that its device renders stably, by runs.
+        region: for a wall, the stiffness and damping that its device renders stably, by runs.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Compared:
     region: ZRegion | None = None
 
     def impedance(self, omega: np.ndarray) -> Impedance:
-        """What a hand feels that is not in the loop; of a controller in continuous time.
+        """Impedance at a hand outside the loop; for a controller in continuous time.
 
         Args:
             omega: [rad/s], > 0, shape (n,).
@@ -81,7 +81,7 @@ class Comparison(Result):
     """Files side by side, in the order in which they were given.
 
     Attributes:
-        files: what each says, what theory says of it, and its run.
+        files: the contents of each, its theory and its run.
     """
 
     drawn_by = "hapticclay.views.compare_plots:main_overlay"
@@ -157,12 +157,12 @@ def is_wall_file(path: str | os.PathLike[str]) -> bool:
 def compared_scenario(path: str | os.PathLike[str], name: str, axis: str) -> Compared:
     """Judges and runs the controller of a scenario file.
 
-    Margins, hands, passivity and the steady damper are those of continuous time without delay; the
-    gain limit is that of the scenario's own sampling and delay.
+    Margins, worst hand, passivity and steady damper are computed in continuous time without delay;
+    the gain limit is computed with the scenario's own sampling and delay.
 
     Args:
         path: the file.
-        name: to be shown.
+        name: name to show.
         axis: "x" or "y".
     """
     scenario = Scenario.load(path)
@@ -197,7 +197,7 @@ def compared_wall(path: str | os.PathLike[str], name: str, axis: str = "x") -> C
 
     Args:
         path: the file.
-        name: to be shown.
+        name: name to show.
         axis: not used; as in `compared_scenario`.
     """
     wall = VirtualWall.load(path)
@@ -249,14 +249,14 @@ def run_and_error(scenario: Scenario) -> tuple[Record, float]:
         scenario: the run.
 
     Returns:
-        The record; the largest change of position at the samples that both have [m], NaN where
-        they end differently. It is about the error of the second run times 3.
+        The record; the largest change of position at the samples that both have [m], NaN where they
+        end differently. This is about 3 times the error of the second run.
     """
     sampled = scenario.control == "sampled"
     finer = replace(
         scenario, dt=0.5 * scenario.dt, Ts=(scenario.Ts or scenario.dt) if sampled else None
     )
-    fine = simulate(finer)  # first: the time of the other has no loading of compiled code in it
+    fine = simulate(finer)  # runs first, so that the other's time excludes loading of compiled code
     record = simulate(scenario)
     n = min(len(record.t), (len(fine.t) + 1) // 2) - 1
     if n < 1 or record.outcome.code != fine.outcome.code:
@@ -286,7 +286,7 @@ def _run_numbers(record: Record, error: float) -> dict[str, float]:
 
 
 def differing_fields(found: Comparison) -> dict[str, list[Any]]:
-    """Fields that are not alike in all files: the value of each file, None where it has none.
+    """Fields that differ between files: the value of each file, None if it has no such field.
 
     Args:
         found: from `compare_files`.

@@ -1,4 +1,4 @@
-"""Distributions of one parameter: four laws, each known by two numbers."""
+"""Distributions of one parameter: four laws with two parameters each."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SIDES = ("mean", "standard deviation", "low", "high")
 @named
 @dataclass(frozen=True)
 class Distribution:
-    """LawName of a random number. Both numbers have the unit of the parameter.
+    """Distribution of a random number. Both numbers have the unit of the parameter.
 
     Attributes:
         law: "normal" or "log-normal", known by mean and standard deviation; "uniform" or
@@ -72,11 +72,11 @@ class Distribution:
 
     @property
     def median(self) -> float:
-        """Value that one half of the numbers lie below."""
+        """Median of the distribution."""
         return float(self.spread(np.array([0.5]))[0])
 
     def spread(self, u: np.ndarray) -> np.ndarray:
-        """Values below which given shares of the numbers lie; uniform shares give a sample.
+        """Quantiles: values below which given shares of the numbers lie; uniform shares sample it.
 
         Args:
             u: shares, 0 < u < 1, any shape.
@@ -91,7 +91,7 @@ class Distribution:
         return self.of_score(normal_score(u))
 
     def of_score(self, z: np.ndarray) -> np.ndarray:
-        """Values whose shares are those of a standard normal number.
+        """Values at the quantiles of given standard normal numbers.
 
         Args:
             z: standard normal numbers, any shape.
@@ -107,7 +107,7 @@ class Distribution:
         return self.spread(_normal_share(z))
 
     def share_below(self, x: np.ndarray) -> np.ndarray:
-        """Share of the numbers below given values.
+        """Cumulative distribution: share of the numbers below given values.
 
         Args:
             x: values, any shape.
@@ -139,7 +139,7 @@ class Distribution:
 
 
 def normal_score(u: np.ndarray) -> np.ndarray:
-    """Standard normal numbers below which given shares of all lie.
+    """Quantiles of the standard normal distribution.
 
     Args:
         u: shares, 0 < u < 1, any shape.

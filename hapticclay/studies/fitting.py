@@ -59,11 +59,11 @@ from .trajectory import (
 FIT_SCHEMA = "hapticclay-fit-1"
 LEAST_INDEPENDENT = 10  # ... of which so many are independent
 FEW_SLIDING = 300
-NARROW = 3.0  # ratio of speeds below which n says little
+NARROW = 3.0  # ratio of speeds below which n is hardly identifiable
 MIDDLE = 0.96  # share of the samples whose speeds are compared
-EXACT = 1e-4  # of the force: what is left below this is the error of splines or steps, no noise
-MISFIT = 1.25  # variance beside a law over that beside a free curve: then none explains the force
-CORRELATED = 2.0  # samples that count as one
+EXACT = 1e-4  # of the force: smaller residuals are errors of splines or steps, not noise
+MISFIT = 1.25  # variance about a law over that about a free curve: above this no law fits
+CORRELATED = 2.0  # samples per independent sample, above which a warning is given
 
 
 @named
@@ -74,7 +74,7 @@ class FittedLaw:
     Attributes:
         law: its name, in FLOW_LAWS.
         parameters: its parameters.
-        deviation: standard deviation of a force from the law [N].
+        deviation: standard deviation of the force about the law [N].
         aicc: Akaike's criterion, corrected for few samples, above that of the best.
         weight: its Akaike weight among the candidates.
     """
@@ -96,17 +96,17 @@ class Fitted(Result):
         parameters: its parameters, with intervals.
         candidates: every law that was tried, from simple to rich.
         level: confidence level of the intervals.
-        t: time of the samples that slide [s], (n,).
+        t: time of the sliding samples [s], (n,).
         v: their velocity [m/s], (n,).
         f: resisting force, of the sign of v [N], (n,).
-        covariance: of the parameters, (k, k), the logarithm of K in its place.
+        covariance: covariance of the parameters, (k, k), with log K in place of K.
         force_noise: standard deviation of a force [N].
         position_noise: standard deviation of a position [m]; 0 where velocities were given.
         correlation: samples that count as one independent one.
-        samples: of the record, in the span.
+        samples: number of samples of the record in the span.
         spacing: of the knots of the motion [s]; 0 where velocities were given.
-        warnings: what limits the claim, a sentence each.
-        axis: "x", "y", or "path" for along the motion.
+        warnings: limits of the result, one sentence each.
+        axis: "x", "y", or "path" for the direction of motion.
         source: name of the data.
     """
 
@@ -148,7 +148,7 @@ class Fitted(Result):
         return self.f - self.flow.force(self.v)
 
     def band(self, v: Any) -> np.ndarray:
-        """Half the interval of the law's force at some velocities, at the level [N].
+        """Half width of the confidence interval of the law's force at given velocities [N].
 
         Args:
             v: velocities [m/s], (m,), none of them 0.
@@ -159,7 +159,7 @@ class Fitted(Result):
         return quantile * np.sqrt(np.einsum("ij,jk,ik->i", J, self.covariance, J))
 
     def tables(self) -> dict[str, dict[str, Any]]:
-        """Returns what a figure of the fit shows: its samples, and the law over the velocity."""
+        """Returns the numbers of the figure: samples, and the law over the velocity."""
         law = [self.flow.force(v) for v in self.v]
         return {
             "parameters": {
@@ -180,7 +180,7 @@ class Fitted(Result):
         }
 
     def summary(self) -> dict[str, Any]:
-        """Everything but the samples, ready for JSON."""
+        """The result without the samples, ready for JSON."""
         speed = np.abs(self.v)
         return {
             "schema": FIT_SCHEMA,
@@ -220,17 +220,17 @@ def fit_flow(
     time: tuple[float, float] | None = None,
     place: tuple[float, float] | None = None,
 ) -> Fitted:
-    """Fits a law of resistance, f = (Fy + K |v|^n) v/|v| + b v, and chooses which of its terms.
+    """Fits a law of resistance, f = (Fy + K |v|^n) v/|v| + b v, and selects its terms.
 
-    Positions and forces may carry white noise and be quantised. Samples at rest say no more than
-    |f| <= Fy and are left out. Chosen is the simplest law whose AICc is within 6 of the least.
+    Positions and forces may carry white noise and be quantised. Samples at rest only imply |f| <=
+    Fy and are left out. The simplest law whose AICc is within 6 of the least is chosen.
 
     Args:
         data: a Measurement with the force of the clay on the tool, counted as resistance, as its
-            input [N] and the position as its output [m]; or a Record, or its folder, of which
-            the samples inside clay are taken, with the velocities as simulated.
+            input [N] and the position as its output [m]; or a Record, or its folder: its samples
+            inside clay are used with the simulated velocities.
         axis: "x" or "y"; "path" for the force along the motion in a Record. None for "path" in
-            clay that is isotropic, else "x". Of a Measurement it is a name alone.
+            isotropic clay, else "x". For a Measurement it is only a name.
         laws: candidates, names in FLOW_LAWS.
         level: confidence level of the intervals, 0.5 to 0.999.
         time: first and last time to take [s]; None for all.
@@ -238,8 +238,7 @@ def fit_flow(
 
     Raises:
         ParameterError: an argument is wrong; too few samples slide; the force does not resist; or
-            the samples of a Record lie in clays of several laws, or in clay that springs back or
-            is turned.
+            the samples of a Record lie in clays of several laws, or in elastic or rotated clay.
     """
     names = _law_names(laws)
     level = number("level", level, 0.5, 0.999)
@@ -279,7 +278,7 @@ def fit_flow(
 
 
 def _law_names(laws: Sequence[str] | str) -> list[str]:
-    """Laws from simple to rich; upper and lower case, hyphens and spaces are alike."""
+    """Laws from simple to rich; case, hyphens and spaces are ignored."""
     known = {_plain_name(x): x for x in FLOW_LAWS}
     if not isinstance(laws, Sequence):
         raise ParameterError("laws", laws, "must be names of laws")
@@ -362,7 +361,7 @@ def _fitted(
 def _compared(
     names: list[str], found: dict[str, tuple[Minimum, Minimum]], least: float, count: float
 ) -> tuple[FittedLaw, ...]:
-    """The candidates with their AICc and weights; `count` independent samples."""
+    """The candidates with their AICc and weights, for `count` independent samples."""
     aicc = {}
     for law in names:
         a = found[law][0]
@@ -384,7 +383,7 @@ def _compared(
 
 
 def _warnings(r: Fitted, s: Sliding, count: float) -> tuple[str, ...]:
-    """What limits the claim; `count` is the step of the force's converter [N]."""
+    """Limits of the result; `count` is the step of the force's converter [N]."""
     out = []
     n, speed = len(r.v), np.abs(r.v)
     slow, fast = np.quantile(speed, (0.5 - 0.5 * MIDDLE, 0.5 + 0.5 * MIDDLE)).tolist()

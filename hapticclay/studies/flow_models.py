@@ -24,7 +24,7 @@ FLOW_LAWS: dict[str, Flowing] = {  # from simple to rich, named as `Flow.kind`
     "Herschel-Bulkley": Flowing(("Fy", "K", "n")),
 }
 FLOW_UNITS = {"Fy": "N", "K": "N/(m/s)^n", "n": "", "b": "N.s/m"}
-PARSIMONY = 6.0  # of AICc: a law needs odds of 20 to 1, exp(6/2), before a simpler one is given up
+PARSIMONY = 6.0  # of AICc: a richer law needs odds of 20 to 1, exp(6/2), over a simpler one
 TRIAL_INDICES = (0.15, 0.3, 0.5, 0.75, 1.0, 1.5, 2.2)  # flow indices from which fits start
 
 
@@ -49,10 +49,10 @@ class FlowParameter:
 
 
 def to_theta(values: Sequence[float], law: str) -> np.ndarray:
-    """Parameters as `Flowing` takes them.
+    """Converts parameters to the vector theta of `Flowing`.
 
     Args:
-        values: of the law.
+        values: parameters of the law.
         law: in FLOW_LAWS.
     """
     pairs = zip(FLOW_LAWS[law].names, values, strict=True)
@@ -60,10 +60,10 @@ def to_theta(values: Sequence[float], law: str) -> np.ndarray:
 
 
 def of_theta(theta: np.ndarray, law: str) -> list[float]:
-    """Parameters of a law of those that `Flowing` takes.
+    """Converts the vector theta of `Flowing` to parameters of a law.
 
     Args:
-        theta: they.
+        theta: vector of parameters.
         law: in FLOW_LAWS.
     """
     pairs = zip(FLOW_LAWS[law].names, theta.tolist(), strict=True)
@@ -71,7 +71,7 @@ def of_theta(theta: np.ndarray, law: str) -> list[float]:
 
 
 def first_guesses(law: str, v: np.ndarray, f: np.ndarray) -> np.ndarray:
-    """Parameters from which a fit starts: linear ones solved for, over some flow indices.
+    """Initial parameters of a fit: linear least squares over a grid of flow indices.
 
     Args:
         law: in FLOW_LAWS.
@@ -85,7 +85,7 @@ def first_guesses(law: str, v: np.ndarray, f: np.ndarray) -> np.ndarray:
         X = np.stack([columns[x] for x in linear], axis=1)
         found = np.linalg.lstsq(X, f, rcond=None)[0]
         a = dict(zip(linear, found.tolist(), strict=True), n=n)
-        if a.get("K", 1.0) <= 0.0:  # the force falls with the speed: almost flat then
+        if a.get("K", 1.0) <= 0.0:  # the force falls with the speed: start almost flat
             a["K"] = 1e-3 * float(np.mean(np.abs(f))) / float(np.mean(v)) ** n
             a["Fy"] = float(np.mean(f))
             found = np.array([a[x] for x in linear])
@@ -97,7 +97,7 @@ def first_guesses(law: str, v: np.ndarray, f: np.ndarray) -> np.ndarray:
 
 
 def best_fit(joint: Joint, law: str, start: np.ndarray) -> tuple[Minimum, Minimum]:
-    """Least sum of squares with Fy and b of 0 or more, and of any sign.
+    """Least-squares fits with Fy, b >= 0, and with Fy, b of any sign.
 
     Args:
         joint: motion and force.
@@ -115,11 +115,11 @@ def best_fit(joint: Joint, law: str, start: np.ndarray) -> tuple[Minimum, Minimu
 
 
 def refit_nested(joint: Joint, found: dict[str, tuple[Minimum, Minimum]]) -> None:
-    """Fit the richest law again from a simpler one that it holds, if that explains more.
+    """Fit the richest law again from a simpler law that it contains, if that one fits better.
 
     Args:
         joint: motion and force.
-        found: what was found, by law; that of the richest is replaced.
+        found: fits by law; the fit of the richest is replaced.
     """
     rich = "Herschel-Bulkley"
     for law in found:
@@ -136,7 +136,7 @@ def refit_nested(joint: Joint, found: dict[str, tuple[Minimum, Minimum]]) -> Non
 
 
 def student_quantile(level: float, freedom: float) -> float:
-    """Student's quantile of a two-sided interval.
+    """Student's t quantile of a two-sided interval.
 
     Args:
         level: confidence level.
@@ -150,13 +150,13 @@ def student_quantile(level: float, freedom: float) -> float:
 def parameter_intervals(
     joint: Joint, law: str, best: Minimum, free: Minimum, variance: float, quantile: float
 ) -> tuple[FlowParameter, ...]:
-    """Where the profile of the sum of squares rises by quantile^2 variance, within the bounds.
+    """Profile intervals: where the profiled sum of squares rises by quantile^2 variance.
 
     Args:
         joint: motion and force.
         law: in FLOW_LAWS.
         best: the fit within the bounds.
-        free: that with Fy and b of any sign.
+        free: the fit with Fy and b of any sign.
         variance: of a residual.
         quantile: half width of the interval in standard deviations.
     """
@@ -179,7 +179,7 @@ def _crossing(
     target: float,
     variance: float,
 ) -> float:
-    """Value of parameter j at which the root of the sum's rise, over its noise, is |target|."""
+    """Value of parameter j at which the root of the sum's rise over the noise is |target|."""
     spread, theta = free.spread, free.theta
     if not spread[j, j] > 0.0:  # at a limit, or without effect
         return float(theta[j])

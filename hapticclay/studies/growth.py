@@ -3,8 +3,8 @@
 The modes of a free linear motion are those of a linear prediction of low rank (ESPRIT: Roy,
 Kailath, IEEE Trans. ASSP 37, 1989). `growth_rate` reads them from a record. `short_growth` reads
 those of many short motions at once, of a few dozen samples each: about 0.2 ms a motion. It fits
-twice, with two ranks. Motions for which the two disagree, that grow or decay by too little, or that
-are not linear, stay undecided.
+twice, with two ranks. Motions remain undecided if the two ranks disagree, if growth or decay is too
+small, or if they are not linear.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from ..errors import choice
 from ..model.constants import AXES
 from ..simulation.record import Record
 
-FITTED_SHARE = 0.7  # of a run, its end, from which growth is read
+FITTED_SHARE = 0.7  # share of a run, at its end, from which growth is read
 GROWTH_SAMPLE = 4e-3  # [s] between the samples from which growth is read
 SINGULAR_SHARE = 1e-7  # singular values below this share of the largest are rounding
 MODE_SHARE = 1e-4  # so are modes below this share of the strongest
-SLOWEST_MODE = 1.0  # [rad/s, 1/s] slower modes are the hand's spring, no oscillation
-FADED = 1e-6  # a smaller share of the first speed is too near to rounding to be read
+SLOWEST_MODE = 1.0  # [rad/s, 1/s] slower modes are due to the hand's spring, not an oscillation
+FADED = 1e-6  # smaller shares of the first speed are dominated by rounding
 MOTION_SAMPLES = 55  # of a motion
 RANKS = (1e-5, 1e-7)  # singular values below these shares of the largest are left out
 LEAST_RATE = 0.3  # [1/s] slower growth or decay is left undecided
 AGREEMENT = 0.1  # the two rates may differ by this share of the smaller one
-LINEAR_SHARE = 1e-4  # of the largest sample: what a linear motion may miss of the samples
+LINEAR_SHARE = 1e-4  # of the largest sample: residual allowed for a linear motion
 
 
 def growth_rate(
     record: Record, axis: str, sample: float = GROWTH_SAMPLE, slowest: float = SLOWEST_MODE
 ) -> float:
-    """Rate at which the oscillation of a free motion grows: that of its least damped mode.
+    """Growth rate of the oscillation of a free motion: the rate of its least damped mode.
 
     The modes of the velocity are those of a linear prediction of low rank (ESPRIT: Roy, Kailath,
     IEEE Trans. ASSP 37, 1989), exact for a linear loop, whatever the sampling.
@@ -41,8 +41,8 @@ def growth_rate(
     Args:
         record: of the motion.
         axis: "x" or "y".
-        sample: about the time between the samples that are read [s].
-        slowest: modes slower than this do not count [rad/s, 1/s].
+        sample: approximate spacing of the samples used [s].
+        slowest: slower modes are ignored [rad/s, 1/s].
 
     Returns:
         [1/s], negative if the oscillation decays; inf for a run that ended before it could be read.
@@ -61,7 +61,7 @@ def growth_rate(
 
 
 def growth_of_run(record: Record, sample: float, slowest: float, axis: str = "x") -> float:
-    """Growth rate of a run; of one that has decayed into rounding, or has grown vastly, a mean.
+    """Growth rate of a run; a mean rate if the run decayed into rounding or grew very large.
 
     Args:
         record: of a free motion.
@@ -94,7 +94,7 @@ def _least_damped(v: np.ndarray, dt: float, slowest: float) -> float:
 def _judged(
     z: np.ndarray, amplitude: np.ndarray, samples: int, dt: float, slowest: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Growth rates of modes [1/s]; which are above rounding; which of these oscillate or run away.
+    """Growth rates of modes [1/s]; which exceed rounding; which of these oscillate or diverge.
 
     Modes lie along the last axis of z and amplitude.
     """
@@ -105,7 +105,7 @@ def _judged(
 
 
 def short_growth(v: np.ndarray, dt: float) -> np.ndarray:
-    """Growth rates of the oscillations of many free motions: those of their least damped modes.
+    """Growth rates of the oscillations of many free motions, from their least damped modes.
 
     Modes slower than `SLOWEST_MODE` do not count.
 
@@ -114,8 +114,8 @@ def short_growth(v: np.ndarray, dt: float) -> np.ndarray:
         dt: between two samples [s].
 
     Returns:
-        [1/s], shape (motions,); negative where the oscillation decays, NaN where these samples do
-        not tell.
+        [1/s], shape (motions,); negative where the oscillation decays, NaN where the samples are
+        inconclusive.
     """
     out = np.full(len(v), np.nan)
     size = np.abs(v).max(axis=1, initial=0.0)
@@ -138,7 +138,7 @@ def short_growth(v: np.ndarray, dt: float) -> np.ndarray:
 def _least_damped_of(
     v: np.ndarray, dt: float, u: np.ndarray, s: np.ndarray, share: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Growth rate of each motion [1/s], NaN for none, and the largest sample that it misses."""
+    """Growth rate of each motion [1/s], NaN for none, and the largest residual of its samples."""
     n, rows = v.shape[1], u.shape[1]
     ranks = np.clip((s > share * s[:, :1]).sum(axis=1), 1, rows // 2)
     rate, miss = np.full(len(v), np.nan), np.full(len(v), np.inf)
@@ -154,7 +154,7 @@ def _least_damped_of(
         sound = np.isfinite(F).all(axis=(1, 2)) & (rest > 1e-12)
         j, F = j[sound], F[sound]
         z = np.linalg.eigvals(F).astype(complex)
-        z[np.abs(z) < 1e-6] = 1e-6  # gone within a sample
+        z[np.abs(z) < 1e-6] = 1e-6  # decayed within a sample
         powers = np.exp(np.log(z)[:, None, :] * np.arange(n)[None, :, None])
         q, R = np.linalg.qr(powers)
         ok = np.isfinite(R).all(axis=(1, 2)) & (
@@ -166,7 +166,7 @@ def _least_damped_of(
         weight = np.linalg.solve(R, q.conj().transpose(0, 2, 1) @ v[j].astype(complex)[..., None])
         miss[j] = np.abs((powers @ weight)[..., 0] - v[j]).max(axis=1)
         growth, strong, swings = _judged(z, np.abs(weight[..., 0]), n, dt, SLOWEST_MODE)
-        # One that folds onto zero frequency, and grows slowly, may be a swing: undecided.
+        # A slowly growing mode aliased onto zero frequency may oscillate: undecided.
         doubtful = (strong & ~swings & (growth > LEAST_RATE)).any(axis=1)
         found = np.where(swings, growth, -np.inf).max(axis=1)
         rate[j] = np.where(doubtful | ~np.isfinite(found), np.nan, found)

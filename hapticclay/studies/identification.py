@@ -44,10 +44,10 @@ COEFFICIENT_UNITS = {
 }
 IDENTIFICATION_BAND = {"G": (0.15, 20.0), "S": (0.15, 20.0), "Th": (0.08, 3.0)}  # [Hz]
 PERIOD = {"G": 5.0, "S": 5.0, "Th": 10.0}  # [s]
-AMPLITUDE = {"G": 2e-3, "S": 2e-3, "Th": 1e-2}  # [m]: small enough to keep the pose; Th has none
+AMPLITUDE = {"G": 2e-3, "S": 2e-3, "Th": 1e-2}  # [m]: small enough to keep the pose; none for Th
 MULTISINE_LINES = 40
-COHERENT = 0.5  # least coherence of a line that counts as seen
-# Relative difference of the loop from the fitted form at AMPLITUDE, by runs without noise; SHAPED
+COHERENT = 0.5  # least coherence of a usable line
+# Relative deviation of the loop from the fitted form at AMPLITUDE, in runs without noise; SHAPED
 # for Sh where it holds at every pose.
 SETTLING = {"G": 5e-9, "S": 5e-5, "Th": 2e-7}
 SHAPED = 5e-9
@@ -63,7 +63,7 @@ class Noise:
     """Noise of the sensors. The paper prints no figure; these are ours.
 
     Attributes:
-        encoder_counts: of each joint's quadrature encoder, a turn.
+        encoder_counts: counts per turn of each joint's quadrature encoder.
         force: rms of the force sensor, white [N].
     """
 
@@ -135,9 +135,9 @@ class Identified(Result):
         coefficients: of gain/(s^2 + damping s + stiffness), or of mass s^2 + damper s + spring,
             with 95 % intervals from the scatter of the runs.
         scenario: of the first run; None for measured columns.
-        noise: added to the records; None for none.
+        noise: noise added to the records; None for none.
         seed: of phases and noise.
-        periods: kept of each run; 0 for a measured record without a period.
+        periods: periods kept of each run; 0 for a measured record without a period.
         realisations: number of runs.
         source: name of the measured columns; empty for the simulated arm.
     """
@@ -216,7 +216,7 @@ class Identified(Result):
 
 
 def response_tables(results: Sequence[Identified], paper: bool = True) -> dict[str, dict[str, Any]]:
-    """Returns what a figure of one block shows: the response on each axis, and its equations.
+    """Returns the numbers of the figure of one block: the response on each axis, and its equations.
 
     Args:
         results: of one block, on one axis or both.
@@ -256,12 +256,12 @@ def endpoint_mobility(x: float, y: float) -> tuple[float, float]:
 def measured(
     record: Record, noise: Noise | None, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Handle position [m] and hand force [N] as the sensors show them.
+    """Handle position [m] and hand force [N] as measured by the sensors.
 
     Args:
         record: of a run.
         noise: of the sensors; None for none.
-        rng: of the force sensor.
+        rng: random generator of the force sensor.
 
     Returns:
         p and fh, shape (n, 2) each.
@@ -280,8 +280,8 @@ def measured(
 class Identification:
     """Identify one block of the loop on one axis; the compensator is off (K = 0).
 
-    A command drives G and a muscle force Sh; for Th the operator's arm holds a handle that a
-    command moves.
+    G is excited by a command, Sh by a muscle force. For Th the operator's arm holds a handle moved
+    by a command.
 
     Attributes:
         axis: "x" or "y".
@@ -338,8 +338,8 @@ class Identification:
         """Makes the runs, and fits the block to them.
 
         Raises:
-            ParameterError: a value is out of its bounds, the handle cannot be there, or a run ended
-                early or met the limits of the motors.
+            ParameterError: a value is out of its bounds, the handle is out of reach, or a run ended
+                early or saturated the motors.
         """
         from scipy.fft import next_fast_len
 
@@ -381,7 +381,7 @@ class Identification:
         bins = np.round(wave.omega / (2.0 * np.pi) * wave.period).astype(int)
         frequency = bins / wave.period
         found = estimate_response(np.array(signals), n, bins)
-        # The difference equation of the continuous loop; none of second order describes a hold.
+        # The difference equation of the continuous loop; no second-order one describes a hold.
         step = base.dt if self.control == "continuous" else None
         settling = SHAPED if what == "S" and self.inertia_shaping else SETTLING[what]
         floor = settling * (size / AMPLITUDE[what]) ** 2
@@ -408,7 +408,7 @@ identify = function_of(
 def _multisine(
     rms: tuple[float, float], band: object, period: float, lines: int, limit: float
 ) -> Multisine:
-    """A multisine of as many lines as requested or as fit into the period, three at least."""
+    """A multisine with the requested lines, or as many as fit into the period, at least three."""
     low, high = numbers_of("band", band, ("low", "high"), 0.0, limit, above=True, unit="Hz")
     lines = integer("lines", lines, 3, 100_000)
     most = math.floor(high * period + 1e-9) - math.ceil(low * period - 1e-9) + 1
@@ -429,7 +429,7 @@ def _signals(
 
 
 def format_coefficient(c: Coefficient) -> str:
-    """Fitted value and half its interval, to two figures of the latter: "41.793 +- 0.012".
+    """Fitted value and half its interval, rounded to two digits of the latter: "41.793 +- 0.012".
 
     Args:
         c: the coefficient.
@@ -466,8 +466,8 @@ def response(
         what: "G", "S" (Sh) or "Th".
         coefficients: in the order of COEFFICIENT_NAMES.
         frequency: [Hz], shape (n,).
-        dt: step of the loop [s], which differentiates by central differences and lets a spring act
-            on (1, 2, 1)/4 of three positions; None for the printed form in continuous time.
+        dt: step of the loop [s], with central differences for derivatives and springs on the mean
+            (1, 2, 1)/4 of three positions; None for the printed form in continuous time.
     """
     s2, s, one = _derivatives(frequency, dt)
     a, b, c = coefficients
@@ -488,8 +488,8 @@ def _derivatives(
 def estimate_response(signals: np.ndarray, n: int, bins: np.ndarray) -> Estimate:
     """Response at the lines of a multisine.
 
-    The reference is free of noise, so S_ry/S_ru is free of bias, with noise on the input and in a
-    closed loop too (Pintelon, Schoukens 2012, sec. 2.6.4). Windows of whole periods do not leak.
+    The reference has no noise, so S_ry/S_ru is unbiased even with noise on the input and in a
+    closed loop (Pintelon, Schoukens 2012, sec. 2.6.4). Windows of whole periods do not leak.
 
     Args:
         signals: reference, input and output, (runs, 3, periods n); more than one run, or period.
@@ -523,14 +523,14 @@ def _scatter(errors: np.ndarray) -> np.ndarray:
 
 
 def noise_deviation(found: Estimate) -> np.ndarray:
-    """Deviation of each line that white noise of input and output would cause, (lines,).
+    """Standard deviation of each line under white noise of input and output, (lines,).
 
-    Two numbers, fitted to the scatter of all lines. Weights that follow the scatter of a few lines
-    over a few runs favour those whose errors happen to be small, whereby the fit becomes worse than
-    its intervals say. These hold with any weights; where noise is not white, they are wider.
+    The model has two parameters, fitted to the scatter of all lines. Weights from the scatter of a
+    few lines over a few runs favour lines with accidentally small errors, and the fit becomes worse
+    than its intervals. The intervals hold for any weights; for coloured noise they are wider.
 
     Args:
-        found: the response, of several runs; of a single one, its own deviation is returned.
+        found: the response of several runs; for a single run its own deviation is returned.
     """
     from scipy.optimize import nnls
 
@@ -546,7 +546,7 @@ def noise_deviation(found: Estimate) -> np.ndarray:
 
 
 def _smooth(x: np.ndarray) -> np.ndarray:
-    """Mean of each value and its SMOOTHED_LINES - 1 nearest, of those that exist."""
+    """Mean of each value and its SMOOTHED_LINES - 1 nearest neighbours, fewer at the ends."""
     half, at = SMOOTHED_LINES // 2, np.arange(len(x))
     total = np.cumsum(np.concatenate(([0.0], x)))
     low, high = np.maximum(at - half, 0), np.minimum(at + half + 1, len(x))
@@ -564,9 +564,9 @@ def fit(
     """Fit the coefficients of a block to a response.
 
     Least squares of the complex misfit, each line weighted by its deviation. The 95 % intervals
-    come from how far each run alone would move the coefficients (Student's t, of one degree of
-    freedom fewer than runs): the count of an encoder makes errors that lines share, and an error
-    that all share leaves no misfit. For a single run they come from that misfit.
+    follow from the influence of each run on the coefficients (Student's t, one degree of freedom
+    fewer than runs). The misfit would not do: encoder counts cause errors common to all lines,
+    which leave no misfit. For a single run the intervals follow from the misfit.
 
     Args:
         what: "G", "S" (Sh) or "Th".
@@ -625,7 +625,7 @@ def fitted_coefficients(
     dt: float | None,
     floor: float,
 ) -> tuple[Coefficient, ...]:
-    """Fit a block and put the coefficients beside the printed ones.
+    """Fit a block and return the coefficients with the printed ones.
 
     Args:
         what: "G", "S" (Sh) or "Th".
@@ -633,7 +633,7 @@ def fitted_coefficients(
         frequency: [Hz], (n,).
         found: the response.
         dt: as in `response`.
-        floor: relative error of the fitted form itself, part of the interval.
+        floor: relative error of the fitted form itself, included in the interval.
     """
     value, half = fit(what, frequency, found.response, noise_deviation(found), found.errors, dt)
     half = np.hypot(half, floor * np.abs(value))

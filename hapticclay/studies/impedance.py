@@ -1,7 +1,7 @@
-"""The impedance at the hand, measured on runs by a multisine, with the computed one.
+"""The impedance at the hand, measured with a multisine in simulation, and the computed one.
 
-The muscles push with a multisine so small that the arm stays linear; after the transient the
-response is taken at its lines over whole periods, as in `identification`.
+The muscle force is a multisine small enough that the arm stays linear. After the transient the
+response is evaluated at its lines over whole periods, as in `identification`.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ IMPEDANCE_PERIOD = 4.0  # [s]
 IMPEDANCE_LINES = 24
 MOTION = 1e-5  # [m] rms: the pose changes the mobility by 4e-5 of it
 LONGEST_STEP = 1e-4  # [s] of the engine: its error is (omega dt)^2/6, 6e-5 at 30 Hz
-STEPS_TRIED = 24  # more of them a sample, until the delay falls on a step
-SETTLING_PERIODS = (2, 6, 22)  # let go by before the response is taken, until it has settled
+STEPS_TRIED = 24  # step numbers per sample to try, until the delay falls on a step
+SETTLING_PERIODS = (2, 6, 22)  # periods discarded until the response has settled
 STEADY_RESPONSE = 1e-4  # relative deviation of the impedance from period to period
 LINEAR_MOTION = "must leave the motion linear: "
 
@@ -48,13 +48,13 @@ class MeasuredImpedance(Result):
     """An impedance measured on a run, with the computed one at the same frequencies.
 
     Attributes:
-        subject: what was run.
+        subject: the loop or wall that was run.
         measured: by the run, at the lines.
         computed: by theory, at the lines.
-        deviation: of the measured Z from period to period, relative, shape (n,): what is left of
-            the transient.
+        deviation: relative change of the measured Z from period to period, shape (n,): the residual
+            transient.
         scenario: the run.
-        notes: what the run has and theory leaves out.
+        notes: effects in the run that theory neglects.
     """
 
     drawn_by = "hapticclay.views.impedance_plots:impedance_plot"
@@ -67,7 +67,7 @@ class MeasuredImpedance(Result):
     notes: tuple[str, ...] = ()
 
     def headline(self) -> str:
-        """Band, and how far measured and computed are apart, in one line."""
+        """Band and deviation of measured from computed impedance, in one line."""
         f = self.measured.frequency
         return f"{f[0]:.3g} to {f[-1]:.3g} Hz, {100.0 * self.gap:.2g} % from the computed one"
 
@@ -78,7 +78,7 @@ class MeasuredImpedance(Result):
 
     @property
     def felt_gap(self) -> float:
-        """Largest relative difference of the measured fe/fh from the computed; NaN without any."""
+        """Largest relative difference of the measured fe/fh from the computed; NaN without fe."""
         there = self.computed.transparency != 0.0
         if not np.any(there):
             return math.nan
@@ -94,7 +94,7 @@ class MeasuredImpedance(Result):
         return computed_impedance(self.subject, 2.0 * math.pi * np.asarray(frequency, dtype=float))
 
     def tables(self) -> dict[str, dict[str, list[float]]]:
-        """What the figures show, by table, columns headed with their units."""
+        """The numbers of the figures, by table, columns headed with their units."""
         (measured,), (computed,) = (x.tables().values() for x in (self.measured, self.computed))
         return {"measured": measured | {"deviation": self.deviation.tolist()}, "computed": computed}
 
@@ -113,7 +113,7 @@ class MeasuredImpedance(Result):
 
 
 def computed_impedance(subject: Subject, omega: np.ndarray) -> Impedance:
-    """What theory says of a loop or a wall, at the nominal pose.
+    """The computed impedance of a loop or a wall, at the nominal pose.
 
     Args:
         subject: a `PushedLoop` or a `VirtualWall`.
@@ -137,17 +137,17 @@ def measure_impedance(
 ) -> MeasuredImpedance:
     """Measure the impedance of a loop or a wall by a run, and compute it.
 
-    The run begins at the nominal pose. Agreement is limited by the steps of the engine, (omega
-    dt)^2/6, by the amplitude over the length of a link, and by what is left of the transient.
+    The run begins at the nominal pose. Agreement is limited by the engine's step, (omega dt)^2/6,
+    by the amplitude over the length of a link, and by the residual transient.
 
     Args:
-        subject: a `Scenario`; a `PushedLoop`, whose own push and pose do not matter; or a
-            `VirtualWall` that acts everywhere.
+        subject: a `Scenario`; a `PushedLoop`, its push and pose ignored; or a `VirtualWall` that
+            acts everywhere.
         axis: of a scenario, "x" or "y".
         band: lowest and highest frequency [Hz].
         lines: of the multisine, spread over the logarithm of frequency.
         period: of the multisine [s], rounded up to whole samples that are quick to transform.
-        amplitude: rms of the motion to aim at [m].
+        amplitude: target rms of the motion [m].
         seed: of the phases.
 
     Raises:
@@ -190,7 +190,7 @@ def measure_impedance(
 
 
 def _check_subject(subject: Subject) -> None:
-    """Refuse what no steady response exists of."""
+    """Refuse a subject without a steady response."""
     if isinstance(subject, VirtualWall):
         if subject.unilateral:
             bound = "must be False: a unilateral wall is not linear"
@@ -214,13 +214,13 @@ def _check_subject(subject: Subject) -> None:
 
 
 def _rough(subject: Subject) -> bool:
-    """Whether friction or encoder are in the run, which theory leaves out."""
+    """Whether the run has friction or an encoder, which theory neglects."""
     device = subject.device if isinstance(subject, VirtualWall) else None
     return device is not None and bool(device.friction or device.quantum)
 
 
 def _steps_of(subject: Subject, length: float) -> tuple[float | None, int, int]:
-    """Control sample; engine steps in a period, whole samples; and in a sample."""
+    """Control sample; engine steps per period, in whole samples; engine steps per sample."""
     from scipy.fft import next_fast_len
 
     if subject.Ts is None:
@@ -247,9 +247,9 @@ def _measured(
 ) -> tuple[Impedance, np.ndarray]:
     """The impedance over two whole periods of a record, and its relative deviation.
 
-    A row of the record holds velocity and hand force at the sample itself, the force interpolated
-    between the kicks on both sides. The force of the motors is held: its rows are a staircase,
-    whose fundamental is that of the rows times that of a hold.
+    A row of the record holds velocity and hand force at the sample, with the force interpolated
+    between the kicks on both sides. The motor force is held, so its rows form a staircase: its
+    fundamental is that of the rows times that of a hold.
     """
     v, fh, fe = (x[part, i] for x in (record.v, record.fh, record.fe))
     held = False

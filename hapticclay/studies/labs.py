@@ -28,17 +28,17 @@ RATES = (0.5e-3, 1e-3, 2e-3, 4e-3)  # [s]
 DAMPERS = (0.25, 0.5, 1.0)  # [N.s/m]
 DAMPINGS = (0.0, 5.0, 20.0, 60.0, 120.0)  # [N.s/m]
 DELAYS = (0.0, 0.5, 1.0, 2.0, 4.0)  # samples
-STEPS = 8  # engine steps a sample of paths that draw energy
-SHOWN = 0.6  # [s] of the run that is shown live
+STEPS = 8  # engine steps per sample of paths that draw energy
+SHOWN = 0.6  # [s] length of the run shown live
 BEYOND = 1.05  # K of that run over the limit
 PUSH = 0.05  # [m/s] with which it meets the wall
 
 STIFFNESS, FORCE, PRESSED = 500.0, 2.0, 0.4  # N/m, N, s: of the wall whose changes are judged
-SETTLED = 0.25  # share of such a run in which the indentation is read
+SETTLED = 0.25  # last share of such a run, over which the indentation is averaged
 CHANGES = np.linspace(0.0, 0.4, 9)  # of stiffness at which the indentation is found by runs
 ROUGH = Device(MASS, 2.0, quantum=1e-4)  # a device whose encoder hides part of a change
 OBSERVER = Observer(0.08, 0.03)
-STAIRCASES = (  # the rules, of small steps: a large one shifts the point of convergence
+STAIRCASES = (  # the rules, with small steps: large ones shift the point of convergence
     Staircase(down=2, fall=0.004, rise=0.004, reversals=60, skipped=10),
     Staircase(down=3, fall=0.004, rise=0.004, reversals=60, skipped=10),
     Staircase(down=1, fall=0.002, rise=0.006, reversals=60, skipped=10),
@@ -51,17 +51,17 @@ Tell = Callable[[str], None]
 @named
 @dataclass(frozen=True, eq=False, repr=False)
 class Lab(Result):
-    """A lab: its task and questions, what its runs gave, and a run to look at.
+    """A lab: task, questions, results of its runs, and a run to watch.
 
     Attributes:
         name: of the lab.
         title: in a few words.
-        task: what is done.
-        questions: to be answered by whoever does it.
-        found: the answer to the first of them, in one line.
+        task: description of the task.
+        questions: questions for the student.
+        found: answer to the first question, in one line.
         columns: its table, by column.
         charts: its figures.
-        scene: a run that shows the effect live.
+        scene: run that shows the effect live.
     """
 
     drawn_by = "hapticclay.views.chart_plots:lab_plot"
@@ -76,11 +76,11 @@ class Lab(Result):
     scene: Scenario
 
     def headline(self) -> str:
-        """What was found, in one line."""
+        """The result, in one line."""
         return f"{self.title}: {self.found}"
 
     def tables(self) -> dict[str, dict[str, Sequence[Any]]]:
-        """The table of the lab, then the curves of its figures."""
+        """The table of the lab and the curves of its figures."""
         out: dict[str, dict[str, Sequence[Any]]] = {self.name: dict(self.columns)}
         for chart in self.charts:
             out |= {f"{chart.name}: {name}": table for name, table in chart.tables().items()}
@@ -88,18 +88,18 @@ class Lab(Result):
 
 
 def _limits(walls: Sequence[VirtualWall]) -> list[float]:
-    """Largest stable K of each wall by runs, searched for from the linear rule [N/m]."""
+    """Largest stable K of each wall by runs; the search starts from the linear rule [N/m]."""
     around = [wall_limits.hulin_limit(w) for w in walls]
     return [stiffest([w], [K], K, PRESS, unshown)[0] for w, K in zip(walls, around, strict=True)]
 
 
 def _swinging(wall: VirtualWall, K: float) -> Scenario:
-    """A run of a wall just beyond a limit, to be looked at."""
+    """A run of a wall just above its limit, for display."""
     return replace(wall, K=BEYOND * K).scenario(SHOWN, push=PUSH)
 
 
 def wall_lab(quick: bool, tell: Tell) -> Lab:
-    """A wall and its rate: how stiff may it be, over the control sample?
+    """A wall and its rate: the largest stable stiffness over the control sample.
 
     Args:
         quick: fewer rates.
@@ -143,7 +143,7 @@ def wall_lab(quick: bool, tell: Tell) -> Lab:
 
 
 def zwidth_lab(quick: bool, tell: Tell) -> Lab:
-    """The Z-width: which K and B does a device render stably?
+    """The Z-width: the K and B that a device renders stably.
 
     Args:
         quick: one damper and three values of B.
@@ -186,7 +186,7 @@ def zwidth_lab(quick: bool, tell: Tell) -> Lab:
 
 
 def delay_lab(quick: bool, tell: Tell) -> Lab:
-    """Delay and passivity: what does a late force cost?
+    """Delay and passivity: the effect of a delayed force.
 
     Args:
         quick: two delays.
@@ -238,7 +238,7 @@ def pressed_wall(change: float, device: Device) -> Scenario:
 
     Args:
         change: of the stiffness, as a share.
-        device: that renders it.
+        device: device that renders the wall.
     """
     K = STIFFNESS * (1.0 + change)
     damping = 0.5 * math.sqrt(K * device.mass)
@@ -247,10 +247,10 @@ def pressed_wall(change: float, device: Device) -> Scenario:
 
 
 def felt_changes(device: Device) -> np.ndarray:
-    """Change of stiffness that a hand feels at CHANGES: force over indentation, by runs.
+    """Change of stiffness at the hand for CHANGES: force over indentation, by runs.
 
     Args:
-        device: that renders the walls.
+        device: device that renders the walls.
     """
     depths = []
     for record in simulate_batch(pressed_wall(float(x), device) for x in CHANGES):
@@ -260,7 +260,7 @@ def felt_changes(device: Device) -> np.ndarray:
 
 
 def jnd_lab(quick: bool, tell: Tell) -> Lab:
-    """A just-noticeable difference of stiffness, by staircases on an observer that is known.
+    """A just-noticeable difference of stiffness, by staircases on a known observer.
 
     Args:
         quick: fewer staircases.

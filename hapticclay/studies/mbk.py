@@ -1,4 +1,4 @@
-"""Renderable masses, dampers and springs: what theory says, and where runs stop being stable."""
+"""Renderable masses, dampers and springs: stability borders by theory and by runs."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from .wall_runs import growth_rates
 
 MBK_SCHEMA = "hapticclay-mbk-1"
 MBK_UNITS = {"M": "kg", "B": "N.s/m", "K": "N/m"}
-MOST_SOUGHT = 100.0  # times the exact border: end of a search
+MOST_SOUGHT = 100.0  # end of a search, in multiples of the exact border
 HANDS = Box((0.1, 1.0), (1.0, 10.0), (0.0, 300.0))  # a choice of ours: light to firm grips
 DECAYS = (1.0, 1000.0)  # [1/s] B/M of admittances
 RANGE_BAND = (0.5, 30.0)  # [Hz]
@@ -40,9 +40,9 @@ class Border(NamedTuple):
     """A border of stability found by runs.
 
     Attributes:
-        x: along the plane.
-        y: up it, as found.
-        exact: the same by theory.
+        x: value on the horizontal axis of the plane.
+        y: value on the vertical axis, found by runs.
+        exact: value on the vertical axis by theory.
         end: "high" or "low".
     """
 
@@ -55,12 +55,12 @@ class Border(NamedTuple):
 @named
 @dataclass(frozen=True, eq=False, repr=False)
 class DeviceMBK(Result):
-    """What a bare device renders: a region over each plane, and its dynamic range.
+    """Stable renderings of a bare device: a region over each plane, and the dynamic range.
 
     Attributes:
         wall: device, hand and sampling; each plane keeps one of its K, B and M.
         regions: by plane.
-        found: borders by runs, by plane.
+        found: borders found by runs, by plane.
         range: from free motion to the stiffest stable wall.
     """
 
@@ -83,7 +83,7 @@ class DeviceMBK(Result):
         return max(gaps, default=math.nan)
 
     def tables(self) -> dict[str, dict[str, Sequence[Any]]]:
-        """What the figures show, by table, columns headed with their units."""
+        """The numbers of the figures, by table, columns headed with their units."""
         out: dict[str, dict[str, Sequence[Any]]] = {}
         for plane, region in self.regions.items():
             a, b = (f"{name} [{MBK_UNITS[name]}]" for name in PLANES[plane])
@@ -129,10 +129,11 @@ class ArmMBK(Result):
     Every larger mass of the same B/M is stable as well.
 
     Attributes:
-        loop: arm, servo, hand and sampling; its own compensator and gain do not matter.
+        loop: arm, servo, hand and sampling; its compensator and gain are ignored.
         box: hands.
         nominal: M [kg] and B [N.s/m] of the border with the loop's own hand, shape (2, n).
-        worst: the same over all hands of the box; its own hand in a sampled loop is one of them.
+        worst: the same for the worst hand of the box; in a sampled loop this includes the loop's
+            own hand.
         found: the border by runs with the loop's own hand.
     """
 
@@ -145,7 +146,7 @@ class ArmMBK(Result):
     found: tuple[Border, ...]
 
     def headline(self) -> str:
-        """Least mass with the own hand and with any of the box, in one line."""
+        """Least mass with the loop's own hand and with all hands of the box, in one line."""
         M, worst = self.nominal[0].min(), self.worst[0].min()
         return f"masses from {M:.4g} kg with this hand, from {worst:.4g} kg with any of the box"
 
@@ -155,7 +156,7 @@ class ArmMBK(Result):
         return max((abs(r.y / r.exact - 1.0) for r in self.found), default=math.nan)
 
     def tables(self) -> dict[str, dict[str, Sequence[Any]]]:
-        """What the figure shows, by table, columns headed with their units."""
+        """The numbers of the figure, by table, columns headed with their units."""
         M, B = "least M [kg]", "B [N.s/m]"
         out: dict[str, dict[str, Sequence[Any]]] = {
             name: {B: b.tolist(), M: m.tolist()}
@@ -190,13 +191,13 @@ def device_mbk(
     band: tuple[float, float] = RANGE_BAND,
     progress: Callable[[Iterable], Iterable] = iter,
 ) -> DeviceMBK:
-    """What a bare device renders, over three planes, with runs at the borders.
+    """Stable renderings of a bare device over three planes, with runs at the borders.
 
     Args:
         wall: device, hand and sampling. The plane of M and B keeps its K, that of M and K its B,
-            and that of B and K its M; a surface and the device's friction and quantum are left out.
-        columns: of each plane at which runs look for the border, 0 (theory alone) to 100.
-        points: of each line, 3 to 1001.
+            and that of B and K its M; a surface and the device's friction and quantum are ignored.
+        columns: columns of each plane where runs search the border, 0 (theory alone) to 100.
+        points: points of each line, 3 to 1001.
         band: lowest and highest frequency of the dynamic range [Hz].
         progress: wraps the iterable of the columns.
 
@@ -224,14 +225,14 @@ def device_mbk(
 
 @checked
 def wall_borders(wall: VirtualWall, plane: str, x: float) -> list[Border]:
-    """The borders of one column of a plane found by runs, the search begun at the exact ones.
+    """The borders in one column of a plane by runs; the search starts at the exact borders.
 
-    A low border at or below 0 is not looked for.
+    Low borders at or below 0 are not searched.
 
     Args:
         wall: as in `renderable`.
         plane: one of PLANES.
-        x: the part along the plane.
+        x: the part on the horizontal axis.
     """
     across, up = PLANES[choice("plane", plane, tuple(PLANES))]
     wall = replace(wall, **{across: x})
@@ -264,13 +265,12 @@ def arm_mbk(
     """The least masses that the arm renders over their damper, with runs.
 
     Args:
-        loop: arm, servo, hand and sampling, or a scenario; its own compensator and gain do not
-            matter.
+        loop: arm, servo, hand and sampling, or a scenario; its compensator and gain are ignored.
         box: hands.
         axis: of a scenario, "x" or "y".
-        columns: number of B/M at which runs look for the border, 0 (theory alone) to 100.
+        columns: number of B/M where runs search the border, 0 (theory alone) to 100.
         points: number of B/M of each line, 2 to 1001.
-        samples: random members of the box tried in a sampled or late loop.
+        samples: random members of the box tested in a sampled or delayed loop.
         progress: wraps the iterable of the points.
 
     Raises:

@@ -19,7 +19,7 @@ import numpy as np
 from ..arguments import named
 from ..errors import ParameterError, array_of, choice
 
-COLUMNS = {  # of a file: what each holds
+COLUMNS = {  # columns of a file and their contents
     "t": "time [s]",
     "input": "command [m] for G, force of the hand on the handle [N] for S and Th",
     "output": "position of the handle [m]",
@@ -35,20 +35,20 @@ JITTER = 0.05  # largest deviation of a step from the mean step
 class Measurement:
     """Columns measured on an arm, evenly sampled; SI units.
 
-    A constant may be missing from each column: the zero of a sensor does not matter.
+    Each column may have an unknown offset: the zero of a sensor is irrelevant.
 
     Attributes:
         t: time [s], (n,), n >= 100; no step differs from the mean one by more than 5 %.
         input: for G the command delta [m], for S and Th the force of the hand on the handle, fh
             [N], (n,).
         output: position of the handle [m], (n,).
-        reference: what drives the experiment, independent of all noise, in any unit, (n,); None
-            takes the input, for Th the position.
-        name: in titles and files.
+        reference: excitation of the experiment, independent of all noise, in any unit, (n,); None
+            uses the input, for Th the position.
+        name: name in titles and files.
 
     Raises:
-        ParameterError: a column is no such array, constant, or too short; a value is not finite;
-            the sampling is uneven.
+        ParameterError: a column is not such an array, is constant or too short; a value is not
+            finite; the sampling is uneven.
     """
 
     t: np.ndarray
@@ -77,18 +77,18 @@ class Measurement:
     def load(cls, path: str | Path, columns: Mapping[str, str] | None = None) -> Measurement:
         """Read a CSV file, whose first line names its columns.
 
-        Comma, semicolon or tab separate cells; empty lines and lines that begin with # are left
-        out, as is a last row after a shorter step: a run ends between two samples. Other columns
-        may hold anything.
+        Comma, semicolon or tab separate cells; empty lines and lines that begin with # are skipped.
+        A last row after a shorter step is skipped too, because a run ends between two samples.
+        Other columns may hold anything.
 
         Args:
             path: the file.
-            columns: names in the file of t, input, output and reference; a name that is not given
-                stands for itself, and a reference is read only if it is given.
+            columns: names in the file of t, input, output and reference; a name not given defaults
+                to its key, and a reference is read only if it is given.
 
         Raises:
             ParameterError: the file cannot be read or is empty; a column is missing, named twice,
-                or holds what is no finite number; or as `Measurement`.
+                or holds a value that is not a finite number; or as `Measurement`.
         """
         for key in dict(columns or {}):
             choice("columns", key, tuple(COLUMNS))
@@ -156,7 +156,7 @@ def _bad_file(path: Path, bound: str) -> ParameterError:
 
 
 def _read_table(path: Path) -> list[tuple[int, list[str]]]:
-    """Lines of a CSV file that are no comments: number and cells."""
+    """Lines of a CSV file without comments: number and cells."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
@@ -177,7 +177,7 @@ def _read_table(path: Path) -> list[tuple[int, list[str]]]:
 
 
 def _places(path: Path, head: list[str], wanted: Mapping[str, str]) -> dict[str, int]:
-    """Where in the first line the columns stand, by the keys of `wanted`."""
+    """Indices of the columns in the first line, by the keys of `wanted`."""
     at = {}
     for key, name in wanted.items():
         column = choice(f"columns.{key}", name, tuple(head))

@@ -25,11 +25,11 @@ from .port_energy import passivity_limit, polygon, taken_energy
 from .stability_map import Progress
 
 INDEX_TURNS = ((1, 8), (1, 4), (3, 8), (1, 2), (2, 3), (4, 5), (1, 1))  # omega Ts over pi
-INDEX_BAND = (0.02, 0.9)  # of pi/Ts, of the sines of the impedance
+INDEX_BAND = (0.02, 0.9)  # shares of pi/Ts: sines that measure the impedance
 INDEX_LINES = 8
 ARM_BAND = (0.5, 30.0)  # [Hz]
 INDEX_POINTS = 2000  # of a computed line
-REGION_SPAN = 10.0  # Ts is shown down to that of the wall over this, and up to so many times it
+REGION_SPAN = 10.0  # Ts ranges from that of the wall divided by this to that times this
 REGION_POINTS = 61
 WORST_AMPLITUDE = 1e-4  # [m] of the worst paths
 
@@ -37,16 +37,17 @@ WORST_AMPLITUDE = 1e-4  # [m] of the worst paths
 @named
 @dataclass(frozen=True, eq=False)
 class IndexOverFrequency:
-    """Damping to spare of a wall, or of an arm in clay, at each frequency, with runs.
+    """Excess damping of a wall, or of an arm in clay, at each frequency, with runs.
 
     Attributes:
-        name: of what was run.
-        omega: of the lines [rad/s], (n,).
+        name: name of the subject.
+        omega: frequencies of the lines [rad/s], (n,).
         damping: Re Z of the impedance fh/v [N.s/m], (n,).
-        index: of Colgate and Schenkel, a sampled wall only [N.s/m], (n,); None for an arm.
-        measured_omega: of the runs by sines [rad/s], (m,).
+        index: passivity index of Colgate and Schenkel for a sampled wall [N.s/m], (n,); None for an
+            arm.
+        measured_omega: frequencies of the runs by sines [rad/s], (m,).
         measured: Re Z in those runs [N.s/m], (m,).
-        worst_omega: of the runs along the worst paths of a hand [rad/s], (k,).
+        worst_omega: frequencies of the runs along the worst paths of a hand [rad/s], (k,).
         worst: energy taken over the integral of v^2 in those runs [N.s/m], (k,).
     """
 
@@ -61,11 +62,11 @@ class IndexOverFrequency:
 
     @property
     def margin(self) -> float:
-        """Least damping of the strictest line [N.s/m]: it is passive if this is not negative."""
+        """Least excess damping of the strictest line [N.s/m]; passive if not negative."""
         return float(np.min(self.damping if self.index is None else self.index))
 
     def tables(self) -> dict[str, dict[str, Any]]:
-        """Returns what a figure of it shows: the lines, and the points by runs."""
+        """Returns the numbers of the figure: the lines, and the points by runs."""
         lines: dict[str, Any] = {"omega [rad/s]": self.omega, "Re Z [N.s/m]": self.damping}
         if self.index is not None:
             lines["index [N.s/m]"] = self.index
@@ -84,8 +85,8 @@ class EnergyOverTime:
     """One run without and with the observer and controller of Hannaford and Ryu.
 
     Attributes:
-        without: the run as it is.
-        controlled: the same with `Hardware(passivity=True)`.
+        without: the run without them.
+        controlled: the run with `Hardware(passivity=True)`.
     """
 
     without: Record
@@ -93,14 +94,15 @@ class EnergyOverTime:
 
     @property
     def observed(self) -> tuple[np.ndarray, np.ndarray]:
-        """Energy that the rendered clay has taken, without and with the controller [J], (n,).
+        """Energy absorbed by the rendered clay, without and with the controller [J], (n,).
 
-        The observer's own sum, of held force times the way since the sample before, over both axes.
+        It is the observer's sum over both axes: held force times displacement since the previous
+        sample.
         """
         return rendered_energy(self.without), rendered_energy(self.controlled)
 
     def tables(self) -> dict[str, dict[str, Any]]:
-        """Returns what a figure of it shows, a table a run."""
+        """Returns the numbers of the figure, one table per run."""
         out = {}
         for name, record, energy in zip(
             ("without", "controlled"),
@@ -124,12 +126,12 @@ class PassiveRegion:
     """Largest passive stiffness of a wall over the control sample, for several delays.
 
     Attributes:
-        wall: what is kept: device, B, M, velocity, window and filter.
+        wall: the fixed parts: device, B, M, velocity, window and filter.
         delays: delays over Ts.
         Ts: of the lines [s], (n,).
-        limits: largest passive K by theory [N/m], a row a delay, (len(delays), n).
+        limits: largest passive K by theory [N/m], one row per delay, (len(delays), n).
         run_Ts: of the runs [s], (m,).
-        found: largest K that no path of a hand draws energy from, by runs [N/m], (len(delays), m).
+        found: largest K at which no path of a hand draws energy, by runs [N/m], (len(delays), m).
     """
 
     wall: VirtualWall
@@ -140,7 +142,7 @@ class PassiveRegion:
     found: np.ndarray
 
     def tables(self) -> dict[str, dict[str, Any]]:
-        """Returns what a figure of it shows: the lines, and the limits found by runs."""
+        """Returns the numbers of the figure: the lines, and the limits found by runs."""
         out = {}
         for name, Ts, K in (("theory", self.Ts, self.limits), ("runs", self.run_Ts, self.found)):
             out[name] = {
@@ -156,13 +158,13 @@ def wall_index(wall: VirtualWall, progress: Progress = iter) -> IndexOverFrequen
     """The passivity of a wall over frequency: theory, sines, and the worst paths of a hand.
 
     Args:
-        wall: the wall with its K; its hand is left out. Friction and encoder, which no line knows,
-            are left out as well.
+        wall: the wall with its K; its hand is ignored. Friction and encoder, which theory neglects,
+            are ignored too.
         progress: wraps the list of paths to run.
 
     Raises:
-        ParameterError: a wall with a surface; B or M on an exact velocity, where the condition
-            holds for no K.
+        ParameterError: a wall with a surface; or B or M on an exact velocity, where no K is
+            passive.
     """
     wall = replace(wall, operator=None, device=replace(wall.device, friction=0.0, quantum=0.0))
     _check_linear(wall)
@@ -191,9 +193,9 @@ def arm_index(loop: PushedLoop | Scenario, axis: str = "x") -> IndexOverFrequenc
     """The passivity of the arm in clay over frequency: Re Z by theory and by a run of sines.
 
     Args:
-        loop: one axis, its hand left out; in continuous time it is passive where Re Z >= 0 at all
-            frequencies. Re Z of a sampled loop is that at one frequency; a hand of others may find
-            less. Or a scenario.
+        loop: one axis, its hand ignored, or a scenario. In continuous time it is passive if Re Z >=
+            0 at all frequencies. For a sampled loop Re Z holds for motion at one frequency; a hand
+            that moves at several may meet less damping.
         axis: of a scenario, "x" or "y".
     """
     loop = replace(of_scenario(loop, axis), operator=None)
@@ -273,7 +275,7 @@ def passive_region(
 
 
 def rendered_energy(record: Record) -> np.ndarray:
-    """Energy that rendered clay has taken from the handle by each sample, over both axes.
+    """Energy absorbed by rendered clay up to each sample, over both axes.
 
     Args:
         record: of a run.
@@ -295,11 +297,11 @@ def _check_linear(wall: VirtualWall) -> None:
 
 
 def _index_by_run(wall: VirtualWall, turn: tuple[int, int]) -> float:
-    """Damping to spare along the worst path at omega Ts = pi p/q.
+    """Excess damping along the worst path at omega Ts = pi p/q.
 
-    Without a fraction of a sample in the delay that path is the same for every damper, and the
-    energy taken along it is the damping to spare times the integral of v^2. With one, the damper
-    itself is lowered until its worst path takes nothing.
+    If the delay has no fraction of a sample, that path is the same for every damper, and the
+    absorbed energy is the excess damping times the integral of v^2. With a fraction, the damper is
+    lowered until its worst path absorbs no energy.
     """
     path = polygon(wall, turn, WORST_AMPLITUDE)
     if not path.middles:

@@ -30,14 +30,14 @@ MOST_HANDS = 100_000
 @named
 @dataclass(frozen=True)
 class Hands:
-    """A population of hands: what is known of the mass, damper and spring of Th.
+    """A population of hands: the known distribution of mass, damper and spring of Th.
 
     Attributes:
         mass: [kg], a number or its distribution over the population.
         damper: [N.s/m], likewise.
         spring: [N/m], likewise.
-        source: who published the numbers, and where; "" for your own numbers.
-        spread: what the spread stands for, as "subjects", or "assumed".
+        source: publication of the numbers; "" for your own numbers.
+        spread: meaning of the spread, such as "subjects" or "assumed".
         subjects: number of people who were measured, 0 where that is not known.
         correlation: of the normal scores of (mass, damper), (mass, spring) and (damper, spring), -1
             to 1; that of the logarithms where both are log-normal. 0 where none was published.
@@ -71,7 +71,7 @@ class Hands:
 
     @classmethod
     def around(cls, operator: Operator, variation: float = 0.3, **about: Any) -> Hands:
-        """Log-normal hands around one: an assumption, where no spread was published.
+        """Log-normal hands around a mean: an assumption for data without a published spread.
 
         Args:
             operator: mean of the hands.
@@ -94,7 +94,7 @@ class Hands:
 
     @property
     def median(self) -> Operator:
-        """The hand whose mass, damper and spring are medians."""
+        """The hand with median mass, damper and spring."""
         values = [getattr(self, n) for n in HAND]
         return Operator(*(x.median if isinstance(x, Distribution) else x for x in values))
 
@@ -104,7 +104,7 @@ class Hands:
         return np.array([[1.0, md, ms], [md, 1.0, ds], [ms, ds, 1.0]])
 
     def spread_over(self, u: np.ndarray) -> np.ndarray:
-        """Hands of uniform samples, correlated as the population is (a Gaussian copula).
+        """Maps uniform samples to hands with the population's correlation (a Gaussian copula).
 
         Args:
             u: samples of the unit cube, 0 < u < 1, shape (n, 3).
@@ -134,7 +134,7 @@ class Hands:
         return [Operator(*row) for row in self.spread_over(u).tolist()]
 
     def box(self, share: float = 0.9) -> Box:
-        """Ranges that hold a share of each number alone, for `worst_case`.
+        """Ranges that contain a given share of each number separately, for `worst_case`.
 
         Args:
             share: of the population between the ends of each range, 0 to 1.
@@ -162,8 +162,8 @@ PAPER_HAND = "Her, Hsu, Lan, Karkoub 2002, J. Intelligent and Robotic Systems 35
 POSTURE_HAND = (
     "van Beek, Bergmann Tiest, Mugge, Kappers 2015, Scientific Reports 5:18004, caption of Fig. 3"
 )
-# Only what could be read at its source. docs/robustness.md names other measurements, without
-# numbers, whose tables could not be read.
+# Only numbers read at their source. docs/robustness.md names other measurements, without
+# numbers, because we had no access to their tables.
 POPULATIONS = {
     "paper": Hands(0.25, 2.0, 6.0, PAPER_HAND),
     "posture": Hands(0.554, 6.45, 135.0, POSTURE_HAND, "one trial of one participant", 1),
@@ -213,10 +213,10 @@ class Band(Result):
         x_name: the parameter and its unit.
         y_name: the limit and its unit.
         x: values of the parameter, shape (n,).
-        limits: limit of each hand, inf for none, shape (n, hands).
+        limits: limit for each hand, inf for none, shape (n, hands).
         hands: the hands, drawn from the population.
         nominal: limit of the hand of medians, shape (n,).
-        told: the population in words.
+        told: description of the population.
     """
 
     drawn_by = "hapticclay.views.robustness_plots:band_plot"
@@ -250,7 +250,7 @@ class Band(Result):
         return self.limits.min(axis=1)
 
     def tables(self) -> dict[str, dict[str, Sequence]]:
-        """What the figure of it shows, by table name: columns by name with unit."""
+        """The numbers of the figure, by table name: columns by name with unit."""
         y = self.y_name
         columns = {"5 %": self.quantile(0.05), "median": self.quantile(0.5),
                    "95 %": self.quantile(0.95), "least": self.least,
@@ -267,7 +267,7 @@ class Band(Result):
 @named
 @dataclass(frozen=True)
 class Draw:
-    """How many hands a band is made of.
+    """Number of hands in a band, and their seed.
 
     Attributes:
         hands: number of hands, 2 to 100000.
@@ -294,7 +294,7 @@ def gain_band(
     A limit takes about 1.5 ms in continuous time, 30 ms with sampling or delay.
 
     Args:
-        loop: all but clay, hand and K; with sampling or delay, or without.
+        loop: all but clay, hand and K; sampling and delay are allowed.
         hands: the population, or its name in POPULATIONS.
         b: clay [N.s/m], shape (n,).
         draw: number of hands, and seed.
@@ -324,7 +324,8 @@ def wall_band(
 ) -> Band:
     """Largest stable stiffness of a virtual wall over its damping, for each hand: exact.
 
-    The linear wall's, without friction and quantum, by `wall_limits.stiffness_band`: the upper end.
+    It is the upper end of `wall_limits.stiffness_band`, for a linear wall without friction and
+    quantum.
 
     Args:
         wall: all but stiffness, damping and hand.

@@ -1,10 +1,9 @@
-"""Passivity of a virtual wall by runs: the energy that it gives to the worst passive hand.
+"""Passivity of a virtual wall by runs: the energy it delivers to the worst passive hand.
 
-A hand moves the device along a path that repeats itself; where the device gives more energy than it
-takes over a period, a passive hand exists that this drives without end, and the wall is active
-(Colgate, Schenkel, J. Robotic Systems 14, 1997). Of all paths through the same places at the
-samples the damper takes least on the one of constant speed between them, so the worst path is a
-polygon, whatever the mass.
+A hand moves the device along a periodic path. If the device delivers net energy over a period, some
+passive hand is driven into growing motion, and the wall is active (Colgate, Schenkel, J. Robotic
+Systems 14, 1997). Among all paths with the same sampled positions, the damper dissipates least at
+constant speed between samples. The worst path is therefore a polygon for any mass.
 """
 
 from __future__ import annotations
@@ -27,31 +26,31 @@ from ..simulation import record
 from ..simulation.simulate import simulate
 from ..theory import wall_limits
 
-PATH_STEPS = 32  # engine steps a sample: a corner takes one, which loses its share of the damping
+PATH_STEPS = 32  # engine steps per sample: a corner takes one and loses its share of the damping
 LEAST_STEP = 1e-6  # [s] of a scenario
 LARGE = 5e-3  # [m] of a path that hides friction and quantum
 TOP_SPEED = 9.0  # [m/s] along it
 ARC_LOSS = 55.0  # measured: link 1's arc costs this (A/lever)^4 m/(b Ts) of the damper's energy
-ARC_SHARE = 1e-3  # most of that, which decides how large such a path may be
-SMALL = 0.01  # of the quantum: of a path that shows one edge of the encoder alone
+ARC_SHARE = 1e-3  # upper bound of that cost, which limits the size of such a path
+SMALL = 0.01  # of the quantum: amplitude of a path over a single encoder edge
 LEAST_SPEED = 1.5e-5  # [m/s] along it: a run slower than 1e-5 m/s counts as stalled
 LEAST_SHARE = 2e-3  # of the damper's loss in that of friction, along such a path
 TRIED_TURNS = [(1, 1), (2, 3), (1, 2), (1, 4), (1, 12)]  # (p, q): paths tried at omega Ts = pi p/q
 SLOW_TURN = 48  # q of the slowest path tried
 K_FACTOR = 1.3  # factor on K in the search for an active wall
-K_SHARE = 2e-4  # limits are found to this share
+K_SHARE = 2e-4  # relative accuracy of limits
 FILTER_TIMES = 12.0  # time constants of the filter before energy is counted
 
 
 @named
 @dataclass(frozen=True)
 class Path:
-    """A path that a hand imposes on the device: an even polygon in the samples, which repeats.
+    """A path that a hand imposes on the device: a periodic polygon through the samples.
 
     Attributes:
-        places: of the device at the samples of a period [m], shape (n,).
-        middles: of the device where a late force changes between two samples [m], shape (n,);
-            empty where it does not.
+        places: positions of the device at the samples of a period [m], shape (n,).
+        middles: positions of the device where a delayed force changes between two samples [m],
+            shape (n,); empty if it does not.
     """
 
     places: Annotated[tuple[float, ...], Bound(-0.1, 0.1, "m")]
@@ -68,10 +67,10 @@ class Path:
 
 @checked
 def zigzag(amplitude: float, about: float = 0.0) -> Path:
-    """The path at half the sampling frequency, in step with the samples: a triangle.
+    """The path at half the sampling frequency, synchronous with the samples: a triangle.
 
-    Over a sample a wall K with damper B gives 2 A^2 (K + 2 B/Ts) along it, and a damper b takes
-    4 b A^2/Ts.
+    Per sample a wall K with damper B delivers 2 A^2 (K + 2 B/Ts) along it, and a damper b
+    dissipates 4 b A^2/Ts.
 
     Args:
         amplitude: A [m], > 0, at most 0.1.
@@ -84,10 +83,10 @@ def zigzag(amplitude: float, about: float = 0.0) -> Path:
 
 @checked
 def polygon(wall: VirtualWall, turn: tuple[int, int], amplitude: float = 1e-4) -> Path:
-    """The path of least loss through a sine of the samples.
+    """The path of least dissipation through a sine of the samples.
 
-    If a late force changes between two samples it has a corner there too, where the damper's loss
-    and the wall's work balance (docs/equations.md, section 7).
+    If a delayed force changes between two samples, the path has a corner there too, where the
+    damper's dissipation and the wall's work balance (docs/equations.md, section 7).
 
     Args:
         wall: the wall with its K, of a device with a damper.
@@ -111,14 +110,15 @@ def polygon(wall: VirtualWall, turn: tuple[int, int], amplitude: float = 1e-4) -
 def imposed(wall: VirtualWall, path: Path, periods: int = 3, steps: int = PATH_STEPS) -> Scenario:
     """Build the run in which a hand moves the device along a path.
 
-    The force of the hand is what mass, damper, friction and wall ask for along the path, kick by
-    kick; the wall's is its law applied to the path as encoder and difference show it.
+    The hand supplies, kick by kick, the force that mass, damper, friction and wall require along
+    the path. The wall's force is its law applied to the path as measured by encoder and difference.
 
     Args:
         wall: the wall, without a hand of its own.
         path: the path.
-        periods: that energy is counted over, behind those in which window, delay and filter fill.
-        steps: engine steps a sample.
+        periods: periods over which energy is counted, after those that fill window, delay and
+            filter.
+        steps: engine steps per sample.
     """
     return _imposed(wall, path, periods, steps)[0]
 
@@ -161,7 +161,7 @@ def _imposed(wall: VirtualWall, path: Path, periods: int, steps: int) -> tuple[S
 
 
 def _wall_force(wall: VirtualWall, place: np.ndarray, t: np.ndarray, h: float) -> np.ndarray:
-    """Mean force of the wall over the kicks at t, for a device at these places at the samples."""
+    """Mean force of the wall over the kicks at t, for given positions at the samples."""
     scenario, Ts, window = wall.scenario(wall.Ts), wall.Ts, wall.velocity_window
     counts = (scenario.hardware.encoder if scenario.hardware else None) or 0
     assert scenario.controller is not None
@@ -189,16 +189,16 @@ def _wall_force(wall: VirtualWall, place: np.ndarray, t: np.ndarray, h: float) -
 
 @checked
 def taken_energy(wall: VirtualWall, path: Path, periods: int = 3, steps: int = PATH_STEPS) -> float:
-    """Energy that the device takes from the hand over a period of a path, by a run [J].
+    """Energy that the device absorbs from the hand over a period of a path, by a run [J].
 
-    The integral of fh v of the run, less what the mass stores meanwhile, which is next to nothing.
+    It is the integral of fh v over the run, minus the negligible energy stored in the mass.
 
     Args:
         wall: the wall with its K, without a hand of its own; not "exact" in velocity with B or M.
-        path: what the hand imposes.
-        periods: that it is a mean of.
-        steps: engine steps a sample, at most as many as make steps of 1e-6 s; damping and friction
-            come out short by one part in so many along a zigzag.
+        path: path imposed by the hand.
+        periods: number of periods in the mean.
+        steps: engine steps per sample, with steps of at least 1e-6 s; along a zigzag damping and
+            friction are too low by one part in this number.
 
     Returns:
         The energy; a negative one proves that the wall is active.
@@ -208,7 +208,7 @@ def taken_energy(wall: VirtualWall, path: Path, periods: int = 3, steps: int = P
     d, v = wall.device, found.v[first:, 0]
     if found.outcome.code != "time limit":
         raise ParameterError("path", path, f"cannot be imposed: {found.status}")
-    # the record counts the device's damper to the hand
+    # the record attributes the device's damper to the hand
     force = found.fh.copy()
     force[:, 0] += d.damper * found.v[:, 0]
     given = record.port_energy(replace(found, fh=force))[:, 0]
@@ -220,29 +220,29 @@ def taken_energy(wall: VirtualWall, path: Path, periods: int = 3, steps: int = P
 def passivity_limit(wall: VirtualWall, steps: int = PATH_STEPS) -> float:
     """Largest K at which no path of a hand takes energy from the wall, by runs [N/m].
 
-    Paths: polygons at several frequencies up to pi/Ts, and at the one that theory names; with
-    friction or an encoder a large and a small zigzag, which show the damper and an edge of the
-    encoder alone. K is found for each path by the sign of the energy. A path that was not tried may
-    take energy at a lower K: the answer is an upper bound of the true limit.
+    The paths are polygons at several frequencies up to pi/Ts and at the worst frequency by theory.
+    With friction or an encoder a large and a small zigzag are added, which isolate the damper and
+    one encoder edge. For each path the sign of the energy determines K. Other paths may draw energy
+    at a lower K, so the result is an upper bound of the true limit.
 
     Args:
         wall: all but K, without a hand of its own; not "exact" in velocity with B or M, nor with a
             surface.
-        steps: engine steps a sample, see `taken_energy`.
+        steps: engine steps per sample, see `taken_energy`.
 
     Returns:
-        K; 0 if the wall is active at any K, inf if nothing shows it active up to 1e9 N/m.
+        K; 0 if the wall is active at any K, inf if no path shows it active up to 1e9 N/m.
 
     Raises:
         ParameterError: the wall has a hand, a surface, or B or M on an exact velocity, where the
-            energy of a path does not tell.
+            energy of a path is inconclusive.
     """
     if wall.velocity == "exact" and (wall.B or wall.M):
         bound = "must be 'difference' for a wall with B or M: a hand can fake an exact velocity"
         raise ParameterError("wall.velocity", wall.velocity, bound)
     d = wall.device
     if not (d.friction or d.damper):
-        return 0.0  # nothing takes energy
+        return 0.0  # nothing dissipates energy
     if not (d.friction or d.quantum):
         paths = [(lambda w, x=x: polygon(w, x), max(8, 2 * steps // x[1])) for x in _turns_of(wall)]
         return _least_limit(wall, paths)
@@ -257,7 +257,7 @@ def passivity_limit(wall: VirtualWall, steps: int = PATH_STEPS) -> float:
 
 
 def _large(wall: VirtualWall) -> float:
-    """A of a zigzag that shows the damper rather than friction and quantum [m]."""
+    """Amplitude A of a zigzag large enough that the damper dominates friction and quantum [m]."""
     d, quantum, large = wall.device, wall.device.quantum, min(LARGE, 0.5 * TOP_SPEED * wall.Ts)
     if d.damper:
         large = min(large, LEVER * (ARC_SHARE * d.damper * wall.Ts / (ARC_LOSS * d.mass)) ** 0.25)
@@ -265,7 +265,7 @@ def _large(wall: VirtualWall) -> float:
 
 
 def _turns_of(wall: VirtualWall) -> list[tuple[int, int]]:
-    """omega Ts over pi, as fractions, of the paths tried: the worst by theory, and some."""
+    """omega Ts/pi of the tested paths, as fractions: the worst by theory and others."""
     limit = wall_limits.colgate_schenkel_limit(wall)
     every = {(p, q) for q in range(1, 17) for p in range(1, q + 1) if math.gcd(p, q) == 1}
     tried = [*sorted(every), (1, SLOW_TURN), (SLOW_TURN - 1, SLOW_TURN)]

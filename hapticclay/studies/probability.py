@@ -17,7 +17,7 @@ LEVEL = 0.95  # of a confidence interval
 
 
 def clopper_pearson(events: Any, runs: Any, level: float = LEVEL) -> tuple[np.ndarray, np.ndarray]:
-    """Confidence interval of a probability, exact: it holds it at least as often as it says.
+    """Exact confidence interval of a probability: coverage is at least the nominal level.
 
     Clopper, Pearson, Biometrika 26, 1934.
 
@@ -43,7 +43,7 @@ def clopper_pearson(events: Any, runs: Any, level: float = LEVEL) -> tuple[np.nd
 @named
 @dataclass(frozen=True)
 class Probability:
-    """A probability that was counted.
+    """A probability estimated by counting.
 
     Attributes:
         probability: share of the runs; NaN without runs.

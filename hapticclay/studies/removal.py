@@ -1,8 +1,8 @@
 """Clay removed by the tool: a map of heights over the block, and the volume.
 
-The tool is a round cutter of `width` that stands `depth` deep in the block and moves with the
-handle; clay is any region with damping. Nothing here needs graphics: the scene draws this map, a
-headless run computes it from the record.
+The tool is a round cutter of diameter `width` at depth `depth` in the block, and moves with the
+handle. Clay is any region with damping. The module needs no graphics: the scene draws this map, and
+a headless run computes it from the record.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..simulation.record import Record
 
 CELL_SIZE = 2e-3  # [m] largest cell of a picture's map
 PICTURE_CELLS, VOLUME_CELLS = 10, 32  # least number of cells in the tool's width
-PATH_TOLERANCE = 5e-4  # of the width: largest distance of the path from its straight pieces
+PATH_TOLERANCE = 5e-4  # of the width: largest deviation of the path from its straight segments
 MAP_MARGIN = 0.02  # [m] of a block without borders, before the start and beyond the end of the path
 HIGHEST = 0.8  # of a block's thickness in a picture, above the floor of its grooves
 HALF_BREADTH = 0.08  # [m] of a block without borders, across the path
@@ -32,8 +32,7 @@ TOOL = Tool()
 def block_of_clay(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     """Extent of the block of clay in a picture; without clay, of the work area.
 
-    The clay's borders are the block's; where it has none, the block reaches a little beyond the
-    path.
+    The block ends at the borders of the clay; without borders it extends slightly beyond the path.
 
     Args:
         scenario: whose clay.
@@ -63,8 +62,8 @@ def block_of_clay(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
 class Removal:
     """Clay removed so far: the share of each cell of a grid that the tool has covered.
 
-    A cell that the edge of the tool passes through is covered in proportion; so a straight cut has
-    its exact area whatever the cell. Along a path, no cell straddles a border of the clay.
+    A cell at the edge of the tool is covered in proportion, so a straight cut has its exact area
+    for any cell size. Along a path, no cell straddles a border of the clay.
 
     Attributes:
         tool: the cutter.
@@ -92,7 +91,7 @@ class Removal:
         Args:
             scenario: whose clay.
             tool: the cutter.
-            cell: largest size of a cell [m]; None for one that suits the tool's width.
+            cell: largest size of a cell [m]; None to choose it from the tool's width.
             path: of the handle [m], shape (n, 2); None for the block of a picture.
         """
         fit = (
@@ -129,7 +128,7 @@ class Removal:
         self.restore()
 
     def restore(self) -> None:
-        """Put back what was cut."""
+        """Restore the uncut block."""
         self.cut, self.volume = self._before.copy(), 0.0
 
     def sweep(self, begin: Any, end: Any) -> float:
@@ -140,7 +139,7 @@ class Removal:
             end: its place after [m], (2,).
 
         Returns:
-            The volume that this removes [m^3].
+            The removed volume [m^3].
         """
         r, reach = 0.5 * self.tool.width, 0.5 * self.tool.width + self.cell
         (x0, y0), (x1, y1) = begin, end
@@ -171,7 +170,7 @@ class Removal:
     def heights(self, thickness: float) -> np.ndarray:
         """Height of the clay over the ground at the cells [m], shape (ny, nx).
 
-        Of a groove whose clay is higher than fits, reduced in proportion.
+        For a groove whose clay exceeds the thickness, heights are reduced in proportion.
 
         Args:
             thickness: of the block [m].
@@ -189,7 +188,7 @@ def removed(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Volume of clay that a tool at the handle has removed in a run, to 0.5 % of it.
 
-    In clay that stays cut (`Clay.groove`) it is what the run itself removed, by its own tool.
+    In clay that stays cut (`Clay.groove`) it is the volume removed in the run by its own tool.
 
     Args:
         record: of the run.
@@ -231,7 +230,7 @@ def removed(
 
 
 def _bends(p: np.ndarray, tolerance: float) -> np.ndarray:
-    """Mask of the points whose connection keeps within tolerance of a path (Douglas, Peucker)."""
+    """Mask of the points whose polygon stays within tolerance of a path (Douglas, Peucker)."""
     keep = np.zeros(len(p), dtype=bool)
     keep[[0, -1]] = True
     spans = [(0, len(p) - 1)]

@@ -1,8 +1,8 @@
 """The probability that a loop is unstable: many short runs over random hands, clay and hardware.
 
-Each run is pushed, and judged by itself: its oscillation grows, or it does not. A few samples tell
-most runs (`growth`); the others are repeated for longer. Chunks of runs are stored as those of a
-sweep are, so that an interrupted study goes on where it stopped.
+Each run starts with a push and is judged on its own: its oscillation grows or not. A few samples
+decide most runs (`growth`); the others are repeated for longer. Chunks of runs are stored like
+those of a sweep, so an interrupted study resumes where it stopped.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .boundary import PushedLoop
 from .probability import LEVEL, Probability, clopper_pearson
 from .trials import NOT_RUN, Trials, judge
 
-PROBED = 200  # runs that an estimate of the cost is made from
+PROBED = 200  # runs used to estimate the cost
 CURVE_POINTS = 61  # of a boundary
 
 
@@ -41,9 +41,9 @@ class RiskMap:
         x_name: the first parameter.
         y_name: the second; "" for none.
         x: its values or the middles of its bins, shape (n,).
-        y: of the second, shape (m,); one NaN for none.
+        y: values of the second, shape (m,); one NaN for none.
         runs: number of runs of each cell, shape (n, m).
-        events: unstable ones among them, shape (n, m).
+        events: number of unstable runs of each cell, shape (n, m).
     """
 
     x_name: str
@@ -71,13 +71,13 @@ class RiskMap:
 @named
 @dataclass(frozen=True, repr=False)
 class Instability(Result):
-    """Runs that were judged.
+    """Judged runs.
 
     Attributes:
-        trials: what they are of.
+        trials: specification of the runs.
         points: their parameters, shape (n, trials.names).
         unstable: 1, 0, or NOT_RUN, shape (n,).
-        longer: whether the first run left it undecided, shape (n,).
+        longer: whether the first run was undecided, shape (n,).
     """
 
     drawn_by = "hapticclay.views.robustness_plots:instability_plot"
@@ -93,7 +93,7 @@ class Instability(Result):
 
     @property
     def refused(self) -> int:
-        """Number of draws that cannot be run; no probability counts them."""
+        """Number of draws that cannot be run; they are excluded from all probabilities."""
         return int(np.sum(self.unstable == NOT_RUN))
 
     @property
@@ -129,7 +129,7 @@ class Instability(Result):
         return self._counted(names, values, index, [len(v) for v in values])
 
     def binned(self, x: str, y: str = "", bins: int = 10) -> RiskMap:
-        """Probability over bins of one or two parameters that vary, each bin with as many runs.
+        """Probability over bins of one or two varying parameters, with equally many runs per bin.
 
         Args:
             x: name of the first parameter.
@@ -170,7 +170,7 @@ class Instability(Result):
     def boundary(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Exact limit of the linear loop of the middle run over the other parameter of the grid.
 
-        The limit is that of K, so K must be one of the two parameters of the grid.
+        The limit is one of K, so K must be one of the two parameters of the grid.
 
         Returns:
             (values of the other parameter, K), shape (n,) each; None where K is not in the grid.
@@ -185,7 +185,7 @@ class Instability(Result):
         return x, np.array([_exact_limit(self.trials.loop({**middle, other[0]: v})) for v in x])
 
     def tables(self) -> dict[str, dict[str, Sequence]]:
-        """What the figure shows, by table name: columns by name."""
+        """The numbers of the figure, by table name: columns by name."""
         total = self.total
         out: dict[str, dict[str, Sequence]] = {
             "total": {"runs": [total.runs], "unstable": [total.events],
@@ -224,13 +224,13 @@ def _exact_limit(loop: PushedLoop | VirtualWall) -> float:
 @named
 @dataclass(frozen=True)
 class Cost:
-    """What the runs that are left will take, measured on a few of them.
+    """Estimated cost of the remaining runs, measured on a few of them.
 
     Attributes:
-        runs: number of runs left.
+        runs: number of remaining runs.
         seconds: time [s].
-        size: room on disk [bytes]; 0 where nothing is stored.
-        free: room that is there [bytes].
+        size: required disk space [bytes]; 0 if nothing is stored.
+        free: free disk space [bytes].
     """
 
     runs: int
@@ -240,13 +240,13 @@ class Cost:
 
 
 def measure_cost(trials: Trials, left: int, out: Path | None = None, workers: int = 1) -> Cost:
-    """Measures what runs will take, on a few of the first chunk.
+    """Estimates the cost of runs from a few of the first chunk.
 
     Args:
-        trials: what they are of.
+        trials: specification of the runs.
         left: number of runs.
-        out: folder that they are stored in; None for none.
-        workers: processes that make them.
+        out: folder for the runs; None for none.
+        workers: number of processes.
     """
     threads = None if workers == 1 else 1
     points = trials.points(0)[:PROBED]
@@ -273,19 +273,20 @@ def monte_carlo(
 ) -> Instability:
     """Makes random runs of a loop and counts the unstable ones.
 
-    With a folder, chunks that are done are kept whatever happens, Ctrl-C too, and the same call
-    makes those that are missing. Without, all is kept in memory.
+    With a folder, finished chunks survive any interruption, including Ctrl-C, and the same call
+    makes the missing ones. Without a folder all runs are kept in memory.
 
     Args:
-        trials: what the runs are of.
+        trials: specification of the runs.
         out: folder for the runs (needs pyarrow); None for none.
         workers: processes that make chunks, with a folder; 1 for this one, on all its cores.
-        announce: called with the Cost of the runs that are left, measured on PROBED of them, before
-            they begin; None measures nothing, except with a folder.
+        announce: called before the runs with the Cost of the remaining runs, measured on PROBED of
+            them; None measures nothing, except with a folder.
         progress: called with the number of runs of each chunk.
 
     Raises:
-        ParameterError: the folder has no room for the runs, holds others, or cannot be written.
+        ParameterError: the disk has too little space, the folder holds other runs or cannot be
+            written.
     """
     workers, show = integer("workers", workers, 1, 1024), progress or (lambda n: None)
     if out is None:
@@ -314,14 +315,14 @@ def monte_carlo(
 
 @checked
 def stored_runs(trials: Trials, out: Path | str) -> Instability:
-    """The runs that a folder holds, all or those that an interruption left.
+    """The runs stored in a folder, complete or interrupted.
 
     Args:
-        trials: what they are of.
+        trials: specification of the runs.
         out: the folder.
 
     Raises:
-        ParameterError: it holds none, or others.
+        ParameterError: it holds no runs, or other runs.
     """
     digest = sweep_store.stored_digest(Path(out))
     if digest is None:

@@ -52,7 +52,7 @@ class Range:
 
     @classmethod
     def parse(cls, field: str, text: object) -> Range:
-        """Reads "1:1000:50log", "0.2:2:20", "0.2:2", "1:1000log" or "1,2,5".
+        """Parses "1:1000:50log", "0.2:2:20", "0.2:2", "1:1000log" or "1,2,5".
 
         Args:
             field: name for the error.
@@ -106,7 +106,7 @@ class Range:
         """Samples of the unit interval spread over the range.
 
         Args:
-            u: samples in [0, 1); they draw from the list if there is one.
+            u: samples in [0, 1); they select from the list if there is one.
         """
         if self.values:
             return np.array(self.values)[(u * len(self.values)).astype(int)]
@@ -122,7 +122,7 @@ class Sweep:
 
     A number is a parameter of the experiment, as on the command line, or any field of the scenario
     by dotted name (`scene/fields.py`): "servo.x.G.damping", "gain.x", "compensator.den.1". A pair
-    without axis gets the value on both. "operator.mass" puts an arm at the handle.
+    without axis gets the value on both axes. "operator.mass" adds an arm at the handle.
 
     Attributes:
         experiment: a name in EXPERIMENTS; not used with a scenario.
@@ -132,8 +132,8 @@ class Sweep:
             "sobol".
         runs: number of runs of "lhs" and "sobol"; None for "grid".
         seed: seed of both.
-        chunk: runs in one file, 1 to 100,000; None for a second or two of work, measured when the
-            sweep begins.
+        chunk: runs per file, 1 to 100,000; None for one or two seconds of work, measured at the
+            start of the sweep.
         scenario: plain data of a scenario file, from `read_settings`; empty for the experiment.
     """
 
@@ -171,7 +171,7 @@ class Sweep:
                     f"{told} ({self.design})",
                 )
         integer("runs", len(self), 1, MOST_RUNS)
-        self.run_scenario(self.points(0, 1)[0])  # refuses what the first run refuses
+        self.run_scenario(self.points(0, 1)[0])  # raises the errors of the first run
 
     def __len__(self) -> int:
         if self.runs is not None:
@@ -228,7 +228,7 @@ class Sweep:
         return Scenario.of(settings, self.fixed, varied)
 
     def described(self) -> dict[str, Any]:
-        """The sweep as data."""
+        """The sweep as plain data."""
         return {"schema": SWEEP_SCHEMA, **dataclasses.asdict(self)}
 
     def digest(self) -> str:
@@ -245,7 +245,7 @@ def _unit_samples(design: str, dimensions: int, runs: int, seed: int) -> np.ndar
     kind = qmc.LatinHypercube if design == "lhs" else qmc.Sobol
     with np.errstate(all="ignore"):
         engine = kind(dimensions, rng=np.random.default_rng(seed))
-    if design == "sobol":  # balance needs a power of two; the first runs of that are taken
+    if design == "sobol":  # balance needs a power of two; the first runs of these are used
         return engine.random_base2(max(0, math.ceil(math.log2(runs))))[:runs]  # type: ignore[attr-defined]
     return engine.random(runs)
 
@@ -286,7 +286,7 @@ def parse_fixed(text: str) -> dict[str, Any]:
 
 
 def _split_words(field: str, text: str, how: str) -> dict[str, str]:
-    """Splits words name=value; `how` they must look is for the error."""
+    """Splits words name=value; `how` describes the format for the error."""
     out: dict[str, str] = {}
     for word in text.split():
         name, equals, value = word.partition("=")
@@ -300,7 +300,7 @@ def load_sweep(path: Path) -> dict[str, Any]:
     """Reads a sweep from TOML: experiment or scenario, design, runs, seed, chunk; [vary], [fixed].
 
     Args:
-        path: the file; `scenario` in it is a scenario file, by its path from there.
+        path: the file; `scenario` in it is the path of a scenario file, relative to it.
 
     Returns:
         Arguments of `Sweep`.
@@ -332,7 +332,7 @@ def load_sweep(path: Path) -> dict[str, Any]:
 
 
 def _flat(table: Mapping[str, Any], path: str = "") -> dict[str, Any]:
-    """Values by dotted name of a deep table: a.b = 1 and "a.b" = 1 are one."""
+    """Flattens a nested table to dotted names: a.b = 1 and "a.b" = 1 are equivalent."""
     out: dict[str, Any] = {}
     for name, value in table.items():
         inner = join_names(path, name)

@@ -1,4 +1,4 @@
-"""Samples that slide through clay: of a record, or of columns with their noise."""
+"""Sliding samples in clay: of a record, or of noisy columns."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from .trajectory import (
 
 LEAST_SLIDING = 50  # samples that slide ...
 FAST = 10.0  # [m/s]: no hand is as fast
-LEAST_SIGNAL = 5.0  # deviations of its own that a velocity must have to be motion ...
-DEVIATIONS = 60  # samples from which the usual deviation is told
+LEAST_SIGNAL = 5.0  # standard deviations above which a velocity counts as motion ...
+DEVIATIONS = 60  # samples for the estimate of the usual deviation
 COUNTS = 3.0  # ... and counts of the encoder between knots
 LEAST_STRETCH = 3 * LEAST_PER_KNOT  # samples of a stretch
 STEADY_STEP = 0.05  # largest change of a known velocity in a step; a force is the mean over one
@@ -30,11 +30,11 @@ UNDITHERED = 0.4  # counts: rounding alone leaves 0.29, noise of 0.3 beside it 0
 
 
 class Met(NamedTuple):
-    """Clay at the samples of a record.
+    """The clay at the samples of a record.
 
     Attributes:
         flows: b, Fy, K and n at each, shape (n, 4).
-        dented: where a law resists a tool at rest that has gone into it, by name of the law.
+        dented: where an elastic law resists an indented tool at rest, by name of the law.
     """
 
     flows: np.ndarray
@@ -42,20 +42,20 @@ class Met(NamedTuple):
 
 
 class Sliding(NamedTuple):
-    """Samples that slide.
+    """Sliding samples.
 
     Attributes:
         t: their time [s].
         sign: of their velocity.
         f: force against the motion [N].
-        p: places of the samples and of those between them [m]; empty where speeds are known.
+        p: positions of these samples and of those between them [m]; empty where speeds are known.
         v: speeds [m/s], or the coefficients of the motion.
-        slowest: speed of any [m/s].
-        motion: splines along the places; None where speeds are known.
+        slowest: least speed of a sliding sample [m/s].
+        motion: splines through the positions; None where speeds are known.
         spacing: of their knots [s].
-        force_variance: beside a free curve [N^2]; nan without.
-        position_variance: of a place [m^2].
-        position_correlation: samples of places that count as one.
+        force_variance: variance of the force about a free curve [N^2]; nan without one.
+        position_variance: variance of a position [m^2].
+        position_correlation: position samples per independent sample.
     """
 
     t: np.ndarray
@@ -79,7 +79,7 @@ def of_record(r: Record, axis: str | None) -> tuple[str, Any, Any, Any, Any, Any
         axis: as for `fit_flow`.
 
     Raises:
-        ParameterError: it has no clay, or none whose law such an axis shows.
+        ParameterError: it has no clay, or none whose law is observable along this axis.
     """
     clay = r.scenario.clay
     if clay is None:
@@ -112,11 +112,11 @@ def of_record(r: Record, axis: str | None) -> tuple[str, Any, Any, Any, Any, Any
 
 
 def check_met(met: Met, inside: np.ndarray) -> None:
-    """Refuse samples that lie in clays of several laws, or in clay whose force depends on more.
+    """Refuse samples in clays of several laws, or in clay whose force depends on more variables.
 
     Args:
         met: the clay at the samples.
-        inside: which of them are taken.
+        inside: mask of the samples used.
 
     Raises:
         ParameterError: they do.
@@ -138,13 +138,13 @@ def check_met(met: Met, inside: np.ndarray) -> None:
 
 
 def of_known_speed(t: np.ndarray, v: np.ndarray, f: np.ndarray, inside: np.ndarray) -> Sliding:
-    """Samples of known velocity that move, and whose velocity changes little in a step.
+    """Moving samples of known velocity whose velocity changes little in a step.
 
     Args:
         t: time [s].
         v: velocity [m/s].
         f: force of the clay [N].
-        inside: which samples are taken.
+        inside: mask of the samples used.
 
     Raises:
         ParameterError: there are too few.
@@ -167,13 +167,13 @@ def _too_few(count: int) -> ParameterError:
 
 
 def of_positions(t: np.ndarray, p: np.ndarray, f: np.ndarray, inside: np.ndarray) -> Sliding:
-    """Stretches that slide, and the splines along them.
+    """Sliding stretches and the splines along them.
 
     Args:
         t: time [s].
         p: position [m].
         f: force of the clay [N].
-        inside: which samples are taken.
+        inside: mask of the samples used.
 
     Raises:
         ParameterError: there are too few.
@@ -236,7 +236,7 @@ def of_positions(t: np.ndarray, p: np.ndarray, f: np.ndarray, inside: np.ndarray
 
 
 def _slowest(motion: Motion, runs: list[tuple[int, int]], margin: int, sigma: float) -> np.ndarray:
-    """Speed that counts as motion at each sample of the runs; larger near their ends [m/s]."""
+    """Least speed that counts as motion at each sample; larger near the ends of runs [m/s]."""
     pieces = np.cumsum([0] + [b - a for a, b in runs])
     some = np.unique(np.linspace(0, pieces[-1] - 1, DEVIATIONS).astype(int))
     out = np.full(pieces[-1], np.median(motion.deviation(some)))
@@ -262,13 +262,13 @@ def _between_rests(
 
 
 def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
-    """Where a mask holds: (start, stop) of each run."""
+    """(start, stop) of each run of True in a mask."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def quantum(x: np.ndarray) -> float:
-    """Step of which all differences are multiples, of quantised samples; 0 for others.
+    """Quantum of quantised samples: all differences are multiples of it; 0 for other samples.
 
     Args:
         x: samples, (n,).

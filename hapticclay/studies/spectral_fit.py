@@ -48,17 +48,17 @@ def identify_data(
 ) -> Identified:
     """Identify one block from measured columns.
 
-    Any excitation does: whole periods of a periodic one, after the first, are taken where there are
-    two or more; else the whole record, whose start and end are fitted too. What moves the handle
-    otherwise, and for Th the muscle force uh, must be independent of the input, or of the reference
-    if there is one.
+    Any excitation is suitable. Of a periodic one with two or more whole periods after the first,
+    these periods are used; otherwise the whole record is used, and its start and end are fitted
+    too. Other forces on the handle, and for Th the muscle force uh, must be independent of the
+    input, or of the reference if there is one.
 
     Args:
         data: the columns.
         what: "G" (input: command), "S" (Sh; input: force) or "Th" (input: force).
         axis: "x" or "y", the axis of the printed equation to compare with.
-        band: lowest and highest frequency [Hz], to 0.1/dt; None for what the record holds of (0.15,
-            20), Th (0.08, 3).
+        band: lowest and highest frequency [Hz], to 0.1/dt; None for the part of (0.15, 20), Th
+            (0.08, 3), that the record covers.
         held: True for an input that a computer holds from each sample to the next; not for Th.
 
     Returns:
@@ -118,7 +118,7 @@ def identify_data(
 
 
 def _band(what: str, band: object, dt: float, n: int) -> tuple[float, float]:
-    """The band asked for, or the usual one as far as the samples hold it."""
+    """The requested band, or the part of the default band that the samples cover."""
     limit = 0.1 / dt
     if band is None:
         low, high = IDENTIFICATION_BAND[what]
@@ -135,11 +135,11 @@ def _band(what: str, band: object, dt: float, n: int) -> tuple[float, float]:
 
 
 def _period(u: np.ndarray, high: float) -> int:
-    """Samples in a period of u, of which it has three or more; 0 for none.
+    """Samples per period of u, if it has at least three periods; 0 otherwise.
 
     Args:
         u: the signal, (n,).
-        high: highest frequency that matters, in lines of a sample.
+        high: highest relevant frequency, in lines of a sample.
     """
     from scipy.fft import irfft, next_fast_len, rfft
     from scipy.signal import find_peaks
@@ -161,7 +161,7 @@ def _period(u: np.ndarray, high: float) -> int:
 
 
 def _between_lines(x: np.ndarray, period: int, high: float) -> float:
-    """Share of the power, after the first period, up to `high`, that is not of this period."""
+    """Share of the power up to `high`, after the first period, that does not have this period."""
     count = len(x) // period - 1
     samples = count * period
     power = np.abs(np.fft.rfft(x[-samples:])[: math.floor(high * samples) + 1]) ** 2
@@ -211,7 +211,7 @@ def _spectrum(
 
 
 def _check_coherence(x: _Spectrum) -> None:
-    """Refuse an output that follows the reference at few lines, before any form is fitted."""
+    """Refuse an output coherent with the reference at few lines only, before any fit."""
     uu, yy = (_near(np.abs(a) ** 2) for a in (x.r, x.y))
     coherence = np.abs(_near(x.y * x.r.conj())) ** 2 / (uu * np.maximum(yy, 1e-300))
     seen = np.count_nonzero(coherence >= COHERENT)
@@ -226,23 +226,23 @@ def _check_coherence(x: _Spectrum) -> None:
 
 
 class _Fitted(NamedTuple):
-    """Coefficients, half of their intervals, and what is left of the output at each line."""
+    """Coefficients, half of their intervals, and the residual of the output at each line."""
 
     value: np.ndarray
     half: np.ndarray
     model: np.ndarray  # response of the fitted form
     known: np.ndarray  # the part of the input that the reference causes
     left: np.ndarray
-    noise: np.ndarray  # standard deviation of what is left
+    noise: np.ndarray  # standard deviation of the residual
 
 
 def _fit_spectrum(what: str, x: _Spectrum, instrument: bool) -> _Fitted:
     """Fit a block, and the terms of start and end, to an output.
 
-    Least squares of the output, each line weighted by its noise; with a reference, the instrumental
-    variables that it gives. The intervals come from what is left at each line (HC3 of MacKinnon,
-    White 1985), so that weights need not be right, with Student's t of as many degrees of freedom
-    as lines decide the coefficient (Satterthwaite 1946). LinAlgError where nothing fits.
+    The method is least squares of the output, each line weighted by its noise; with a reference it
+    uses instrumental variables. The intervals follow from the residual at each line (HC3 of
+    MacKinnon, White 1985), so they hold for inexact weights. Student's t has as many degrees of
+    freedom as lines determine the coefficient (Satterthwaite 1946). LinAlgError where nothing fits.
     """
     from scipy.special import stdtrit
 
@@ -262,7 +262,7 @@ def _fit_spectrum(what: str, x: _Spectrum, instrument: bool) -> _Fitted:
     columns, tools = (_slopes(what, x, u, theta) for u in (x.u, known))
     J, Z = (_parts(c.T / noise).T for c in (columns, tools))
     size = np.linalg.norm(J, axis=0)
-    # how far what is left at each line moves the coefficients, (p, 2 lines)
+    # influence of the residual at each line on the coefficients, (p, 2 lines)
     gain = np.linalg.solve(Z.T @ J / size, Z.T) / size[:, None]
     hat = np.einsum("lp,pl->l", J, gain).reshape(2, -1).mean(axis=0)
     own = 0.5 * (np.abs(left) / noise / (1.0 - np.minimum(hat, 0.9))) ** 2
@@ -270,7 +270,7 @@ def _fit_spectrum(what: str, x: _Spectrum, instrument: bool) -> _Fitted:
     variance = shares.sum(axis=1)
     freedom = 2.0 * variance**2 / np.maximum(np.sum(shares**2, axis=1), 1e-300)
     half = stdtrit(np.maximum(freedom, 1.0), 0.5 + 0.5 * CONFIDENCE) * np.sqrt(variance)
-    # nothing is known of what happens between samples
+    # the motion between samples is unknown
     lost = response(what, theta[:3], x.frequency) * x.u * (2.0 * np.pi * x.frequency * x.dt) ** 2
     half = np.hypot(half, gain @ _parts(lost / 6.0 / noise))[:3]
     model = response(what, theta[:3], x.frequency)
@@ -295,7 +295,7 @@ def _terms(x: _Spectrum) -> np.ndarray:
 
 
 def _denominator(what: str, theta: np.ndarray, f: np.ndarray) -> np.ndarray:
-    """That of the block, scaled to the highest line."""
+    """Denominator of the block, scaled to the highest line."""
     s = 2j * np.pi * f
     return (
         np.ones_like(s) if what == "Th" else (s * s + theta[1] * s + theta[2]) / np.abs(s[-1]) ** 2
@@ -303,7 +303,7 @@ def _denominator(what: str, theta: np.ndarray, f: np.ndarray) -> np.ndarray:
 
 
 def _misfit(what: str, x: _Spectrum, theta: np.ndarray) -> np.ndarray:
-    """Output without the block's and without what start and end leave, (lines,)."""
+    """Output minus the block's output and minus the terms of start and end, (lines,)."""
     edge = _terms(x) @ theta[3:] / _denominator(what, theta, x.frequency)
     return x.y - response(what, theta[:3], x.frequency) * x.u - edge
 
@@ -337,7 +337,7 @@ def _start(what: str, x: _Spectrum) -> np.ndarray:
 
 
 def _solve(columns: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
-    """Real least squares of complex equations: unknowns, and what is left, squared."""
+    """Real least squares of complex equations: unknowns, and the squared residual."""
     A = _parts(columns.T).T
     size = np.linalg.norm(A, axis=0)
     A = A / size
@@ -346,7 +346,7 @@ def _solve(columns: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def _least(what: str, x: _Spectrum, theta: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """Least squares of what is left, each line weighted by its noise."""
+    """Least squares of the residual, each line weighted by its noise."""
     from scipy.optimize import least_squares
 
     size = 1.0 / np.linalg.norm(_slopes(what, x, x.u, theta) / noise[:, None], axis=0)
@@ -369,7 +369,7 @@ def _least(what: str, x: _Spectrum, theta: np.ndarray, noise: np.ndarray) -> np.
 def _settle(
     what: str, x: _Spectrum, known: np.ndarray, theta: np.ndarray, noise: np.ndarray
 ) -> np.ndarray:
-    """Steps to where what is left has no part along the columns of the known part of the input."""
+    """Iterates until the residual is orthogonal to the columns of the known part of the input."""
     for _ in range(100):
         J, Z = (_parts(_slopes(what, x, u, theta).T / noise).T for u in (x.u, known))
         size = np.linalg.norm(Z, axis=0)
@@ -384,8 +384,8 @@ def _settle(
 def _shown(x: _Spectrum, found: _Fitted) -> tuple[np.ndarray, ...]:
     """Frequency, response, its deviation and coherence, averaged over up to 40 bands.
 
-    In a band, what is left is projected on what the block makes of the input: a mean response that
-    does not depend on how the response bends within the band.
+    In each band the residual is projected on the block's output. This gives a mean response that is
+    independent of the curvature of the response within the band.
     """
     edges = np.geomspace(x.frequency[0], x.frequency[-1], MULTISINE_LINES + 1)
     place = np.clip(np.searchsorted(edges, x.frequency, "right") - 1, 0, MULTISINE_LINES - 1)

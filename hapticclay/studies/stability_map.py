@@ -1,4 +1,4 @@
-"""Maps of stability: analytic boundaries, boundaries found by runs, and where the two disagree."""
+"""Stability maps: analytic boundaries, boundaries by runs, and where the two disagree."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MAP_POSES = 0.10  # [m] the handle's path, either way from the nominal pose
 DAMPINGS = (1.0, 3000.0)  # [N.s/m] of the map of gains
 LINE_POINTS = 61  # of an analytic line
 UNDAMPED = "held clay is never passive without a damper behind it (Colgate, Schenkel)"
-MOST_DAMPING = 1e5  # [N.s/m] clay is looked for up to here
+MOST_DAMPING = 1e5  # [N.s/m] end of the search for clay
 
 Line = tuple[list[float], list[float]]
 Progress = Callable[[Iterable], Iterable]
@@ -32,11 +32,11 @@ class MapCell:
     """One point of a map.
 
     Attributes:
-        x: place on the map's first axis.
-        y: place on the map's second axis.
+        x: value on the map's first axis.
+        y: value on the map's second axis.
         theory: whether the linear loop is stable, in continuous time at the nominal pose.
         simulated: class of a run, as boundary.classify_run.
-        cause: why the two differ, "" if they do not.
+        cause: cause of a difference between the two, "" if they agree.
     """
 
     x: float
@@ -52,14 +52,14 @@ class StabilityMap:
 
     Attributes:
         kind: one of MAP_KINDS.
-        loop: what is kept fixed.
+        loop: the fixed parts.
         x_name: quantity and unit of the first axis.
         y_name: quantity and unit of the second axis.
         lines: analytic boundaries by name: x and y of each, inf where there is none.
-        found: boundaries from runs, likewise.
-        exact: boundaries of the linear loop of those very runs, by name: y of each.
+        found: boundaries by runs, likewise.
+        exact: boundaries of the linear loop of the same runs, by name: y of each.
         cells: points at which theory and a run are compared.
-        notes: lines that are missing, and why.
+        notes: missing lines and the reasons.
         limit: name of the line of the linear loop of the runs: above it, the gain margin is below
             1; "" for none.
     """
@@ -76,7 +76,7 @@ class StabilityMap:
     limit: str = ""
 
     def tables(self) -> dict[str, dict[str, list]]:
-        """Returns what a figure of the map shows: its cells, its lines, what runs found."""
+        """Returns the numbers of the figure: cells, lines, and boundaries by runs."""
         x, y = self.x_name, self.y_name
         cells = {
             x: [c.x for c in self.cells],
@@ -115,7 +115,7 @@ def stability_map(
     Args:
         kind: "gain-damping", "delay-damping" (the loop's own K; sampled every 0.36 ms if it is
             continuous) or "gain-pose" (without shaping, and with it).
-        loop: what is kept fixed.
+        loop: the fixed parts.
         quick: four columns of three cells instead of eight of five.
         progress: wraps the iterable of the columns.
     """
@@ -251,7 +251,7 @@ def _gain_pose(loop: PushedLoop, columns: int, rows: int, progress: Progress) ->
 def _map_cells(
     loops: list[PushedLoop], x: list[float], field: str, ys: list[float], progress: Progress
 ) -> tuple[MapCell, ...]:
-    """Theory beside a run for each loop, with each of ys as its field."""
+    """Theory and a run for each loop, with each of ys as its field."""
     out = []
     for loop, at in zip(progress(loops), x, strict=True):
         for y in ys:
@@ -276,7 +276,7 @@ def _largest_gain(holds: Callable[[float], bool], low: float = 1e-2, high: float
 
 
 def _unstable_damping(loop: PushedLoop, Ts: float | None, delay: float) -> float:
-    """Smallest b at which the late linear loop is unstable [N.s/m]; inf for none, 0 if below 1."""
+    """Least b at which the delayed linear loop is unstable [N.s/m]; inf for none, 0 if below 1."""
     linear = replace(loop.linear, Ts=Ts, delay=delay)
 
     def stable(b: float) -> bool:
@@ -287,9 +287,9 @@ def _unstable_damping(loop: PushedLoop, Ts: float | None, delay: float) -> float
 
 
 def _passive_damping(Ts: float, delay: float, damper: float) -> float:
-    """Largest held clay, late, that is passive behind a damper [N.s/m].
+    """Largest held, delayed clay that is passive behind a damper [N.s/m].
 
-    The damper that clay needs is proportional to it, so one test tells.
+    The required damper is proportional to the clay, so one test suffices.
     """
 
     def late(z: np.ndarray) -> np.ndarray:

@@ -28,14 +28,14 @@ Stimulus = Callable[[float], float]
 @named
 @dataclass(frozen=True)
 class Observer:
-    """A simulated observer, who answers by chance with a known psychometric function.
+    """A simulated observer that answers at random with a known psychometric function.
 
     A difference x is noticed with probability lapse/2 + (1 - lapse) Phi((x - threshold)/spread).
 
     Attributes:
-        threshold: difference that is noticed half of the times, > 0, in the unit of the stimulus.
+        threshold: difference noticed in half of the trials, > 0, in the unit of the stimulus.
         spread: standard deviation of the noise within the observer, > 0, in the same unit.
-        lapse: share of answers that are guessed, 0 to 0.5.
+        lapse: share of guessed answers, 0 to 0.5.
     """
 
     threshold: Annotated[float, Bound(0.0, MOST_LEVEL, above=True)] = 0.08
@@ -55,7 +55,7 @@ class Observer:
         return 0.5 * self.lapse + (1.0 - self.lapse) * seen
 
     def difference(self, share: float) -> float:
-        """The difference that is noticed in a share of the trials.
+        """The difference noticed in a share of the trials.
 
         Args:
             share: lapse/2 to 1 - lapse/2, both excluded.
@@ -72,14 +72,14 @@ class Observer:
 @named
 @dataclass(frozen=True)
 class Staircase:
-    """A staircase: the difference falls after some noticed in a row, and rises after one missed.
+    """A staircase: the difference falls after several hits in a row, and rises after a miss.
 
     Attributes:
         down: noticed trials in a row before the difference falls, 1 to 10.
-        fall: by which it falls, > 0, in the unit of the stimulus.
-        rise: by which it rises, > 0; equal steps are Levitt's, others Kaernbach's.
+        fall: step down, > 0, in the unit of the stimulus.
+        rise: step up, > 0; equal steps are Levitt's, others Kaernbach's.
         start: difference of the first trial, >= 0.
-        reversals: turns after which it ends, 2 to 10000.
+        reversals: number of turns at which it ends, 2 to 10000.
         skipped: turns at the start that do not count, less than reversals.
     """
 
@@ -96,7 +96,7 @@ class Staircase:
 
     @property
     def share(self) -> float:
-        """Share of noticed trials at which it neither rises nor falls in the mean.
+        """Share of noticed trials at which the mean step is zero.
 
         There p^down fall = (1 - p^down) rise: 70.7 % for two in a row and equal steps, 79.4 % for
         three.
@@ -143,7 +143,7 @@ class StaircaseRun(Result):
         )
 
     def tables(self) -> dict[str, dict[str, Any]]:
-        """What was found: the trials, and the turns."""
+        """The trials and the turns."""
         return {
             "trials": {"level": self.levels, "noticed": self.noticed},
             "turns": {"trial": self.turns, "level": self.levels[self.turns]},
@@ -158,9 +158,9 @@ def run_staircase(
 
     Args:
         staircase: the rule.
-        observer: who answers.
-        seed: of the answers, 0 to 2^32 - 1.
-        stimulus: difference that reaches the observer, of the one that is set; None for the same.
+        observer: the simulated observer.
+        seed: seed of the answers, 0 to 2^32 - 1.
+        stimulus: difference at the observer as a function of the difference set; None for the same.
 
     Raises:
         ParameterError: it does not turn often enough within 100000 trials, or stimulus returns no
@@ -198,9 +198,9 @@ def staircase_mean(
 
     Args:
         staircase: the rule.
-        observer: who answers.
+        observer: the simulated observer.
         runs: number of staircases, 2 to 100000.
-        seed: of the first of them, 0 to 2^31.
+        seed: seed of the first, 0 to 2^31.
     """
     runs, seed = integer("runs", runs, 2, 100_000), integer("seed", seed, 0, 2**31)
     found = [run_staircase(staircase, observer, seed + i).estimate for i in range(runs)]

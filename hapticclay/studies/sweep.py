@@ -1,8 +1,8 @@
-"""Many runs over a space of parameters, as a data set that survives anything.
+"""Many runs over a space of parameters, as a data set that survives interruptions.
 
 A sweep is cut into chunks; each chunk is one Parquet file, written whole or not at all by the
-process that ran it. Missing and damaged files are the work left, so that an interrupted sweep, even
-a killed one, goes on where it stopped.
+process that ran it. Missing and damaged files define the remaining work, so an interrupted or
+killed sweep resumes where it stopped.
 """
 
 from __future__ import annotations
@@ -96,19 +96,19 @@ def run_chunks(
     workers: int | None = None,
     scheduler: str | None = None,
 ) -> Generator[int, None, None]:
-    """Runs chunks of a sweep whose folder is claimed; yields the number of runs of each.
+    """Runs chunks of a sweep whose folder is locked; yields the number of runs of each.
 
     Args:
         sweep: the sweep.
         out: its folder.
         todo: the chunks.
-        workers: processes on this machine; None for one a core.
+        workers: processes on this machine; None for one per core.
         scheduler: address of a dask scheduler to use instead.
 
     Raises:
         ParameterError: a file cannot be written, or a package is missing.
         ChildProcessError: a worker here was killed.
-        ConnectionError: the scheduler has gone.
+        ConnectionError: the connection to the scheduler is lost.
     """
     return (
         _run_on_cluster(sweep, out, todo, scheduler)
@@ -122,7 +122,7 @@ def processes(todo: list[int], workers: int | None) -> int:
 
     Args:
         todo: the chunks.
-        workers: the most to use; None for one a core.
+        workers: largest number to use; None for one per core.
     """
     return max(1, min(workers or cores(), len(todo)))
 
@@ -143,7 +143,7 @@ def _run_here(sweep: Plan, out: Path, todo: list[int], workers: int) -> Generato
         try:
             jobs: set[Future[int]] = set()
             left = iter(todo)
-            while True:  # one chunk a worker: none waits in the pool, which would finish it too
+            while True:  # one chunk per worker: Ctrl-C would wait for queued ones
                 jobs |= {
                     pool.submit(run_chunk, sweep, number, str(out))
                     for number in itertools.islice(left, workers - len(jobs))
@@ -152,7 +152,7 @@ def _run_here(sweep: Plan, out: Path, todo: list[int], workers: int) -> Generato
                     return
                 done, jobs = wait(jobs, return_when=FIRST_COMPLETED)
                 yield from (job.result() for job in done)
-        except (KeyboardInterrupt, GeneratorExit):  # struck here, or in who takes the results
+        except (KeyboardInterrupt, GeneratorExit):  # Ctrl-C here or in the consumer of the results
             print(FINISHING, file=sys.stderr, flush=True)
             raise
         except BrokenProcessPool:
@@ -165,7 +165,7 @@ def _run_here(sweep: Plan, out: Path, todo: list[int], workers: int) -> Generato
 
 @contextlib.contextmanager
 def _finishing() -> Iterator[None]:
-    """Lets Ctrl-C wait for the work in hand, and says so; a second one does not wait."""
+    """Makes Ctrl-C wait for the running chunks, with a message; a second Ctrl-C does not wait."""
     import signal
     import threading
 
@@ -190,7 +190,7 @@ def _finishing() -> Iterator[None]:
 
 
 def _start_worker() -> None:
-    """Leaves signals of the terminal to the parent, so that a worker finishes; ends with it."""
+    """Ignores signals of the terminal, so a worker finishes; the worker ends with its parent."""
     import signal
     import threading
 
@@ -206,7 +206,7 @@ def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
     assert parent
     parent.join()
-    os._exit(1)  # a killed parent takes no report
+    os._exit(1)  # a killed parent receives no report
 
 
 def _run_on_cluster(
@@ -241,7 +241,7 @@ def _run_on_cluster(
 
 @contextlib.contextmanager
 def _quiet(name: str) -> Iterator[None]:
-    """Keeps the log of a package silent: errors that it logs are raised too, and told once."""
+    """Silences the log of a package: the errors it logs are raised too and shown once."""
     logger = logging.getLogger(name)
     before = logger.level
     logger.setLevel(logging.CRITICAL + 1)
@@ -252,7 +252,7 @@ def _quiet(name: str) -> Iterator[None]:
 
 
 def estimate_time(sweep: Sweep) -> tuple[float, float]:
-    """Time [s] of one process and room on disk [bytes] that a run takes, from a random sample.
+    """Process time [s] and disk space [bytes] of a run, estimated from a random sample.
 
     Args:
         sweep: the sweep.

@@ -1,4 +1,4 @@
-"""The rows of a sweep: a run's parameters, outcome and measurements, and the time that it takes."""
+"""The rows of a sweep: parameters, outcome and measurements of a run, and its run time."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from ..theory import gain_limits
 from .sampling import Sweep
 
 CROSSINGS_KEPT = 3  # crossings that have columns of their own
-CHUNK_TIME = 1.5  # of one process, that a chunk should take [s]: an interruption waits for it
-PROBES = 20  # runs that an estimate is made from ...
+CHUNK_TIME = 1.5  # target time of a chunk in one process [s]: an interruption waits for it
+PROBES = 20  # runs used for an estimate ...
 PROBE_TIME = 5.0  # ... or fewer after this time [s]
 NO_INDEX: dict[str, Any] = {"index_columns": [], "column_indexes": [], "columns": []}  # of pandas
 RESULT_COLUMNS = {  # unit, what it is; crossing1 and x stand for their likes
@@ -39,10 +39,10 @@ RESULT_COLUMNS = {  # unit, what it is; crossing1 and x stand for their likes
 
 
 def column_told(name: str) -> tuple[str, str]:
-    """Unit and description of a column of the data set, "" where there is none.
+    """Unit and description of a column of the data set, "" if it has none.
 
     Args:
-        name: of the column: a result, or a parameter.
+        name: name of the column: a result, or a parameter.
     """
     like = re.sub("_y$", "_x", re.sub(r"^crossing\d$", "crossing1", name))
     return RESULT_COLUMNS.get(like) or (parameter_unit(name), "parameter of the run")
@@ -110,7 +110,7 @@ def run_point(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:
 
 
 def run_time(sweep: Sweep) -> float:
-    """Time [s] that a run takes, from one random run if it is long, from a few if it is short.
+    """Run time [s], from one random run if it is long, from a few if it is short.
 
     Args:
         sweep: the sweep.
@@ -123,11 +123,11 @@ def run_time(sweep: Sweep) -> float:
 
 
 def probed(sweep: Sweep, patience: float) -> tuple[list[dict[str, Any]], float]:
-    """Rows of random runs, and the time that they took [s].
+    """Rows of random runs, and their total time [s].
 
     Args:
         sweep: whose runs.
-        patience: after which there are fewer than PROBES [s].
+        patience: time after which fewer than PROBES runs are made [s].
     """
     rows, spent, begin = [], 0.0, time.perf_counter()
     for i in np.random.default_rng(0).integers(0, len(sweep), PROBES).tolist():

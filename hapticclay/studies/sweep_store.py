@@ -1,4 +1,4 @@
-"""Where a sweep keeps its runs: parts in Parquet, marked by its digest, claimed by a process."""
+"""Storage of a sweep: Parquet files with its digest, in a folder locked by one process."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from .sweep_rows import CHUNK_TIME, NO_INDEX, column_told, result_row, run_time
 
 MARKS = (b"hapticclay_sweep", b"hapticclay_part")  # metadata keys: sweep's digest, chunk's number
 MOST_IN_CHUNK = 1024  # runs, where they are short
-BAD_PARTS_NAMED = 5  # bad parts that a message names; it counts the others
+BAD_PARTS_NAMED = 5  # damaged parts named in a message; the others are counted
 
 
 class Stored(Protocol):
-    """What is stored as a sweep is, besides a Sweep: it makes its own rows, chunk by chunk."""
+    """Protocol of runs stored like a Sweep: it makes its own rows, chunk by chunk."""
 
     def __len__(self) -> int: ...
 
@@ -56,11 +56,11 @@ class Stored(Protocol):
         ...
 
     def described(self) -> dict[str, Any]:
-        """All of it as data."""
+        """The runs as plain data."""
         ...
 
     def digest(self) -> str:
-        """Its fingerprint."""
+        """Fingerprint of the runs."""
         ...
 
 
@@ -69,7 +69,7 @@ P = TypeVar("P", bound=Plan)
 
 
 def parquet_schema(sweep: Plan, number: int) -> Any:
-    """The pyarrow Schema of a chunk's file; its metadata tell the sweep and the chunk.
+    """The pyarrow Schema of a chunk's file; its metadata identify sweep and chunk.
 
     Metadata of each field are its unit and description.
 
@@ -101,9 +101,9 @@ def write_part(rows: list[dict[str, Any]], schema: Any, file: Any) -> None:
     """Writes the rows of a chunk.
 
     Args:
-        rows: they.
-        schema: of them.
-        file: where to.
+        rows: the rows.
+        schema: schema of the rows.
+        file: path of the file.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -155,7 +155,7 @@ def missing_parts(sweep: Plan, out: Path) -> list[int]:
 
 
 def stored_digest(out: Path) -> str | None:
-    """What tells the sweep of a folder from others; None if it holds none.
+    """Digest of the sweep in a folder; None if it holds none.
 
     Args:
         out: the folder.
@@ -167,15 +167,15 @@ def stored_digest(out: Path) -> str | None:
 def begin_sweep(sweep: Plan, out: Path) -> list[int]:
     """Prepares the folder, or checks that it holds this same sweep; returns the chunks to run.
 
-    Parts that are damaged, or of another sweep or place, are named and removed, as are the remains
-    of killed writers.
+    Parts that are damaged or belong to another sweep or chunk are named and removed, as are
+    temporary files of killed writers.
 
     Args:
         sweep: the sweep.
         out: its folder.
 
     Raises:
-        ParameterError: the folder holds another sweep, or a file that is no part of any.
+        ParameterError: the folder holds another sweep, or a file that is not part of a sweep.
     """
     _file, digest = out / "sweep.json", stored_digest(out)
     if digest is not None:
@@ -205,7 +205,7 @@ def begin_sweep(sweep: Plan, out: Path) -> list[int]:
 
 
 def _begun(out: Path) -> dict[str, Any] | None:
-    """What a folder's sweep.json holds, empty if it is damaged; None where there is none."""
+    """Content of a folder's sweep.json, empty if it is damaged; None if there is none."""
     file = out / "sweep.json"
     if not file.is_file():
         return None
@@ -216,7 +216,7 @@ def _begun(out: Path) -> dict[str, Any] | None:
 
 
 def _with_chunk(sweep: P, out: Path) -> P:
-    """The sweep with runs in a file: as given, as the folder has it, or by the time they take."""
+    """The sweep with its chunk size: as given, as stored in the folder, or from the run time."""
     if not isinstance(sweep, Sweep) or sweep.chunk is not None:
         return sweep
     begun = _begun(out)
@@ -225,10 +225,10 @@ def _with_chunk(sweep: P, out: Path) -> P:
 
 
 def chunk_size(seconds: float) -> int:
-    """Runs that make up CHUNK_TIME.
+    """Number of runs that take CHUNK_TIME.
 
     Args:
-        seconds: that one takes.
+        seconds: duration of one run.
     """
     return max(1, min(MOST_IN_CHUNK, int(CHUNK_TIME / max(seconds, 1e-6))))
 
@@ -265,8 +265,8 @@ def claimed(sweep: P, out: Path) -> Iterator[tuple[P, list[int]]]:
         out: its folder.
 
     Raises:
-        ParameterError: the folder holds another sweep, another process works in it, a file cannot
-            be written, or a package is missing.
+        ParameterError: the folder holds another sweep, another process uses it, a file cannot be
+            written, or a package is missing.
     """
     try:
         import pyarrow  # noqa: F401
@@ -290,7 +290,7 @@ def claimed(sweep: P, out: Path) -> Iterator[tuple[P, list[int]]]:
 
 
 def _hold(lock: int, out: Path) -> None:
-    """Takes the lock, an open file's; the system releases it when the process ends, even killed."""
+    """Locks an open file; the system releases the lock when the process ends, even if killed."""
     try:
         import fcntl
 
@@ -308,7 +308,7 @@ def _hold(lock: int, out: Path) -> None:
 
 
 def row_size(sweep: Plan, rows: list[dict[str, Any]]) -> float:
-    """Room on disk [bytes] that a run takes in files of a whole chunk.
+    """Disk space [bytes] per run in files of a whole chunk.
 
     Args:
         sweep: the sweep.
@@ -335,7 +335,7 @@ def read_sweep(out: str | os.PathLike[str]):
         out: folder of the sweep.
 
     Raises:
-        ParameterError: there is none, or a part is damaged or does not belong to the others.
+        ParameterError: there is no sweep, or a part is damaged or belongs to another sweep.
     """
     import pyarrow as pa
 

@@ -1,8 +1,8 @@
 """Smooth motions under noisy positions, and a law of force fitted together with the motion.
 
 A velocity differentiated from noisy positions is itself noisy, and a law fitted to it comes out
-biased. Here position and force are explained at once: a spline a stretch follows the positions, and
-its derivative, put into the law, the forces (total least squares along a spline). The spline's
+biased. Here position and force are fitted together: one spline per stretch fits the positions, and
+the law applied to its derivative fits the forces (total least squares along a spline). The spline's
 coefficients are eliminated from the normal equations, which are banded.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 from ..model.flow import N_MAX, N_MIN
 
 DEGREE = 4  # of the spline; its velocity is a cubic, its acceleration continuous
-LEAST_PER_KNOT = 8  # samples between knots: coarse enough for the rests to tell the noise
+LEAST_PER_KNOT = 8  # samples between knots: coarse enough to estimate the noise from the residuals
 FIT_RANGES = {  # of the parameters, the logarithm of K, while a law is fitted
     "Fy": (-1e9, 1e9),
     "b": (-1e12, 1e12),
@@ -28,7 +28,7 @@ WINDOW = 5.0  # correlation times over which autocorrelations are summed (Sokal 
 
 
 class Stretch(NamedTuple):
-    """Samples that one spline follows.
+    """Samples fitted by one spline.
 
     Attributes:
         t: times [s], (n,), ascending.
@@ -43,9 +43,9 @@ class Motion:
     """Quartic splines over time, one for each stretch, and their velocities.
 
     Args:
-        stretches: one or more; samples are those of one after those of the other.
-        spacing: of the knots, about [s].
-        sliding: samples of which the velocity matters, indices; None for all.
+        stretches: one or more; their samples are concatenated.
+        spacing: approximate spacing of the knots [s].
+        sliding: indices of the samples whose velocity is used; None for all.
         sign: direction of each of these, 1.0 or -1.0; None for 1.0.
 
     Attributes:
@@ -92,7 +92,7 @@ class Motion:
         return np.einsum("ij,ij->i", self._velocity, c[_nearby(self._near)])
 
     def follow(self, p: np.ndarray) -> np.ndarray:
-        """Coefficients that follow some samples best.
+        """Coefficients of the best fit to samples.
 
         Args:
             p: positions [m], (n,).
@@ -113,14 +113,14 @@ class Motion:
     def eliminated(
         self, ratio: float, slope: np.ndarray, columns: np.ndarray, rest: np.ndarray, p: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The coefficients' part in a step of Gauss and Newton, normal equations A c + G theta = g.
+        """The coefficients' part of a Gauss-Newton step, normal equations A c + G theta = g.
 
         Args:
-            ratio: weight of a squared position beside a squared force [N^2/m^2].
+            ratio: weight of a squared position relative to a squared force [N^2/m^2].
             slope: change of each force by its velocity [N.s/m], (n,).
             columns: change of each force by the law's parameters, (n, k).
-            rest: forces less those of the law [N], (n,).
-            p: positions less those of the spline [m], (m,).
+            rest: residual forces [N], (n,).
+            p: residual positions [m], (m,).
 
         Returns:
             (A^-1 g, (size,); A^-1 G, (size, k); G, (size, k)).
@@ -185,11 +185,11 @@ def _basis(stretch: Stretch, spacing: float) -> tuple[np.ndarray, np.ndarray, np
 
 
 class Series(NamedTuple):
-    """Values to follow.
+    """Values to fit.
 
     Attributes:
         stretches: their samples.
-        y: the values, (n,), those of one stretch after those of the other.
+        y: the values, (n,), concatenated over the stretches.
     """
 
     stretches: Sequence[Stretch]
@@ -197,13 +197,13 @@ class Series(NamedTuple):
 
 
 def chosen_spacing(series: Sequence[Series]) -> tuple[float, list[float]]:
-    """Spacing of the knots with which splines tell most of some series, by Akaike's criterion.
+    """Best spacing of the knots of splines for some series, by Akaike's criterion.
 
     Args:
         series: one or more.
 
     Returns:
-        (spacing [s], variance of what is left of each series).
+        (spacing [s], residual variance of each series).
     """
     times = [x.t for x in series[0].stretches]
     finest = LEAST_PER_KNOT * float(np.median(np.diff(times[0])))
@@ -238,7 +238,7 @@ class Flowing(NamedTuple):
         """Forces at some speeds [N].
 
         Args:
-            theta: parameters, the logarithm of K in its place.
+            theta: parameters, with log K in place of K.
             v: speeds [m/s], above 0.
         """
         return self.slopes(theta, v)[0]
@@ -247,7 +247,7 @@ class Flowing(NamedTuple):
         """Forces, and how they change with speed and parameters.
 
         Args:
-            theta: parameters, the logarithm of K in its place.
+            theta: parameters, with log K in place of K.
             v: speeds [m/s], above 0, (n,).
 
         Returns:
@@ -267,16 +267,16 @@ class Flowing(NamedTuple):
 
 
 class Minimum(NamedTuple):
-    """Where position and force together are explained best.
+    """The best joint fit of position and force.
 
     Attributes:
-        theta: parameters of the law, the logarithm of K in its place.
+        theta: parameters of the law, with log K in place of K.
         c: coefficients of the motion [m]; empty where the speed is known.
-        sum: sum of squares of the force, the part of the noise of the velocity taken out [N^2].
+        sum: sum of squares of the force without the contribution of velocity noise [N^2].
         spread: inverse of the normal matrix of the parameters, (k, k); times the variance of a
             force their covariance.
         v: speeds [m/s], (n,).
-        rest: forces less those of the law [N], (n,).
+        rest: residual forces [N], (n,).
     """
 
     theta: np.ndarray
@@ -288,13 +288,13 @@ class Minimum(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """Forces beside positions, or beside known speeds.
+    """Forces with positions or with known speeds.
 
     Attributes:
         f: resisting forces [N], (n,), positive against the motion.
         p: positions in the direction of motion [m], (n,); empty where the speed is known.
         motion: splines; None where the speed is known.
-        start: coefficients that follow the positions alone, or the known speeds [m/s].
+        start: coefficients fitted to the positions alone, or the known speeds [m/s].
         ratio: variance of a force over that of a position [N^2/m^2].
         slowest: speed below which laws are continued by their tangents [m/s].
     """
@@ -313,13 +313,13 @@ class Joint(NamedTuple):
         held: Sequence[bool] = (),
         near: np.ndarray | None = None,
     ) -> Minimum:
-        """Least sum of squares over parameters and motion, by Gauss and Newton's method.
+        """Least sum of squares over parameters and motion, by the Gauss-Newton method.
 
         Args:
             law: the law.
-            theta: where to start.
-            held: which parameters stay as they are; empty for none.
-            near: coefficients to start from [m]; None for `start`.
+            theta: initial parameters.
+            held: fixed parameters; empty for none.
+            near: initial coefficients [m]; None for `start`.
         """
         k = len(law.names)
         free = ~np.array(held, dtype=bool) if len(held) else np.ones(k, dtype=bool)
@@ -365,7 +365,7 @@ class Joint(NamedTuple):
             return float(rest @ rest) + self._position_sum(c), v, rest
 
     def _continued(self, law: Flowing, theta: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Of a law, below the slowest speed along its tangent."""
+        """Forces and slopes of a law, continued by its tangent below the slowest speed."""
         force, slope, columns = law.slopes(theta, np.maximum(v, self.slowest))
         return force + slope * np.minimum(v - self.slowest, 0.0), slope, columns
 
@@ -390,10 +390,10 @@ class Joint(NamedTuple):
 
 
 def correlation_time(x: np.ndarray) -> float:
-    """Samples of noise that count as one: 1 + 2 sum of the autocorrelations; 1 for white noise.
+    """Samples per independent sample: 1 + 2 sum of the autocorrelations; 1 for white noise.
 
-    Summed over a window that grows until it holds WINDOW correlation times (A. Sokal 1997). What
-    differs from 1 by less than twice its own deviation counts as 1.
+    The sum runs over a window that grows until it holds WINDOW correlation times (A. Sokal 1997). A
+    value that differs from 1 by less than twice its standard deviation is set to 1.
 
     Args:
         x: samples, (n,).

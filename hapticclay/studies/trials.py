@@ -30,39 +30,39 @@ from .sampling import MOST_RUNS, Range
 
 SCHEMA = "hapticclay-trials-1"
 TRIAL_PUSH = 1e-6  # [m/s] so small that the arm stays linear to 1e-6
-SAMPLE_PUSH = 1e-7  # [m] a sample: of a wall, far above rounding and far below the arm's length
+SAMPLE_PUSH = 1e-7  # [m] per sample, for a wall: far above rounding and far below the arm's length
 ENDED = ("limit cycle", "saturated")  # runs that the motors bound: a small push has grown to that
 LOST = ("diverged", "out of reach", "singular")  # runs that nothing bounds
 SPAN_STEPS = 200.0  # of a repeated run, at least
 WALL_SPANS = (1.0, 4.0)  # of a wall's run, then of the one that repeats it
-WALL_TOLD = 0.01  # a wall's run that changes by a smaller share of itself is repeated
-WALL_BATCH = 100  # walls that run together, for their samples take room in memory
+WALL_TOLD = 0.01  # a wall's run with a smaller relative change is repeated
+WALL_BATCH = 100  # walls per batch, limited by the memory for their samples
 NOT_RUN = -1  # in place of 0, stable, and 1, unstable
 
 
 @checked
 @dataclass(frozen=True)
 class Trials:
-    """Random runs of a loop, or of a virtual wall: what is fixed, what varies, and how.
+    """Random runs of a loop or of a virtual wall: fixed parts, varying parts and their laws.
 
-    A wall must be linear: no surface, friction or encoder. `zwidth` judges the others, by rest.
+    A wall must be linear: no surface, friction or encoder. `zwidth` judges other walls, by rest.
 
     Parameters have dotted names: those of the base ("b", "K", "delay", "pose.x", "operator.mass",
     "servo.G.damping"; of a wall "K", "B", "device.damper"), else those of the scenario of its runs
     ("hardware.force_filter", "torque_limit.elbow"); `hapticclay fields` lists the latter.
 
     Attributes:
-        base: what does not vary: a PushedLoop or a VirtualWall. Its own push does not matter.
+        base: the fixed parts: a PushedLoop or a VirtualWall. Its own push is ignored.
         vary: distributions by name; the numbers are independent.
         hands: population of the hand, or its name in POPULATIONS; None for the hand of the base.
         grid: one or two parameters with a range of values each, lists or with a count; each
             combination is a cell.
         runs: number of runs, of each cell where there is a grid.
-        push: velocity of the handle at the start [m/s], 1e-9 to 1; None for one that leaves the
-            motion linear: TRIAL_PUSH, of a wall SAMPLE_PUSH a sample. Larger ones show what
-            friction, encoder and torque limits of an arm do, and take longer.
-        seed: of the generator, 0 to 2^32 - 1.
-        chunk: runs that are stored together, the most that a killed process loses.
+        push: velocity of the handle at the start [m/s], 1e-9 to 1; None for one that keeps the
+            motion linear: TRIAL_PUSH, for a wall SAMPLE_PUSH per sample. Larger pushes show the
+            effect of friction, encoder and torque limits of an arm, and take longer.
+        seed: seed of the generator, 0 to 2^32 - 1.
+        chunk: runs per stored chunk, the most that a killed process loses.
     """
 
     base: PushedLoop | VirtualWall
@@ -147,7 +147,7 @@ class Trials:
         return np.column_stack(columns)
 
     def middle(self) -> dict[str, float]:
-        """The parameters of a run in the middle: medians, and the first cell."""
+        """The parameters of the middle run: medians, and the first cell."""
         hand = self.hands.median if isinstance(self.hands, Hands) else None
         return (
             {name: float(r.grid()[0]) for name, r in self.grid.items()}
@@ -204,7 +204,7 @@ class Trials:
         return self.base.axis if isinstance(self.base, PushedLoop) else "x"
 
     def described(self) -> dict[str, Any]:
-        """The trials as data."""
+        """The trials as plain data."""
         kind = type(self.base).__name__
         return {"schema": SCHEMA, "kind": kind, **dataclasses.asdict(self)}
 
@@ -213,20 +213,20 @@ class Trials:
         text = json.dumps({**self.described(), "release": versions()["hapticclay"]}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
-    # What `sweep` asks of that which it stores.
+    # The interface that `sweep` requires of stored runs.
 
     def blank_row(self) -> dict[str, Any]:
         """A row of the data set, for the types of its columns."""
         return {"run": 0, **dict.fromkeys(self.names, 0.0), "unstable": 0, "longer": False}
 
     def chunk_rows(self, number: int) -> list[dict[str, Any]]:
-        """Makes the runs of a chunk; a row each.
+        """Makes the runs of a chunk, one row per run.
 
         Args:
             number: of the chunk, from 0.
         """
         points = self.points(number)
-        # A worker is one of several processes, one a core.
+        # A worker is one of several processes, one per core.
         threads = None if multiprocessing.parent_process() is None else 1
         unstable, longer = judge(self, points, threads)
         values = points.tolist()
@@ -240,16 +240,16 @@ class Trials:
 def judge(
     trials: Trials, points: np.ndarray, threads: int | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Makes runs and tells which are unstable.
+    """Makes runs and decides which are unstable.
 
-    A run is unstable if its oscillation grows. Where `growth.short_growth` leaves that of an arm
-    undecided, it is repeated for `boundary.GROWTH_SPAN` and judged by `growth.growth_rate`. That
-    of a wall is as long, and is read, as `wall_runs.growth_rates` does, at the wall's own samples;
-    where it hardly changes in size it is repeated, four times as long. A run that ends early, or
-    drives the motors into their limits from so small a push, is unstable.
+    A run is unstable if its oscillation grows. If `growth.short_growth` is undecided for an arm,
+    the run is repeated for `boundary.GROWTH_SPAN` and judged by `growth.growth_rate`. Runs of walls
+    have the length and the evaluation of `wall_runs.growth_rates`, at the wall's own samples; if
+    the size hardly changes, the run is repeated, four times as long. A run that ends early, or
+    saturates the motors after so small a push, is unstable.
 
     Args:
-        trials: what the runs are of.
+        trials: specification of the runs.
         points: their parameters, shape (runs, trials.names).
         threads: as in `simulate_batch`.
 
@@ -266,7 +266,7 @@ def judge(
     for i, row in enumerate(points.tolist()):
         with contextlib.suppress(ParameterError):
             made = trials.scenario(dict(zip(trials.names, row, strict=True)), 1.0)
-            # Odd, so that half the sampling frequency does not fold onto zero.
+            # Odd, so that half the sampling frequency is not aliased onto zero.
             steps[i] = 2 * round(0.5 * growth.GROWTH_SAMPLE / made.dt) + 1
             short[i] = replace(
                 made, t_max=(growth.MOTION_SAMPLES + 0.5) * float(steps[i]) * made.dt
@@ -301,7 +301,7 @@ def judge(
 def _judge_walls(
     trials: Trials, points: np.ndarray, threads: int | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As `judge`, of walls."""
+    """As `judge`, for walls."""
     unstable, longer = np.full(len(points), NOT_RUN), np.zeros(len(points), dtype=bool)
     walls: dict[int, VirtualWall] = {}
     runs: dict[int, Scenario] = {}

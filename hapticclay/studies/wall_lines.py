@@ -20,7 +20,7 @@ from ..theory.roots import bisect
 from . import boundary
 
 LIMIT_POINTS = 61  # of a line of theory
-SOFTEST = 0.03  # K of the ladder's first rung over that of the linear loop at B = 0, and
+SOFTEST = 0.03  # first K of the search over that of the linear loop at B = 0, and
 SOFT_BOUNDS = (1e-4, 1e-3)  # its bounds over the largest K of the linear loop
 
 # on a bare device, or clay of k and b on this arm
@@ -35,10 +35,10 @@ class Limit:
     Attributes:
         name: authors and year, or "exact".
         kind: "exact" (of the linear loop), "sufficient" (for every passive hand), or "rule" (an
-            approximation, or for another question).
+            approximation, or a limit of another property).
         B: [N.s/m].
         K: [N/m], of the length of B; 0 where there is none.
-        note: where it holds.
+        note: range of validity.
     """
 
     name: str
@@ -57,10 +57,10 @@ class Limit:
 
 
 def wall_at(wall: Wall, K: float, B: float) -> Wall:
-    """The wall with another K and B.
+    """The wall with the given K and B.
 
     Args:
-        wall: the wall; of an arm, k and b change.
+        wall: the wall; for an arm, k and b change.
         K: stiffness [N/m].
         B: damping [N.s/m].
     """
@@ -73,7 +73,7 @@ def is_linear(wall: Wall) -> bool:
     """Whether the loop of a wall is linear: no friction, no encoder, no surface.
 
     Args:
-        wall: the wall; the arm's loop is linear in a small motion.
+        wall: the wall; the loop of an arm is linear for small motions.
     """
     if isinstance(wall, boundary.PushedLoop):
         return True
@@ -103,10 +103,10 @@ def theoretical_damping(wall: Wall) -> float:
 
 
 def worst_hand(wall: Wall, box: Box) -> Operator:
-    """The hand of a box with which the least K is stable, among those at its ends and middles.
+    """The hand with the least stable K among those at ends and middles of a box.
 
     Args:
-        wall: all but K and the hand, which do not matter.
+        wall: all but K and the hand, which are ignored.
         box: the hands.
     """
     sides = [
@@ -116,7 +116,7 @@ def worst_hand(wall: Wall, box: Box) -> Operator:
     return min(hands, key=lambda hand: exact_limit(replace(wall, operator=hand)))
 
 
-@functools.lru_cache(maxsize=2048)  # asked for as a line, as a guess, and beside the runs
+@functools.lru_cache(maxsize=2048)  # used as a line, as a guess, and for comparison with the runs
 def exact_limit(wall: Wall) -> float:
     """Largest stable K of the linear loop [N/m].
 
@@ -129,7 +129,7 @@ def exact_limit(wall: Wall) -> float:
 
 
 def softest(wall: Wall, top: float) -> float:
-    """Least K at which a wall is tried [N/m].
+    """Least K at which a wall is tested [N/m].
 
     Args:
         wall: all but K and B.
@@ -152,7 +152,7 @@ def moving_mass(wall: Wall) -> float:
 
 
 def sample_time(wall: Wall) -> float:
-    """Sampling period [s]; that of the paper where the wall has none.
+    """Sampling period [s]; that of the paper if the wall has none.
 
     Args:
         wall: the wall.
@@ -166,13 +166,13 @@ def theory_limits(wall: Wall, top: float, grid: Sequence[float]) -> list[Limit]:
     Args:
         wall: all but K and B.
         top: largest B [N.s/m].
-        grid: values of B at which walls are tried as well [N.s/m], ascending.
+        grid: values of B at which walls are also tested [N.s/m], ascending.
     """
     first = next((B for B in grid if B > 0.0), 1.0)
     fine = [*np.linspace(min(grid[0], 0.0), first, 5)[:-1]]
     if top > first:
         fine += [*np.geomspace(first, top, LIMIT_POINTS), *np.linspace(0.5 * top, top, 17)]
-    if isinstance(wall, boundary.PushedLoop):  # whose limit is a scan
+    if isinstance(wall, boundary.PushedLoop):  # their limit requires a scan
         fine = []
     B = np.unique([*fine, *grid]).tolist()
     parts: list[Limit] = []

@@ -1,4 +1,4 @@
-"""Whether a wall is stable, by runs: growth of a linear loop, rest after a push of others."""
+"""Stability of a wall by runs: growth rate for a linear loop, rest after a push otherwise."""
 
 from __future__ import annotations
 
@@ -22,43 +22,44 @@ from .wall_lines import Wall, is_linear, moving_mass, wall_at
 FEWEST_SAMPLES, MOST_SAMPLES = 300, 6000  # samples of a run whose growth is read
 READ_SWINGS = 4.0  # periods of device and wall in such a run, at least
 READ = 400  # samples of it that are read, about
-SLOWEST = 1e-3  # modes slower than this share of sqrt(K/m) are no oscillation
-GROWTH_STEPS, REST_STEPS = 16, 4  # engine steps a sample, at least
+SLOWEST = 1e-3  # modes slower than this share of sqrt(K/m) do not count as oscillation
+GROWTH_STEPS, REST_STEPS = 16, 4  # least number of engine steps per sample
 STEP_DECAY = 0.1  # largest share of its speed that the damper takes in a step
-DEEPEST = 5e-3  # [m] into the wall that the force presses, so that the arm moves straight
+DEEPEST = 5e-3  # [m] depth to which the force presses into the wall, so that the arm moves straight
 REST_SAMPLES = 1000  # of the first run that is judged by its rest
 REST_SWINGS = 10.0  # its periods, at least
 REST_SPANS = (1.0, 4.0, 16.0, 64.0)  # longer while a swing decays, or the device creeps
 REST_MOST = 20_000  # samples of that first run, at most
 WINDOWS = ((0.4, 0.6), (0.8, 1.0))  # parts of a run whose swings are compared
-KEPT = 0.97  # a swing that keeps so much of itself from one to the other is sustained
-ROUGH_KEPT = 0.8  # the same of one within ROUGH quanta, whose size is not even
+KEPT = 0.97  # an oscillation that keeps this share from one part to the next is sustained
+ROUGH_KEPT = 0.8  # the same for one within ROUGH quanta, whose amplitude is irregular
 ROUGH = 10.0
-RUNG = 3.0  # ratio of the K of one rung to that of the one below
-EDGE_CLOSE = 5e-3  # a boundary between rest and swing is found to this share
+RUNG = 3.0  # ratio of successive K of the search
+EDGE_CLOSE = 5e-3  # relative accuracy of the boundary between rest and oscillation
 Search = Generator[float, Any, float]
 Share = Callable[[float], None]
 
 
 def unshown(share: float) -> None:
-    """Shows no progress.
+    """Ignores the progress.
 
     Args:
-        share: of the work that is done.
+        share: completed share of the work.
     """
 
 
 @named
 @dataclass(frozen=True)
 class Press:
-    """The push by which a wall is tried whose loop is not linear, and what counts as rest.
+    """The push that tests a wall with a nonlinear loop, and the criterion of rest.
 
     Attributes:
-        force: that presses into the wall from the start [N], 0 to 1e3: no deeper than 5 mm, and to
-            the middle between two forces that the encoder can tell, where the wall rests least.
-        speed: at which the device meets the wall [m/s], 0 to 1.
-        still: largest motion back and forth that counts as rest [m], 1e-9 to 1e-2. A hand that
-            grips feels about 1 um at 100 to 300 Hz.
+        force: force that presses into the wall from the start [N], 0 to 1e3: to at most 5 mm, and
+            to the middle between two forces that the encoder can resolve, where rest is least
+            likely.
+        speed: impact speed of the device [m/s], 0 to 1.
+        still: largest peak-to-peak motion that counts as rest [m], 1e-9 to 1e-2. A hand that grips
+            feels about 1 um at 100 to 300 Hz.
     """
 
     force: Annotated[float, Bound(0.0, 1e3, "N")] = 1.0
@@ -82,11 +83,11 @@ def stiffest(
     """Largest stable K of each wall [N/m], by runs.
 
     Args:
-        walls: all but K, alike but for B.
-        exact: that of the linear loop, for each [N/m]: where a search begins.
-        softest: least K that is tried [N/m].
-        press: how a wall that is not linear is pressed.
-        show: takes the share of the work that is done.
+        walls: all but K; they differ only in B.
+        exact: limit of the linear loop for each [N/m]: start of the search.
+        softest: least K in the search [N/m].
+        press: push for a wall that is not linear.
+        show: called with the completed share of the work.
     """
     if is_linear(walls[0]):
         searches = [
@@ -114,9 +115,9 @@ def most_damping(wall: Wall, top: float, K: float, press: Press) -> float:
 
     Args:
         wall: all but K and B.
-        top: that of the linear loop at K = 0 [N.s/m]: where the search begins.
+        top: limit of the linear loop at K = 0 [N.s/m]: start of the search.
         K: stiffness [N/m].
-        press: how a wall that is not linear is pressed.
+        press: push for a wall that is not linear.
     """
     if top == 0.0:
         return 0.0
@@ -137,7 +138,7 @@ def _side_by_side(
     judge: Callable[[Sequence[Any]], Sequence[Any]],
     show: Share = unshown,
 ) -> list[float]:
-    """Results of searches that each ask for one run at a time; a batch has one of each."""
+    """Results of searches that each need one run at a time; a batch has one run of each search."""
     results = [math.nan] * len(searches)
     asked = {i: next(search) for i, search in enumerate(searches)}
     while asked:
@@ -154,9 +155,9 @@ def _side_by_side(
 
 
 def _rung_search(start: float, most: float) -> Search:
-    """Yields x from start upwards, takes whether it rests, and returns the largest that does.
+    """Yields x from start upwards, receives whether it rests, and returns the largest x at rest.
 
-    The first rung of the ladder that does not rest ends it; a bisection follows.
+    The first x that does not rest ends the ascent; a bisection follows.
     """
     low, high = 0.0, start
     while (yield high):
@@ -173,7 +174,7 @@ def _rung_search(start: float, most: float) -> Search:
 
 
 def growth_rates(walls: Sequence[Wall]) -> list[float]:
-    """Rate at which the oscillation of each wall's linear loop grows, from a run of each [1/s].
+    """Growth rate of the oscillation of each wall's linear loop, from one run each [1/s].
 
     Args:
         walls: the walls.
@@ -200,7 +201,7 @@ def growth_rates(walls: Sequence[Wall]) -> list[float]:
 
 
 def growth_steps(wall: VirtualWall) -> int:
-    """Engine steps a sample of a run whose growth is read.
+    """Engine steps per sample of a run for a growth rate.
 
     Args:
         wall: the wall.
@@ -209,15 +210,15 @@ def growth_steps(wall: VirtualWall) -> int:
 
 
 def growth_reading(wall: VirtualWall, span: float = 1.0) -> tuple[int, float, float]:
-    """How the growth of a wall's oscillation is read from a run, on the scale of its own samples.
+    """Parameters for the growth rate of a wall's oscillation, on the scale of its samples.
 
     Args:
         wall: the wall.
-        span: length of the run, in those of the shortest that tells most walls.
+        span: length of the run, relative to the shortest that decides most walls.
 
     Returns:
-        Samples of the run; about the time between those that are read [s]; modes slower than the
-        third do not count [rad/s, 1/s].
+        Samples of the run; approximate spacing of the samples used [s]; rate below which modes are
+        ignored [rad/s, 1/s].
     """
     omega = math.sqrt((wall.K + wall.hand.spring) / moving_mass(wall))
     order = wall.velocity_window + wall.delay / wall.Ts
@@ -231,16 +232,16 @@ def growth_reading(wall: VirtualWall, span: float = 1.0) -> tuple[int, float, fl
 
 
 def come_to_rest(walls: Sequence[VirtualWall], press: Press = Press()) -> list[bool]:
-    """Whether each wall comes to rest after a push, by a run of each.
+    """Whether each wall comes to rest after a push, by one run each.
 
-    At rest is what moves back and forth by `press.still` at most in the last fifth of the run. What
-    swings more is tried for longer, up to 64 times, as long as the swing decays. Without an encoder
-    a swing that still decays at the end is stable, too; with one it may end in a limit cycle of
-    about a quantum, so it must have come to rest.
+    A wall is at rest if its peak-to-peak motion in the last fifth of the run is at most
+    `press.still`. While a larger oscillation decays, the run is extended, up to 64 times. Without
+    an encoder, an oscillation that still decays at the end is stable, too. With an encoder it may
+    end in a limit cycle of about a quantum, so the wall must come to rest.
 
     Args:
         walls: the walls.
-        press: the push, and what counts as rest.
+        press: the push and the criterion of rest.
     """
     rests: dict[int, bool] = {}
     steps = _engine_steps(walls, REST_STEPS)
@@ -264,7 +265,7 @@ def come_to_rest(walls: Sequence[VirtualWall], press: Press = Press()) -> list[b
 
 
 def _pressed(wall: VirtualWall, press: Press, span: float, steps: int) -> Any:
-    """The scenario of a wall that a hand pushes."""
+    """The scenario of a wall pushed by a hand."""
     stiffness, quantum = wall.K + wall.hand.spring, wall.device.quantum
     force = min(press.force, DEEPEST * stiffness)
     if quantum and wall.K:
@@ -277,7 +278,7 @@ def _pressed(wall: VirtualWall, press: Press, span: float, steps: int) -> Any:
 
 
 def _swing(record: Record, begin: float, end: float) -> tuple[float, float]:
-    """Largest motion back and forth in a part of a run, and how far it creeps one way [m]."""
+    """Largest peak-to-peak motion in a part of a run, and the creep in one direction [m]."""
     n = len(record.p)
     x = record.p[int(begin * n) : max(int(end * n), int(begin * n) + 1), 0]
     back = np.max(np.maximum.accumulate(x) - x)
@@ -286,7 +287,7 @@ def _swing(record: Record, begin: float, end: float) -> tuple[float, float]:
 
 
 def _engine_steps(walls: Sequence[VirtualWall], least: int) -> int:
-    """Engine steps a sample, at least so many, and such that dampers take little in each."""
+    """Engine steps per sample: at least a given number, more where dampers are strong."""
     w = walls[0]
     decay = (w.device.damper + w.hand.damper) / moving_mass(w) * w.Ts
     most = max(1, math.floor(w.Ts / 1e-6))  # dt is 1 us at least

@@ -1,4 +1,4 @@
-"""How the coefficients of G and Sh drift over the workspace, with and without inertia shaping."""
+"""Drift of the coefficients of G and Sh over the workspace, with and without inertia shaping."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Drift:
     mobility: np.ndarray
 
     def tables(self) -> dict[str, dict[str, Any]]:
-        """Returns what a figure of the map shows: the gain of Sh at each pose."""
+        """Returns the numbers of the figure: the gain of Sh at each pose."""
         table: dict[str, Any] = {"world x [m]": self.x, "world y [m]": self.y}
         for i, axis in enumerate(AXES):
             for k, way in enumerate(("without shaping", "with shaping")):

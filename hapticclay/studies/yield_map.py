@@ -1,4 +1,4 @@
-"""How a push ends, over the yield force of the clay and the gain: theory and runs."""
+"""Outcome of a push over the yield force of the clay and the gain: theory and runs."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from ..theory.roots import first_failure
 from .boundary import LARGE_PUSH, PushedLoop
 
 YIELD_FORCES = (0.1, 100.0)  # [N] of the map
-GAINS = (0.1, 100.0)  # among which the least is sought that has a limit cycle
+GAINS = (0.1, 100.0)  # gains among which the least with a limit cycle is searched
 NO_LIMITS = (1e6, 1e6)  # [N.m] motors for which the loop is linear
 RUN_SPANS = (6.0, 24.0, 96.0)  # [s] of a run, longer where it has not settled
-SETTLED = 0.01  # share by which the speed of a cycle may still change from quarter to quarter
+SETTLED = 0.01  # relative change of a settled cycle's speed from quarter to quarter
 
 PushClass = Literal["sticks", "limit cycle", "grows"]
 
@@ -39,9 +39,9 @@ class MeasuredCycle:
     Attributes:
         speed: largest velocity [m/s].
         fundamental: amplitude of the velocity at omega [m/s].
-        amplitude: half of the way between its ends [m].
+        amplitude: half the distance between its ends [m].
         omega: frequency [rad/s].
-        change: share by which its speed grew from the third to the last quarter of the run.
+        change: relative growth of its speed from the third to the last quarter of the run.
     """
 
     speed: float
@@ -58,10 +58,10 @@ class YieldCell:
     Attributes:
         Fy: yield force [N].
         K: gain of the compensator.
-        expected: what theory says of the push.
+        expected: outcome of the push by theory.
         predicted: V of the limit cycle by the describing function [m/s]; NaN without one.
         exact: its exact largest velocity [m/s]; NaN without one.
-        simulated: what a run did.
+        simulated: outcome of a run.
         speed: largest velocity of the cycle in the run [m/s]; NaN without one.
     """
 
@@ -76,18 +76,18 @@ class YieldCell:
 
 @dataclass(frozen=True)
 class YieldMap:
-    """What a push ends in, over yield force and gain.
+    """Outcome of a push over yield force and gain.
 
-    In proportion to Fy the loop does the same, so each gain has two numbers: the push that just
-    does not stick, and the speed of the limit cycle, both for a yield force of 1 N.
+    Motions of the loop scale with Fy. Each gain therefore has two numbers, both for a yield force
+    of 1 N: the least push that does not stick, and the speed of the limit cycle.
 
     Attributes:
-        loop: what is kept fixed; its push is the push, its b the damping of the clay.
-        least: gain below which every push ends stuck, as there is no limit cycle.
-        limit: gain from which on a push that does not stick grows.
+        loop: the fixed parts, with the push and the damping b of the clay.
+        least: gain below which every push ends stuck, because there is no limit cycle.
+        limit: gain from which a push that does not stick grows.
         K: gains of the lines, ascending, from least on.
-        critical: velocity of the push from which on it does not stick [m/s per N].
-        speed: largest velocity of the limit cycle [m/s per N]; NaN from limit on.
+        critical: least velocity of a push that does not stick [m/s per N].
+        speed: largest velocity of the limit cycle [m/s per N]; NaN at and above `limit`.
         cells: points at which theory and a run are compared.
     """
 
@@ -100,7 +100,7 @@ class YieldMap:
     cells: tuple[YieldCell, ...]
 
     def tables(self) -> dict[str, dict[str, Any]]:
-        """Returns what a figure of the map shows: its cells, and its lines over the gain."""
+        """Returns the numbers of the figure: cells, and lines over the gain."""
         return {
             "cells": {
                 "Fy [N]": [c.Fy for c in self.cells],
@@ -120,10 +120,10 @@ class YieldMap:
 
 
 def yielding_run(loop: PushedLoop, flow: Flow, t_max: float) -> Scenario:
-    """The run of a pushed loop in clay that yields, its motors without limits.
+    """The scenario of a pushed loop in yielding clay, with unlimited motors.
 
     Args:
-        loop: the loop; its own b does not matter.
+        loop: the loop; its own b is ignored.
         flow: the law of the clay.
         t_max: length of the run [s].
     """
@@ -132,7 +132,7 @@ def yielding_run(loop: PushedLoop, flow: Flow, t_max: float) -> Scenario:
 
 
 def measured_cycle(record: Record, axis: str) -> MeasuredCycle | None:
-    """The oscillation in the last half of a run; None where it rests or never swings through.
+    """The oscillation in the last half of a run; None if it rests or completes no period.
 
     Args:
         record: of the motion.
@@ -160,16 +160,16 @@ def measured_cycle(record: Record, axis: str) -> MeasuredCycle | None:
 
 
 def classify_push(loop: PushedLoop, flow: Flow) -> tuple[PushClass, float]:
-    """What a run of a push does, and the largest velocity of its limit cycle [m/s], NaN for none.
+    """Outcome of a push in a run, and the largest velocity of its limit cycle [m/s], NaN for none.
 
     Args:
-        loop: the loop; its own b does not matter.
+        loop: the loop; its own b is ignored.
         flow: the law of the clay.
     """
     cycle = None
     for t_max in RUN_SPANS:
         record = simulate(yielding_run(loop, flow, t_max))
-        if record.t[-1] < t_max - 2.0 * record.scenario.dt:  # the arm is folded, or worse
+        if record.t[-1] < t_max - 2.0 * record.scenario.dt:  # the arm is folded, or the run failed
             return "grows", math.nan
         cycle = measured_cycle(record, loop.axis)
         if cycle is None:
@@ -185,10 +185,10 @@ def yield_map(
 ) -> YieldMap:
     """Make the map of yield force and gain, for Bingham clay of the loop's b.
 
-    Theory and runs are in continuous time, without delay and with motors that have no limits.
+    Theory and runs use continuous time, no delay and unlimited motors.
 
     Args:
-        loop: what is kept fixed; its own K does not matter, its push is LARGE_PUSH.
+        loop: the fixed parts; its own K is ignored, its push is LARGE_PUSH.
         quick: four gains of four yield forces, and seven on the lines, instead of six of seven, and
             nineteen.
         progress: wraps the iterable of the gains.
@@ -199,7 +199,7 @@ def yield_map(
     loop = replace(loop, **TIMING, push=LARGE_PUSH)
     linear, unit = loop.linear, Flow(Fy=1.0, b=loop.b)
     lines, rows, columns = (6, 4, 4) if quick else (12, 6, 7)
-    limit = gain_limit(linear)  # inf in clay without damping, which does nothing once it flows
+    limit = gain_limit(linear)  # inf in clay without damping, which has no damping once it flows
 
     def rests(K: float) -> bool:
         return math.isnan(_stable_speed(replace(linear, K=K), unit))

@@ -35,7 +35,7 @@ from .wall_lines import (
 )
 from .wall_runs import PRESS, Press, Share, most_damping, stiffest, unshown
 
-VARIED_DEVICE = {  # what a family may vary: its field, unit, factor of the unit that a label shows
+VARIED_DEVICE = {  # parameters of a family: field, unit, factor of the unit in labels
     "Ts": ("Ts", "ms", 1e3),
     "delay": ("delay", "ms", 1e3),
     "quantum": ("device.quantum", "um", 1e6),
@@ -59,8 +59,8 @@ LETTERS = {
     "velocity_window": "window",
 }  # in labels
 POINTS, QUICK_POINTS = 13, 7  # values of B of a region
-TOP_SHARES = (0.72, 0.88, 0.97)  # of the largest B: points where the boundary falls
-REST_RESOLVED = 0.01  # share of K to which the decay of a swing tells stable from unstable
+TOP_SHARES = (0.72, 0.88, 0.97)  # shares of the largest B: points where the boundary falls
+REST_RESOLVED = 0.01  # share of K to which decay separates stable from unstable
 FALLEN = 0.01  # share of the largest K below which a boundary has fallen to nothing
 BY_GROWTH, BY_REST = "growth rate", "rest after a push"
 
@@ -68,23 +68,23 @@ BY_GROWTH, BY_REST = "growth rate", "rest after a push"
 @named
 @dataclass(frozen=True)
 class ZRegion:
-    """Walls that one device renders stably: those below K(B), found by runs.
+    """The walls that one device renders stably: below K(B), found by runs.
 
     Attributes:
-        name: of the region in its family, "" for one alone.
-        wall: what renders them, whose own K and B (of an arm, k and b) do not matter.
+        name: name of the region in its family, "" for a single region.
+        wall: device, hand and timing; its own K and B (for an arm, k and b) are ignored.
         verdict: how a run was judged, "growth rate" (linear loops) or "rest after a push".
         B: virtual damping [N.s/m], ascending.
-        K: largest stable stiffness found by runs, for each B [N/m]; 0 for none. All that is softer
-            was found stable as far as it was tried.
-        exact: the same of the linear loop by its eigenvalues [N/m]; friction, quantum and surface
-            are left out.
-        most_B: largest stable B found by runs [N.s/m], at K = 0; at the softest K tried if the
-            verdict is that of rest; NaN if B was given.
+        K: largest stable stiffness found by runs, for each B [N/m]; 0 for none. Every softer wall
+            tested was stable.
+        exact: the same for the linear loop by its eigenvalues [N/m]; friction, quantum and surface
+            are ignored.
+        most_B: largest stable B found by runs [N.s/m], at K = 0, or at the softest K tested if runs
+            are judged by rest; NaN if B was given.
         limits: lines of theory.
-        box: hands for which the region was found once more; None for none.
+        box: hands of a second region; None for none.
         box_K: largest stable K of runs with the worst hand of the box, for each B [N/m].
-        box_exact: the same of the linear loop.
+        box_exact: the same for the linear loop.
     """
 
     name: str
@@ -101,7 +101,7 @@ class ZRegion:
 
     @property
     def linear(self) -> bool:
-        """Whether the loop is linear, so that its eigenvalues tell what the runs must find."""
+        """Whether the loop is linear, so that its eigenvalues predict the result of the runs."""
         return self.verdict == BY_GROWTH
 
     @property
@@ -111,7 +111,7 @@ class ZRegion:
 
     @property
     def largest_B(self) -> float:
-        """Largest B of the region [N.s/m]: that of the runs, or of the points where B was given."""
+        """Largest B of the region [N.s/m]: found by runs, or the largest given B."""
         inside = [B for B, K in zip(self.B, self.K, strict=True) if K > 0.0]
         return max([*inside, 0.0 if math.isnan(self.most_B) else self.most_B], default=0.0)
 
@@ -126,7 +126,7 @@ class ZRegion:
     def gap(self) -> float:
         """Largest gap between runs and the exact linear loop; NaN if it is not linear.
 
-        As a share of K, and, where the boundary falls to nothing, of 1 % of the largest K.
+        The gap is a share of K or, where the boundary falls to zero, of 1 % of the largest K.
         """
         if not self.linear:
             return math.nan
@@ -139,7 +139,7 @@ class ZRegion:
         return max(gaps, default=math.nan)
 
     def violations(self) -> list[str]:
-        """Points at which a run was unstable below a line that is sufficient, in words."""
+        """Points at which a run was unstable below a sufficient line, in words."""
         out = []
         close = boundary.BRACKET if self.linear else REST_RESOLVED
         for limit in self.limits:
@@ -158,7 +158,7 @@ class ZWidth(Result):
     Attributes:
         regions: in the order of the values.
         vary: what differs between them, "" for nothing.
-        press: the push where the verdict is that of rest.
+        press: the push of runs judged by rest.
     """
 
     drawn_by = "hapticclay.views.wall_plots:zwidth_plot"
@@ -182,11 +182,11 @@ class ZWidth(Result):
         return max(gaps, default=math.nan)
 
     def violations(self) -> list[str]:
-        """What was unstable below a line that is sufficient, in words; empty as it should be."""
+        """Unstable runs below a sufficient line, in words; empty if theory and runs agree."""
         return [x for r in self.regions for x in r.violations()]
 
     def tables(self) -> dict[str, dict[str, list]]:
-        """What the figure shows: "runs", "lines", and "regions" with a row each."""
+        """The numbers of the figure: "runs", "lines", and "regions" with one row per region."""
         runs: dict[str, list] = {"region": [], "B [N.s/m]": [], "K [N/m]": [], "exact K [N/m]": []}
         if boxed := any(r.box for r in self.regions):
             runs |= {"worst hand: K [N/m]": [], "worst hand: exact K [N/m]": []}
@@ -230,30 +230,30 @@ def zwidth(
     quick: bool = False,
     progress: Share = unshown,
 ) -> ZWidth:
-    """Find the walls that a device renders stably, by runs and by theory.
+    """Finds the walls that a device renders stably, by runs and by theory.
 
-    A linear loop is stable where the oscillation of a run decays: its growth rate is that of its
-    least damped mode, exact but for the step of the engine. With friction, an encoder or a surface
-    it is not linear, and a wall is stable if it comes to rest after a push: see `Press` and
+    A linear loop is stable if the oscillation of a run decays. Its growth rate is that of the least
+    damped mode, exact up to the step of the engine. With friction, an encoder or a surface the loop
+    is not linear, and a wall is stable if it comes to rest after a push: see `Press` and
     `docs/zwidth.md`.
 
     Args:
-        wall: device, hand and timing; its own K and B do not matter. Or the arm with its servo and
-            compensator, or a scenario, of which it takes x (y is `PushedLoop.of(scenario, "y")`):
-            the plane is then that of the clay's b and k, under the gain of the loop.
-        vary: what differs in a family: "Ts", "delay", "quantum", "damper", "friction", "mass",
-            "filter" or "velocity_window", of an arm "Ts", "delay" or "gain"; "" for one region.
-        values: of what differs [SI]; None among those of "filter" is no filter.
-        B: virtual damping to try [N.s/m], ascending; None for 0 and others up to the largest that
-            is stable.
-        box: hands at the handle, in the place of the wall's own for a second set of runs.
-        press: the push and the rest of a loop that is not linear.
+        wall: device, hand and timing; its own K and B are ignored. Or the arm with its servo and
+            compensator, or a scenario, of which it uses x (for y pass `PushedLoop.of(scenario,
+            "y")`): the plane is then that of the clay's b and k, at the gain of the loop.
+        vary: parameter of a family: "Ts", "delay", "quantum", "damper", "friction", "mass",
+            "filter" or "velocity_window", for an arm "Ts", "delay" or "gain"; "" for one region.
+        values: values of the parameter [SI]; for "filter" None means no filter.
+        B: virtual damping to test [N.s/m], ascending; None for 0 and others up to the largest
+            stable B.
+        box: hands that replace the wall's own in a second set of runs.
+        press: push and criterion of rest for a loop that is not linear.
         quick: 7 values of B instead of 13.
-        progress: called with the share of the work that is done.
+        progress: called with the completed share of the work.
 
     Raises:
-        ParameterError: wall is none, an unknown name, a value out of its bounds, no values, or an
-            arm in continuous time.
+        ParameterError: wall is not a wall, an unknown name, a value out of its bounds, no values,
+            or an arm in continuous time.
     """
     wall = boundary.of_scenario(wall, AXES[0])
     if isinstance(wall, boundary.PushedLoop) and not wall.Ts:
@@ -341,7 +341,7 @@ def _region(
 
 
 def _grid(wall: Wall, top: float, points: int) -> tuple[float, ...]:
-    """0, then even on a logarithm up to half of the largest B, then where the boundary falls."""
+    """0, then evenly spaced in log B up to half of the largest B, then where the boundary falls."""
     if top == 0.0:
         return (0.0,)
     b = wall.hand.damper + (wall.device.damper if isinstance(wall, VirtualWall) else 0.0)

@@ -1,4 +1,4 @@
-"""What is known of a loop without a run."""
+"""Analysis of the loop without simulation."""
 
 import lazy_loader
 

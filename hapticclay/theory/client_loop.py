@@ -1,9 +1,10 @@
 """The sampled loop of an arm, a hand at it, and a program that renders a wall through a port.
 
-The handle moves by M p'' + D p' + S p = n f in the plane, M the inertia of arm and hand at a pose.
-The program reads place and velocity each Ts; its force f = -(K n.p + B n.v), `delay` late, is held
-for a Ts (zero-order hold). Between samples the motion is linear, so the loop is a matrix: exact for
-small motions about the pose. Friction, torque limits and the surface of the wall are left out.
+The handle moves in the plane: M p'' + D p' + S p = n f, with M the inertia of arm and hand at a
+pose. The program reads position and velocity every Ts. Its force f = -(K n.p + B n.v) acts after
+`delay` and is held for one Ts (zero-order hold). Between samples the motion is linear, so the loop
+is a matrix: exact for small motions about the pose. The model has no friction, no torque limits and
+no wall surface.
 """
 
 from __future__ import annotations
@@ -20,24 +21,24 @@ from ..model.arm import inverse_kinematics, jacobian, mobility
 from ..scene.scenario import Scenario
 from . import linear_loop, roots
 
-STIFFEST = 1e9  # [N/m] above which no limit is sought
-SCANNED = 240  # values of K, even on a logarithm, between which a limit is sought
-SOFTEST = 1e-3  # [N/m] the least of them
-AT_ONCE = 40  # of them at a time
-AT_REST = 1e-6  # modes so near to z = 1 only move the handle, which nothing may pull back
+STIFFEST = 1e9  # [N/m] end of the search for a limit
+SCANNED = 240  # values of K in the search, spaced evenly in log K
+SOFTEST = 1e-3  # [N/m] start of the search
+AT_ONCE = 40  # values of K evaluated at a time
+AT_REST = 1e-6  # modes this near to z = 1 are rigid motion of the handle, which may have no spring
 ROUNDING = 1e-12  # of an eigenvalue
 LONGEST_QUEUE = 500  # samples of delay
 
 
 @dataclass(frozen=True)
 class Handle:
-    """Arm and hand at a pose, as the wall's force meets them.
+    """Arm and hand at a pose, as seen by the force of the wall.
 
     Attributes:
-        inertia: of arm and hand at the handle [kg], shape (2, 2).
-        damping: of the hand [N.s/m], shape (2,).
-        stiffness: of the hand [N/m], shape (2,).
-        normal: direction of the wall, of length 1, shape (2,).
+        inertia: inertia of arm and hand at the handle [kg], shape (2, 2).
+        damping: damping of the hand [N.s/m], shape (2,).
+        stiffness: stiffness of the hand [N/m], shape (2,).
+        normal: unit normal of the wall, shape (2,).
     """
 
     inertia: np.ndarray
@@ -55,9 +56,9 @@ class Handle:
         """The handle of a scenario's arm and operator.
 
         Args:
-            scenario: has arm, origin and operator; compensator and servo do not act.
-            place: of the handle, p [m].
-            normal: direction of the wall, of any length above 0.
+            scenario: source of arm, origin and operator; compensator and servo are ignored.
+            place: position of the handle, p [m].
+            normal: normal of the wall, any length above 0.
 
         Raises:
             ParameterError: the place is out of reach, or the normal has no direction.
@@ -82,13 +83,13 @@ class Handle:
 
 
 def client_map(handle: Handle, K: float, B: float, Ts: float, delay: float) -> np.ndarray:
-    """The loop over a sample, x(k+1) = A x(k): place, velocity, then forces on their way.
+    """State matrix of the sampled loop, x(k+1) = A x(k): position, velocity, then delayed forces.
 
     Args:
         handle: arm and hand.
         K: stiffness of the wall [N/m].
         B: damping of the wall [N.s/m].
-        Ts: between two readings of the program [s].
+        Ts: sampling period of the program [s].
         delay: from a reading to the force computed from it [s].
 
     Returns:
@@ -115,7 +116,7 @@ def client_map(handle: Handle, K: float, B: float, Ts: float, delay: float) -> n
 
 
 def _held(handle: Handle, t: float) -> tuple[np.ndarray, np.ndarray]:
-    """Change of place and velocity over a time, and by a force along the normal held for it."""
+    """Transition of position and velocity over a time, and the response to a held normal force."""
     from scipy.linalg import expm
 
     inverse = np.linalg.inv(handle.inertia)
@@ -129,20 +130,20 @@ def _held(handle: Handle, t: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def holds(handle: Handle, K: float, B: float, Ts: float, delay: float) -> bool:
-    """Whether the loop is stable: every oscillating or diverging mode is within the unit circle.
+    """Whether the loop is stable: all modes but rigid motion lie within the unit circle.
 
     Args:
         handle: arm and hand.
         K: stiffness of the wall [N/m].
         B: damping of the wall [N.s/m].
-        Ts: between two readings of the program [s].
+        Ts: sampling period of the program [s].
         delay: from a reading to the force computed from it [s].
     """
     return bool(_stable(client_map(handle, K, B, Ts, delay)))
 
 
 def _stable(maps: np.ndarray) -> np.ndarray:
-    """Whether each map is stable, shape (...) of maps (..., n, n)."""
+    """Whether each map is stable: maps (..., n, n), result (...)."""
     z = np.linalg.eigvals(maps)
     size = np.where(np.abs(z - 1.0) > AT_REST, np.abs(z), 0.0)
     return size.max(axis=-1) < 1.0 + ROUNDING
@@ -150,16 +151,16 @@ def _stable(maps: np.ndarray) -> np.ndarray:
 
 @checked
 def rendered_stiffness_limit(handle: Handle, B: float, Ts: float, delay: float = 0.0) -> float:
-    """Stiffness up to which a wall that a program renders is stable [N/m].
+    """Largest stable stiffness of a wall rendered by a program [N/m].
 
     Args:
         handle: arm and hand.
         B: damping of the wall [N.s/m], -1e6 to 1e6.
-        Ts: between two readings of the program [s], 1e-6 to 1.
+        Ts: sampling period of the program [s], 1e-6 to 1.
         delay: from a reading to the force computed from it [s], 0 to 10.
 
     Returns:
-        The limit; 0 if no wall is stable, inf if all are that were tried (1e-3 to 1e9 N/m).
+        The limit; 0 if no wall is stable, inf if every tested wall is stable (1e-3 to 1e9 N/m).
 
     Raises:
         ParameterError: a number is out of its bounds, or the delay is of more than 500 samples.
@@ -172,12 +173,12 @@ def rendered_stiffness_limit(handle: Handle, B: float, Ts: float, delay: float =
 def rendered_stiffness_limits(
     handle: Handle, B: Sequence[float], Ts: float, delay: float = 0.0
 ) -> tuple[float, ...]:
-    """The same for several dampings of the wall: the Z-width of a program's loop.
+    """Largest stable stiffness for several dampings of the wall: the Z-width of a program's loop.
 
     Args:
         handle: arm and hand.
         B: dampings of the wall [N.s/m], -1e6 to 1e6 each.
-        Ts: between two readings of the program [s], 1e-6 to 1.
+        Ts: sampling period of the program [s], 1e-6 to 1.
         delay: from a reading to the force computed from it [s], 0 to 10.
 
     Returns:
@@ -195,7 +196,7 @@ def rendered_stiffness_limits(
 
 
 def _limit(soft: np.ndarray, by_K: np.ndarray) -> float:
-    """The least K at which soft + K by_K is unstable [N/m]; inf for none that was tried."""
+    """Least K at which soft + K by_K is unstable [N/m]; inf if no tested K is unstable."""
 
     def stable(K: float) -> bool:
         return bool(_stable(soft + K * by_K))
@@ -212,17 +213,17 @@ def _limit(soft: np.ndarray, by_K: np.ndarray) -> float:
 
 @checked
 def slowest_period(handle: Handle, K: float, B: float, late: float, Ts: float) -> float:
-    """Longest Ts at which a program may render a wall, no longer than a given one [s].
+    """Longest Ts, up to a given one, at which a wall rendered by a program is stable [s].
 
     Args:
         handle: arm and hand.
         K: stiffness of the wall [N/m].
         B: damping of the wall [N.s/m].
         late: delay in samples, the same at every Ts.
-        Ts: that to begin with [s].
+        Ts: longest Ts to test, the start of the search [s].
 
     Returns:
-        The period; 0 if none down to a thousandth of Ts is short enough.
+        The period; 0 if the loop is unstable down to a thousandth of Ts.
     """
     grid = np.geomspace(Ts, 1e-3 * Ts, 200).tolist()
 

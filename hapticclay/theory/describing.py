@@ -1,10 +1,10 @@
 """Clay that yields in the linear loop: describing functions, limit cycles and thresholds.
 
-To a sinusoidal velocity of amplitude V clay with a `Flow` is, at that frequency, a damper N(V).
-The loop oscillates evenly where N(V) is a damping b at which its poles lie on the imaginary axis.
-Neglected are the harmonics of the clay's force that come back through the loop (Gelb, Vander Velde,
-Multiple-Input Describing Functions and Nonlinear System Design, 1968). Here their first effect is
-worked out, and tells where the prediction ends.
+For a sinusoidal velocity of amplitude V, clay with a `Flow` acts as a damper N(V) at that
+frequency. The loop sustains an oscillation where N(V) equals a damping b at which its poles lie on
+the imaginary axis. The method neglects the harmonics of the clay's force that return through the
+loop (Gelb, Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design, 1968).
+Their first-order effect is computed here and limits the range of the prediction.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from ..model.flow import Flow
 from . import linear_loop, roots
 from .loops import Loop, of_loop
 
-EXTREME = 300.0  # no amplitude is sought beyond exp(+-300) m/s
-HARMONICS = 199  # the last one that counts: their effect falls as its square
+EXTREME = 300.0  # the search for amplitudes ends at exp(+-300) m/s
+HARMONICS = 199  # highest harmonic included: the effect falls as its square
 # A prediction is trusted to 10 % in amplitude and 5 % in frequency while the harmonics move them by
 # less than this, to first order; the rest is for higher orders.
 AMPLITUDE_TRUST = 0.08
@@ -35,10 +35,10 @@ PushOutcome = Literal["sticks", "comes to rest", "limit cycle", "grows"]
 
 @checked
 def describing_function(flow: Flow, V: Any) -> Any:
-    """The damper that clay is to a sinusoidal velocity: N(V) = b + 4 Fy/(pi V) + K c(n) V^(n-1).
+    """Equivalent damper of clay for a sinusoidal velocity, b + 4 Fy/(pi V) + K c(n) V^(n-1).
 
-    The fundamental of the clay's force over that of the velocity, with c(n) = (2/sqrt(pi))
-    Gamma(n/2 + 1)/Gamma((n + 3)/2). It is real: clay stores nothing.
+    N(V) is the fundamental of the clay's force over that of the velocity, with c(n) = (2/sqrt(pi))
+    Gamma(n/2 + 1)/Gamma((n + 3)/2). It is real because clay stores no energy.
 
     Args:
         flow: the law of the clay.
@@ -64,28 +64,28 @@ def _flow_terms(flow: Flow, V: Any) -> list[tuple[Any, float]]:
 
 
 def amplitudes(flow: Flow, N: float) -> tuple[float, ...]:
-    """Every amplitude of velocity at which clay is a damper N: the solutions of N(V) = N.
+    """Velocity amplitudes at which clay acts as a damper N: the solutions of N(V) = N.
 
-    Up to n = 1 N(V) falls, so there is one at most. Above, N(V) falls to a least value and rises
-    again, so there are two, or one without a yield force.
+    For n <= 1, N(V) falls, so there is at most one solution. For n > 1, N(V) falls to a minimum and
+    rises again, so there are up to two, or one without a yield force.
 
     Args:
         flow: the law of the clay.
         N: damping [N.s/m].
 
     Returns:
-        V [m/s], ascending; none for a damper, which has one N for every V.
+        V [m/s], ascending; empty for a damper, whose N does not depend on V.
     """
     from scipy.optimize import brentq
 
     n, rest = flow.n, N - flow.b - (flow.K if flow.n == 1.0 else 0.0)
     if rest <= 0.0:
         return ()
-    yields = 4.0 * flow.Fy / (math.pi * rest)  # where the yield force alone makes up the rest
+    yields = 4.0 * flow.Fy / (math.pi * rest)  # V at which the yield force alone gives N - b
     if n == 1.0 or not flow.K:
         return (yields,) if yields else ()
     (_, (k, _)) = _flow_terms(flow, 1.0)
-    flows = math.log(rest / k) / (n - 1.0)  # logarithm of where the consistency alone does
+    flows = math.log(rest / k) / (n - 1.0)  # log V at which the consistency alone gives N - b
     if not flow.Fy:
         return (math.exp(flows),) if abs(flows) < EXTREME else ()
 
@@ -94,7 +94,7 @@ def amplitudes(flow: Flow, N: float) -> tuple[float, ...]:
     def excess(x: float) -> float:  # log of (N(V) - b)/(N - b) at V = exp(x)
         return float(np.logaddexp(low - x, (n - 1.0) * (x - flows)))
 
-    if n < 1.0:  # both terms fall: from where either is enough to where each is at most a half
+    if n < 1.0:  # both terms fall: from where one suffices to where each is at most a half
         half = math.log(2.0)
         spans = [(max(low, flows), max(low + half, flows + half / (1.0 - n)))]
     else:
@@ -117,7 +117,7 @@ class DampingCrossing:
 
     Attributes:
         b: the damping [N.s/m].
-        omega: where they lie [rad/s]; 0 or inf for a single pole.
+        omega: frequency of these poles [rad/s]; 0 or inf for a single pole.
         below: number of unstable poles just below b.
         above: number of unstable poles just above b.
     """
@@ -142,7 +142,7 @@ def damping_crossings(loop: Loop) -> tuple[DampingCrossing, ...]:
     """Every damping of the clay at which the linear loop gains or loses a stable pole.
 
     Args:
-        loop: the loop with its K, in continuous time without delay, whose own b does not matter.
+        loop: the loop with its K, in continuous time without delay; its b is ignored.
 
     Returns:
         The crossings, b ascending.
@@ -162,11 +162,10 @@ def damping_crossings(loop: Loop) -> tuple[DampingCrossing, ...]:
 def unstable_dampings(loop: Loop) -> tuple[tuple[float, float], ...]:
     """Bands of the clay's damping b in which the linear loop is unstable.
 
-    Exact: from roots of polynomials.
+    The bands are exact: they follow from roots of polynomials.
 
     Args:
-        loop: the loop with its K, whose own b does not matter; or axis, K, operator, and other
-            parts by name.
+        loop: the loop with its K, its b ignored; or axis, K, operator, and other parts by name.
 
     Returns:
         (low, high) of each band [N.s/m], ascending; high may be inf.
@@ -189,18 +188,18 @@ def unstable_dampings(loop: Loop) -> tuple[tuple[float, float], ...]:
 @named
 @dataclass(frozen=True)
 class LimitCycle:
-    """An oscillation that the clay neither lets grow nor lets decay, as predicted.
+    """A predicted oscillation of constant amplitude in clay.
 
     Attributes:
         speed: V, amplitude of the velocity [m/s].
         omega: frequency [rad/s].
         damping: N(V), the clay's damping at that amplitude [N.s/m].
-        kind: "limit cycle" if motions around it tend to it, "threshold" if smaller ones decay and
-            larger ones grow, "unstable" if nothing tells, because the loop has further unstable
-            poles.
+        kind: "limit cycle" if nearby motions converge to it, "threshold" if smaller motions decay
+            and larger ones grow, "unstable" if the loop has further unstable poles, so that neither
+            can be concluded.
         third: third harmonic of the velocity over the fundamental.
         speed_shift: share of V by which the harmonics move the true amplitude, to first order.
-        omega_shift: the same of omega.
+        omega_shift: the same for omega.
     """
 
     speed: float
@@ -213,12 +212,12 @@ class LimitCycle:
 
     @property
     def amplitude(self) -> float:
-        """Of the position [m]."""
+        """Amplitude of the position [m]."""
         return self.speed / self.omega
 
     @property
     def frequency(self) -> float:
-        """In Hz."""
+        """Frequency in Hz."""
         return self.omega / (2.0 * math.pi)
 
     @property
@@ -231,12 +230,13 @@ class LimitCycle:
 def limit_cycles(loop: Loop, *, flow: Flow) -> tuple[LimitCycle, ...]:
     """Limit cycles and thresholds of the loop in clay that yields, by the describing function.
 
-    Each damping b* at which the linear loop has poles at j omega gives those with N(V) = b*. They
-    are around rest: a handle that a force moves on steadily meets b alone, once it slides.
+    Each damping b* at which the linear loop has poles at j omega gives the cycles with N(V) = b*.
+    The cycles are around rest: once a steady force makes the handle slide, only b acts on the
+    motion.
 
     Args:
-        loop: the loop with its K, whose own b does not matter; or axis, flow, K, operator, and
-            other parts by name; or a Scenario and an axis.
+        loop: the loop with its K, its b ignored; or axis, flow, K, operator, and other parts by
+            name; or a Scenario and an axis.
         flow: the law of the clay.
 
     Returns:
@@ -263,11 +263,11 @@ def limit_cycles(loop: Loop, *, flow: Flow) -> tuple[LimitCycle, ...]:
 
 @of_loop("flow", "K", "operator")
 def push_outcomes(loop: Loop, *, flow: Flow) -> tuple[PushOutcome, PushOutcome]:
-    """What becomes of a small push and of a large one, by the describing function.
+    """Outcome of a small and of a large push, by the describing function.
 
     Args:
-        loop: the loop with its K, whose own b does not matter; or axis, flow, K, operator, and
-            other parts by name; or a Scenario and an axis.
+        loop: the loop with its K, its b ignored; or axis, flow, K, operator, and other parts by
+            name; or a Scenario and an axis.
         flow: the law of the clay.
 
     Returns:
@@ -288,20 +288,20 @@ def push_outcomes(loop: Loop, *, flow: Flow) -> tuple[PushOutcome, PushOutcome]:
 
 
 def is_flow(flow: Flow) -> None:
-    """Refuses what is no Flow.
+    """Refuses anything but a Flow.
 
     Args:
         flow: the law of the clay.
 
     Raises:
-        ParameterError: it is something else.
+        ParameterError: it is not a Flow.
     """
     if not isinstance(flow, Flow):
         raise ParameterError("flow", flow, "must be a Flow")
 
 
 def without_spring(loop: Loop) -> None:
-    """Refuses a loop in clay that springs back, where clay that yields would rest elsewhere.
+    """Refuses a loop in elastic clay, where yielding clay would come to rest elsewhere.
 
     Args:
         loop: the loop.
@@ -314,7 +314,7 @@ def without_spring(loop: Loop) -> None:
 
 
 def _counts(loop: Loop, flow: Flow, speeds: list[float]) -> list[int]:
-    """Unstable poles of the linear loop with N(V) below the first of some V, between, and above."""
+    """Number of unstable poles of the linear loop with N(V): below, between and above some V."""
     V = [0.5 * speeds[0], *speeds, 2.0 * speeds[-1]] if speeds else [1.0, 1.0]
     middles = [math.sqrt(x * y) for x, y in zip(V[:-1], V[1:], strict=True)]
     return [_unstable_poles(loop, describing_function(flow, x)) for x in middles]
@@ -332,10 +332,9 @@ def _harmonics(
     """Third harmonic of the velocity over V, and the shares by which harmonics move V and omega.
 
     The harmonic k of a term K|v|^n of the force is a_k times its fundamental, with a_1 = 1 and
-    a_(k+2) = a_k (k - n)/(k + 2 + n). The harmonics of all terms come back as velocities
-    V Im(r_k exp(k j omega t)). Each changes the fundamental of a term, N_n V, so N by
-    N_n a_k (n Re r_k + k j Im r_k). The balance A + N B = 0, linear in the changes of omega and V,
-    gives both.
+    a_(k+2) = a_k (k - n)/(k + 2 + n). The harmonics of all terms return as velocities V Im(r_k
+    exp(k j omega t)). Each changes the fundamental of a term, N_n V, and so changes N by N_n a_k (n
+    Re r_k + k j Im r_k). The balance A + N B = 0, linear in the changes of omega and V, gives both.
     """
     s, terms = 1j * at.omega, _flow_terms(flow, V)
     k = np.arange(3, HARMONICS + 1, 2)

@@ -17,8 +17,8 @@ from . import gain_limits, stability_margins
 from .loops import TIMING, Loop, of_loop
 from .roots import first_failure
 
-K_MAX = 1e6  # as in a Scenario: a margin that holds there holds for any gain
-DESIGN_BAND = (0.3, 30.0)  # [rad/s]: where a hand moves on purpose, up to about 5 Hz
+K_MAX = 1e6  # bound of Scenario.gain: a margin that holds here counts as holding for any gain
+DESIGN_BAND = (0.3, 30.0)  # [rad/s]: voluntary motion of a hand, up to about 5 Hz
 
 
 @of_loop("b", "operator", timing=True)
@@ -31,20 +31,20 @@ def design_gain(
     delay_margin: float = 0.0,
     at: str = "compensator",
 ) -> float:
-    """Largest K that keeps every requested margin, as does every lower K.
+    """Largest K for which it and every lower K keep all requested margins.
 
     Args:
-        loop: the loop, whose own K does not matter; or axis, b, operator, and other parts by name.
-            With sampling or delay only gain_margin may be requested.
+        loop: the loop, its K ignored; or axis, b, operator, and other parts by name. With sampling
+            or delay only gain_margin may be requested.
         gain_margin: least factor to which the gain may rise, >= 1.
         phase_margin: least phase margin [rad], 0 to pi.
         disk_margin: least alpha, 0 to 2 (see `Margins`).
-        delay_margin: least delay margin [s]. A lead of C without it may have no largest K, because
-            nothing else in the continuous loop is late.
-        at: where the loop is broken for the margins (see `open_loop`).
+        delay_margin: least delay margin [s]. Without this margin a lead compensator may have no
+            largest K, because nothing else in the continuous loop is delayed.
+        at: where the loop is opened for the margins (see `open_loop`).
 
     Returns:
-        K; inf if every gain keeps them, 0 if none does.
+        K; inf if every gain keeps the margins, 0 if no gain does.
 
     Raises:
         ParameterError: a value is out of its bounds.
@@ -81,11 +81,11 @@ class Design(Result):
     """A compensator tuned to a margin; shape and gain are `Scenario.compensator` and `gain`.
 
     Attributes:
-        compensator: its shape.
-        K: its gain.
+        compensator: shape of C.
+        K: gain of the compensator.
         error: rms of |1 - fe/fh| over the band, in log frequency; 0 if the hand feels only the
             clay.
-        margins: the margins that it has.
+        margins: stability margins of the loop.
     """
 
     drawn_by = "hapticclay.views.result_plots:design_plot"
@@ -118,11 +118,10 @@ class Design(Result):
 
 @of_loop("K", "b")
 def transparency_error(loop: Loop, *, band: tuple[float, float] = DESIGN_BAND) -> float:
-    """Rms of |1 - fe/fh| (Eq. 7) over a band, evenly in log frequency (Simpson's rule, 401 points).
+    """Rms of |1 - fe/fh| (Eq. 7) over a band, in log frequency (Simpson's rule, 401 points).
 
     Args:
-        loop: the loop with its K, whose hand does not matter; or axis, K, b, and other parts by
-            name.
+        loop: the loop with its K, its hand ignored; or axis, K, b, and other parts by name.
         band: lowest and highest frequency [rad/s].
     """
     from scipy.integrate import simpson
@@ -144,14 +143,15 @@ def compare(
 ) -> list[Design]:
     """Compensators at equal margin, the most transparent first.
 
-    The error is that of continuous time; with sampling or delay only gain_margin can be requested.
+    The error is computed in continuous time. With sampling or delay only gain_margin can be
+    requested.
 
     Args:
-        loop: the loop, whose own compensator and K do not matter; or axis, b, compensators,
-            operator, and other parts by name.
-        compensators: shapes to compare, anything that `Compensator.of` takes.
-        band: of the error [rad/s].
-        at: where the loop is broken for the margins (see `open_loop`).
+        loop: the loop, its compensator and K ignored; or axis, b, compensators, operator, and other
+            parts by name.
+        compensators: shapes to compare, anything that `Compensator.of` accepts.
+        band: band of the error [rad/s].
+        at: where the loop is opened for the margins (see `open_loop`).
         **margin: margins, as in `design_gain`.
 
     Raises:

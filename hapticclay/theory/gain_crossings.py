@@ -1,13 +1,12 @@
-"""The largest stable gain: in continuous time, with late motors, and in the sampled loop.
+"""The largest stable gain: in continuous time, with delayed motors, and in the sampled loop.
 
-However the loop is built, K multiplies one signal in it, so a pole lies at s on the border of
-stability where
+In every loop K multiplies one signal, so a pole lies at s on the border of stability where
 
     1 = K h(s),        s = j omega, or z = exp(j omega Ts) in the sampled loop.
 
 The gains at which a pole can cross are therefore 1/h at the frequencies where h is real and
-positive. Between two of them no pole crosses, so one test in each interval tells where the loop is
-stable.
+positive. Between two of them no pole crosses, so one test per interval decides whether the loop is
+stable there.
 """
 
 from __future__ import annotations
@@ -26,15 +25,15 @@ from .linear_loop import LinearLoop
 
 PHASE_STEP = 1.01  # the frequency grid grows by this factor ...
 NEAR_AXIS = 10.0 ** np.arange(-9.0, 0.0, 0.25)  # ... and closes in on every resonance
-LEAST_GAIN = 1e-60  # nothing crosses at a lower gain, and products of such numbers vanish
-SMALL_ANGLE = 1e-6  # an eigenvalue below this share of the largest is better known from the inverse
+LEAST_GAIN = 1e-60  # no pole crosses at a lower gain, and products of such numbers underflow
+SMALL_ANGLE = 1e-6  # eigenvalues below this share of the largest are computed from the inverse
 
 
 def critical_gain(loop: LinearLoop) -> tuple[float, float]:
-    """The gain limit and the frequency at which the loop then rings.
+    """The gain limit and the frequency of oscillation at that gain.
 
     Args:
-        loop: the loop, whose own K does not matter.
+        loop: the loop, its K ignored.
 
     Returns:
         (K, omega [rad/s]).
@@ -46,7 +45,7 @@ def critical_gain(loop: LinearLoop) -> tuple[float, float]:
 
 
 def is_stable(loop: LinearLoop) -> bool:
-    """Whether the loop is stable at this very K, whatever it is below.
+    """Whether the loop is stable at its K, whether or not it is stable at lower K.
 
     Args:
         loop: the loop with its K > 0.
@@ -60,16 +59,16 @@ def is_stable(loop: LinearLoop) -> bool:
 
 
 def loop_family(loop: LinearLoop) -> LoopFamily:
-    """The sampled or late loop for every gain.
+    """The sampled or delayed loop for every gain.
 
     Args:
-        loop: the loop, sampled or late, whose own K does not matter.
+        loop: the loop, sampled or delayed, its K ignored.
     """
     return delayed_loop(loop) if loop.Ts is None else sampled_loop(loop)
 
 
 def no_poles() -> int:
-    """Number of poles right of the axis, of an h without any."""
+    """Number of right-half-plane poles of an h that has none: 0."""
     return 0
 
 
@@ -83,7 +82,8 @@ class LoopFamily:
         grid: frequencies dense enough to follow h [rad/s], ascending.
         stable: whether the loop is stable at K.
         ends: further frequencies at which a pole may cross, where h is real by symmetry [rad/s].
-        most: gain from which on poles lie right of the axis at any frequency; inf for none.
+        most: gain from which poles of arbitrarily high frequency lie right of the axis; inf for
+            none.
         order: multiplicity of the pole of h at 0, or at z = 1.
         right: number of poles of h right of the axis, or outside the unit circle.
     """
@@ -104,7 +104,7 @@ def first_instability(loop: LoopFamily) -> tuple[float, float]:
         loop: the loop for every gain.
 
     Returns:
-        (K, omega [rad/s]); (inf, nan) if it never does.
+        (K, omega [rad/s]); (inf, nan) if it is always stable.
     """
     found = gain_crossings(loop)
     found = sorted(found + [(loop.most, math.inf)] if loop.most < math.inf else found)
@@ -120,8 +120,8 @@ def first_instability(loop: LoopFamily) -> tuple[float, float]:
 def gain_crossings(loop: LoopFamily) -> list[tuple[float, float]]:
     """Every (K, omega) with 1 = K h(omega), K > 0.
 
-    A pair of crossings closer than the grid shows as a dip of Im h that keeps its sign; every dip
-    is followed to its bottom.
+    Two crossings closer than the grid appear as a dip of Im h without a change of sign, so the
+    search also minimises every dip.
 
     Args:
         loop: the loop for every gain.
@@ -132,7 +132,7 @@ def gain_crossings(loop: LoopFamily) -> list[tuple[float, float]]:
         return z.imag / abs(z)
 
     z = loop.h(loop.grid)
-    if not np.any(z):  # nothing drives the compensator
+    if not np.any(z):  # the compensator has no input
         return []
     omega = _zeros(phase_sine, np.log(loop.grid), z.imag / np.abs(z), z.real > 0.0)
     omega += loop.ends
@@ -161,10 +161,10 @@ def unit_crossings(loop: LoopFamily, K: float) -> list[float]:
 def _zeros(
     f: Callable[[float], float], x: np.ndarray, y: np.ndarray, where: np.ndarray
 ) -> list[float]:
-    """exp of the zeros of f between points x, where it is y, next to one at which where holds."""
+    """exp of the zeros of f between points x, with y = f(x), next to a point of the mask."""
     from scipy.optimize import brentq, minimize_scalar
 
-    y[y == 0.0] = 1e-300  # a grid point on a crossing: found from one side
+    y[y == 0.0] = 1e-300  # a grid point on a crossing is found from one side
     spans = [
         (x[i], x[i + 1]) for i in np.flatnonzero((y[:-1] * y[1:] < 0.0) & (where[:-1] | where[1:]))
     ]
@@ -179,7 +179,7 @@ def _zeros(
 
     def zero(a: float, c: float) -> float:
         fa, fc = f(a), f(c)
-        if fa * fc > 0.0:  # one of them is a zero but for the rounding of an array beside a number
+        if fa * fc > 0.0:  # one is a zero up to rounding: arrays and scalars round differently
             return a if abs(fa) < abs(fc) else c
         return brentq(f, a, c, xtol=1e-15, rtol=1e-14)  # type: ignore[return-value]
 
@@ -187,12 +187,12 @@ def _zeros(
 
 
 def frequency_grid(low: float, high: float, resonances: np.ndarray) -> np.ndarray:
-    """Frequencies dense in ratio, and denser around resonances.
+    """Logarithmic frequency grid, refined around resonances.
 
     Args:
         low: lowest [rad/s].
         high: highest [rad/s].
-        resonances: shape (n,), real or complex; their magnitudes count [rad/s].
+        resonances: real or complex, used by magnitude [rad/s], shape (n,).
     """
     base = np.geomspace(low, high, 2 + int(math.log(high / low) / math.log(PHASE_STEP)))
     near = np.multiply.outer(
@@ -202,15 +202,15 @@ def frequency_grid(low: float, high: float, resonances: np.ndarray) -> np.ndarra
 
 
 def delayed_loop(loop: LinearLoop) -> LoopFamily:
-    """The continuous loop in which everything the motors do is late.
+    """The continuous loop in which every action of the motors is delayed.
 
-    Where Th has a mass, and a force passes straight through C (numerator and denominator of one
-    order) or is used to shape the inertia, an acceleration comes back late with the same gain at
-    any high frequency. That gain must stay below one (a neutral delay system: Hale, Verduyn Lunel,
+    Suppose Th has a mass, and C has direct feedthrough (numerator and denominator of equal order)
+    or the force shapes the inertia. Then acceleration is fed back with delay and with constant gain
+    at high frequency. That gain must stay below one (a neutral delay system: Hale, Verduyn Lunel,
     Introduction to Functional Differential Equations, 1993, ch. 9).
 
     Args:
-        loop: the loop, in continuous time, whose own K does not matter.
+        loop: the loop, in continuous time, its K ignored.
     """
     parts, delay = linear_loop.delayed_polynomials(loop), loop.delay
     while all(p.coef[0] == 0.0 for p in parts):  # the integrator that moves the handle
@@ -260,7 +260,7 @@ def delayed_loop(loop: LinearLoop) -> LoopFamily:
         return K < most and bool(abs(right(K)) < 0.5)
 
     low, top = 1e-3 * size.min(), max(40.0 / delay, 2.0 * np.abs(resonances.imag).max())
-    top = max(top, 10.0 * size.max()) if neutral else top  # where |h| has nearly come to rest
+    top = max(top, 10.0 * size.max()) if neutral else top  # where |h| is nearly constant
     turns = np.linspace(low, top, min(int(4.0 * delay * top), 100_000))
     grid = np.union1d(turns, frequency_grid(low, top, resonances))
     rest = physical.coef[0] + motors.coef[0]
@@ -276,7 +276,7 @@ def phase_change(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> float:
         x: ascending, shape (n,).
 
     Returns:
-        NaN if that takes over a million points: a delay of so many turns that no loop survives it.
+        NaN if that needs over a million points: so long a delay makes any loop unstable.
     """
     z = f(x)
     while len(x) < 1_000_000:
@@ -293,13 +293,14 @@ def sampled_loop(loop: LinearLoop) -> LoopFamily:
     """The sampled loop (`control="sampled"`) as x(k+1) = (M + K beta gamma) x(k), exact at samples.
 
     See `linear_loop.sampled_differences`. A loop is stable if every eigenvalue lies within the unit
-    circle, except one at z = 1 that moves the handle where C integrates and Th has no spring. Clay
-    of 1e9 N.s/m, or K = 1e-12, puts others within rounding of z = 1, so the map is of differences,
-    M - 1, with everything counted from where it would rest, or move evenly, under the present
-    states of C's integrators: their columns are then zero but for their own chain.
+    circle. The exception is one at z = 1, the free motion of the handle where C integrates and Th
+    has no spring. Clay of 1e9 N.s/m, or K = 1e-12, puts other eigenvalues within rounding of z = 1.
+    The map is therefore one of differences, M - 1. Its states are relative to the rest, or steady
+    motion, that the present states of C's integrators would give. The integrators' columns are then
+    zero except for their own chain.
 
     Args:
-        loop: the loop, sampled, whose own K does not matter.
+        loop: the loop, sampled, its K ignored.
     """
     less, beta, gamma, free, integrators, unseen = _acting_map(loop)
     t, Ts, n = loop.environment, loop.Ts, len(less)
@@ -339,16 +340,17 @@ def _within_circle(less: np.ndarray, beta: np.ndarray, gamma: np.ndarray, K: flo
 def _acting_map(
     loop: LinearLoop,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int, int]:
-    """The sampled loop without the states that nothing of the force tells of.
+    """The sampled loop without the states that do not affect the force.
 
     Returns:
-        M - 1, beta and gamma; M - 1 without C's integrators; their number; that of those left out.
+        M - 1, beta and gamma; M - 1 without C's integrators; number of these; number of omitted
+        states.
     """
     loop = replace(loop, compensator=linear_loop.reduced(loop.compensator))
     less, beta, gamma = linear_loop.sampled_differences(loop)
     less, beta, gamma = _from_rest(loop, less, beta[:, 0], gamma[0])
     t, integrators = loop.environment, _integrators(loop.compensator)
-    # Nothing of the force tells of a state that only moves the place, or the speed, of the handle.
+    # A state that only offsets position or speed of the handle does not affect the force.
     unseen = min(integrators, roots.multiplicity_of_zero(t)) if np.any(t.coef) else integrators
     kept = np.delete(np.arange(len(less)), np.arange(2, 2 + unseen))
     free = np.delete(np.arange(len(less)), np.arange(2, 2 + integrators))
@@ -363,11 +365,11 @@ def _integrators(compensator: Compensator) -> int:
 def _from_rest(
     loop: LinearLoop, less: np.ndarray, beta: np.ndarray, gamma: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The map with the other states counted from where they rest under C's integrators.
+    """The map with the other states relative to their equilibrium under C's integrators.
 
-    The first m states of a compensator with m integrators are a chain of them, which nothing of
-    the others' own motion reads. Under the first alone the loop rests; under the second it moves
-    evenly, and so on.
+    The first m states of a compensator with m integrators are a chain of integrators, independent
+    of the motion of the other states. Under the first alone the loop is at rest; under the second
+    it moves at constant speed, and so on.
     """
     m, n = _integrators(loop.compensator), loop.compensator.order
     if not m:
@@ -393,7 +395,7 @@ def _from_rest(
 
 
 def eigenvalues(a: np.ndarray) -> np.ndarray:
-    """Eigenvalues, the small ones as exact as the large: from the inverse, where they are large.
+    """Eigenvalues, small ones as accurate as large ones: the small are computed from the inverse.
 
     Args:
         a: matrix, shape (n, n).

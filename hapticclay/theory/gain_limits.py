@@ -22,10 +22,10 @@ def gain_limit(loop: Loop) -> float:
 
     Every gain between 0 and the limit is stable. In continuous time without delay the limit is the
     first crossing of the closed-loop polynomial (Eq. 8); otherwise see `sampled_loop` (sampled) and
-    `delayed_loop` (continuous, the motors late).
+    `delayed_loop` (continuous, with delayed motors).
 
     Args:
-        loop: the loop, whose own K does not matter; or axis, b, operator, and other parts by name.
+        loop: the loop, its K ignored; or axis, b, operator, and other parts by name.
 
     Returns:
         K; inf if there is no limit, 0 if the loop is unstable at any small gain.
@@ -40,13 +40,13 @@ def gain_limit(loop: Loop) -> float:
 def stiffness_limit(loop: Loop) -> float:
     """Largest stiffness k of the clay up to which the loop of one axis is stable [N/m].
 
-    In continuous time without delay it is the first crossing of the closed-loop polynomial, which
-    is linear in k: exact. Otherwise k rises over 20 values a decade, from 1e-3 N/m, until the loop
-    is unstable, and the limit is bisected: a window of k narrower than that may be missed.
+    In continuous time without delay the limit is exact: the first crossing of the closed-loop
+    polynomial, which is linear in k. Otherwise k rises from 1e-3 N/m in 20 values per decade until
+    the loop is unstable, and bisection refines the limit. A narrower window of k may be missed.
 
     Args:
-        loop: the loop with its K > 0, whose own k does not matter; or axis, K, b, operator, and
-            other parts by name.
+        loop: the loop with its K > 0, its k ignored; or axis, K, b, operator, and other parts by
+            name.
 
     Returns:
         k; inf if there is no limit up to 1e9 N/m, 0 if the loop is unstable at any small k.
@@ -61,7 +61,7 @@ def stiffness_limit(loop: Loop) -> float:
 
 
 def continuous_limit(scenario: Scenario, axis: str, b: float) -> float:
-    """Gain limit of the loop of a scenario as if its control were continuous and without delay.
+    """Gain limit of the loop of a scenario for continuous control without delay.
 
     Args:
         scenario: the run.
@@ -69,7 +69,7 @@ def continuous_limit(scenario: Scenario, axis: str, b: float) -> float:
         b: clay [N.s/m].
 
     Returns:
-        K; inf if there is no limit, or where the controller is the user's own.
+        K; inf if there is no limit, or if the scenario has a user's controller.
     """
     if scenario.controller is not None:
         return math.inf
@@ -77,10 +77,10 @@ def continuous_limit(scenario: Scenario, axis: str, b: float) -> float:
 
 
 def spring_crossover(scenario: Scenario, i: int, k: float) -> float:
-    """Highest frequency at which a spring has a loop gain of 1, beyond which it moves no pole.
+    """Highest frequency at which a spring has a loop gain of 1; above it the spring moves no pole.
 
-    At k |P| = 1, P = (G C + Sh)/(1 + m s^2 (G C + Sh)), the handle with the mass of the hand.
-    Without shaping Sh has the gain trace W, which no pose and no direction exceeds.
+    It solves k |P| = 1 with P = (G C + Sh)/(1 + m s^2 (G C + Sh)), the handle with the mass of the
+    hand. Without shaping the gain of Sh is trace W, an upper bound over poses and directions.
 
     Args:
         scenario: the run, with continuous control.

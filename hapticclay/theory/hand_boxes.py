@@ -1,4 +1,4 @@
-"""The hand of a box that leaves a loop the least margin, and a rigid hand."""
+"""The worst hand of a box, with the least stability margin, and a rigid hand."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from .stability_margins import LINEAR, Verdict
 @named
 @dataclass(frozen=True)
 class Box:
-    """Ranges of Th, and whether a rigid arm is among them.
+    """Ranges of Th, with or without a rigid arm.
 
     Attributes:
         mass: (low, high) [kg].
         damper: (low, high) [N.s/m].
         spring: (low, high) [N/m].
-        rigid: True adds an arm that cannot move, Th = infinity.
+        rigid: True adds a rigid arm, Th = infinity.
     """
 
     mass: tuple[float, float] = (0.25, 0.25)
@@ -57,7 +57,7 @@ class Box:
         flag("box.rigid", self.rigid)
 
     def corners(self) -> list[Operator]:
-        """Return the eight corners, each once."""
+        """Return the up to eight distinct corners."""
         corners = sorted(set(itertools.product(self.mass, self.damper, self.spring)))
         return [Operator(*x) for x in corners]
 
@@ -66,7 +66,7 @@ class Box:
 
         Args:
             n: number of members.
-            seed: of the generator.
+            seed: seed of the generator.
         """
         x = np.random.default_rng(seed).uniform(size=(n, 3))
         low, high = np.array([self.mass, self.damper, self.spring]).T
@@ -81,7 +81,7 @@ class WorstCase:
     Attributes:
         verdict: whether every hand of the box is stable, its margin the worst gain limit over K.
         limit: largest K up to which every hand is stable.
-        hand: one that stops being stable there; None if it is the rigid arm.
+        hand: the hand that becomes unstable at this K; None for the rigid arm.
     """
 
     verdict: Verdict
@@ -92,17 +92,17 @@ class WorstCase:
 def critical_hand(loop: Loop, box: Box) -> tuple[Operator, float] | None:
     """A hand of the box that puts a pole on the imaginary axis.
 
-    Exact (zero exclusion; Barmish, New Tools for Robustness of Linear Systems, 1994). The
-    closed-loop polynomial is A + E Th, so the pole s = j omega needs one value Th = -A/E. The
+    The result is exact (zero exclusion; Barmish, New Tools for Robustness of Linear Systems, 1994).
+    The closed-loop polynomial is A + E Th, so the pole s = j omega needs one value Th = -A/E. The
     values of the box at omega are a rectangle, spring - mass omega^2 by omega damper: -A/E lies in
     it where four polynomials in omega^2 have the right sign.
 
     Args:
-        loop: the loop with its K, in continuous time; its own hand does not matter.
+        loop: the loop with its K, in continuous time; its hand is ignored.
         box: the hands.
 
     Returns:
-        (hand, frequency [rad/s]), or None if no hand of the box does.
+        (hand, frequency [rad/s]), or None if no hand of the box puts a pole there.
     """
     A = linear_loop.characteristic(replace(loop, operator=None))
     E = linear_loop.device_admittance(loop)[0]
@@ -116,7 +116,7 @@ def critical_hand(loop: Loop, box: Box) -> tuple[Operator, float] | None:
     edges = np.unique(np.concatenate([roots.positive_roots(t) for t in tests]))
     sizes = [Polynomial(np.abs(t.coef)) for t in tests]
     for x in np.concatenate((edges, 0.5 * (edges[1:] + edges[:-1]))).tolist():
-        # Where an edge of the box is met, to 1e-9 of the terms that cancel there.
+        # Intersections with an edge of the box, to 1e-9 of the terms that cancel there.
         if all(t(x) >= -1e-9 * size(x) for t, size in zip(tests, sizes, strict=True)):
             return _member(box, float(R(x) / Q(x)), float(X(x) / Q(x)), x)
     return None
@@ -143,14 +143,14 @@ def _member(box: Box, real: float, damper: float, x: float) -> tuple[Operator, f
 
 
 def rigid_limit(loop: Loop) -> tuple[float, float]:
-    """Largest K that is stable with an arm that cannot move, Th to infinity.
+    """Largest stable K with a rigid arm, Th to infinity.
 
-    The closed-loop poles tend to the zeros of G C + Sh, so the limit is that of its numerator,
-    whatever the clay. The paper's remark below Eq. 13, that no compensator serves a rigid arm, is a
+    The closed-loop poles tend to the zeros of G C + Sh, so its numerator sets the limit for any
+    clay. The paper remarks below Eq. 13 that no compensator is stable with a rigid arm. This is a
     property of its sufficient condition, not of the loop.
 
     Args:
-        loop: the loop, in continuous time; clay, hand and K do not matter.
+        loop: the loop, in continuous time; clay, hand and K are ignored.
 
     Returns:
         (K, omega [rad/s]).
@@ -164,15 +164,15 @@ def rigid_limit(loop: Loop) -> tuple[float, float]:
 def worst_case(loop: Loop, box: Box, *, samples: int = 56) -> WorstCase:
     """The lowest gain limit over a box of hands.
 
-    In continuous time without delay it is exact: K rises from zero until `critical_hand` finds one.
-    With sampling or delay it is the least over the corners and random members, and the verdict's
-    method says so.
+    In continuous time without delay the result is exact: the least K at which `critical_hand` finds
+    a hand. With sampling or delay it is the minimum over the corners and random members, and the
+    verdict's method says so.
 
     Args:
-        loop: the loop with its K > 0, whose own hand does not matter; or axis, K, b, box, and other
-            parts by name.
+        loop: the loop with its K > 0, its hand ignored; or axis, K, b, box, and other parts by
+            name.
         box: the hands.
-        samples: random members tried with sampling or delay, 0 to 10000.
+        samples: random members tested with sampling or delay, 0 to 10000.
     """
     K = number("K", loop.gain, 0.0, above=True)
     timed = loop.Ts is not None or loop.delay > 0.0
@@ -210,7 +210,7 @@ def _exact_worst_case(loop: Loop, box: Box) -> tuple[float, float, Operator | No
     # A window narrower than 20 % in K may be missed, but no limit of a corner.
     grid = [*np.geomspace(1e-4 * top, top, 49)[:-1].tolist(), (1.0 + 1e-6) * top]
     high = first_failure(stable, grid, below=0.0)[1]
-    if high < (1.0 - 1e-7) * limit:  # `critical_hand` is that sharp
+    if high < (1.0 - 1e-7) * limit:  # the resolution of `critical_hand`
         critical = critical_hand(replace(loop, K=high), box)
         return high, critical[1] if critical else math.nan, critical[0] if critical else worst
     return limit, omega, worst

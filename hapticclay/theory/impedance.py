@@ -1,8 +1,8 @@
 """The impedance that a hand feels, split into stiffness, damping and mass, and transparency.
 
-In a sampled loop a sinusoidal force of the muscles comes back with sidebands, at every multiple of
-the sampling frequency. The response is then that of the fundamental: exact, by the pulse transfer
-function of the held arm at the samples, and by the hold's own spectrum between them.
+In a sampled loop a sinusoidal muscle force causes sidebands at every multiple of the sampling
+frequency. The response is then that of the fundamental. It is exact: the pulse transfer function of
+the held arm gives it at the samples, and the spectrum of the hold between them.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ UNIT_SPRING = Operator(0.0, 0.0, 1.0)
 @named
 @dataclass(frozen=True, eq=False, repr=False)
 class Impedance(Result):
-    """What a hand feels over frequency, computed or measured.
+    """Impedance at the hand over frequency, computed or measured.
 
-    Stiffness, damping and mass are the effective ones of Colonnese, Sketch, Okamura, Closed-loop
-    stiffness and damping accuracy of impedance-type haptic displays, IEEE Haptics Symposium 2014:
-    the spring or mass, and the damper, that would be felt alike at this one frequency.
+    Stiffness, damping and mass are effective values (Colonnese, Sketch, Okamura, Closed-loop
+    stiffness and damping accuracy of impedance-type haptic displays, IEEE Haptics Symposium 2014):
+    the spring or mass, and the damper, that have the same impedance at this frequency.
 
     Attributes:
         omega: [rad/s], shape (n,).
         Z: fh/v, hand force over handle velocity [N.s/m], complex, shape (n,).
         transparency: fe/fh, the share of the hand's force that is rendered, complex, (n,).
-        rendered: Ze, the impedance that is to be rendered [N.s/m], complex, shape (n,).
+        rendered: Ze, the desired impedance [N.s/m], complex, shape (n,).
     """
 
     drawn_by = "hapticclay.views.result_plots:effective_parts_plot"
@@ -57,7 +57,7 @@ class Impedance(Result):
         return f"{span}, |Z| {size.min():.3g} to {size.max():.3g} N.s/m"
 
     def tables(self) -> dict[str, dict[str, list[float]]]:
-        """What the figures show, columns headed with their units."""
+        """The numbers in the figures, columns headed with their units."""
         return {
             "impedance": {
                 "f [Hz]": self.frequency.tolist(),
@@ -85,12 +85,12 @@ class Impedance(Result):
 
     @property
     def stiffness(self) -> np.ndarray:
-        """Effective stiffness, -omega Im Z [N/m], (n,); NaN where Z is that of a mass."""
+        """Effective stiffness, -omega Im Z [N/m], (n,); NaN where Z is inertial."""
         return np.where(self.Z.imag < 0.0, -self.omega * self.Z.imag, np.nan)
 
     @property
     def mass(self) -> np.ndarray:
-        """Effective mass, Im Z/omega [kg], shape (n,); NaN where Z is that of a spring."""
+        """Effective mass, Im Z/omega [kg], shape (n,); NaN where Z is elastic."""
         return np.where(self.Z.imag > 0.0, self.Z.imag / self.omega, np.nan)
 
     @property
@@ -103,15 +103,16 @@ class Impedance(Result):
 class HeldArm(NamedTuple):
     """A mass, damper and spring under a sinusoidal and a held force, phasors of the fundamental.
 
-    Each field has shape (n,), over the frequencies asked for. z = exp(j omega Ts).
+    Each field has shape (n,), over the given frequencies. z = exp(j omega Ts).
 
     Attributes:
-        place: per unit of the sinusoidal force [m/N].
-        speed: the same [m/(N.s)].
-        held_place: at the samples, per unit of the force asked for at them [m/N].
-        held_speed: the same [m/(N.s)].
-        before: force that acts up to a sample per unit of that asked for: z^-1, or more of them.
-        hold: fundamental of the held and late force per unit of that asked for.
+        place: position per unit of the sinusoidal force [m/N].
+        speed: velocity per unit of the sinusoidal force [m/(N.s)].
+        held_place: position at the samples, per unit of the force commanded at them [m/N].
+        held_speed: velocity at the samples, likewise [m/(N.s)].
+        before: force that acts up to a sample per unit of commanded force: z^-1 or a higher power
+            of it.
+        hold: fundamental of the held, delayed force per unit of commanded force.
     """
 
     place: np.ndarray
@@ -125,12 +126,12 @@ class HeldArm(NamedTuple):
 def held_arm(
     mass: float, damper: float, spring: float, Ts: float, delay: float, omega: np.ndarray
 ) -> HeldArm:
-    """Responses of a mass, damper and spring whose motor holds its force from sample to sample.
+    """Responses of a mass, damper and spring whose motor force is held from sample to sample.
 
     Args:
-        mass: that moves [kg], > 0.
-        damper: on it [N.s/m].
-        spring: on it [N/m].
+        mass: moving mass [kg], > 0.
+        damper: damping of the mass [N.s/m].
+        spring: stiffness on the mass [N/m].
         Ts: control sample [s].
         delay: from a sample to the force computed from it [s].
         omega: [rad/s], > 0, shape (n,).
@@ -153,12 +154,12 @@ def held_arm(
 
 @of_loop("K", "b", "omega", timing=True)
 def loop_response(loop: Loop, omega: np.ndarray) -> Impedance:
-    """What the hand at the handle of a loop feels, over frequency.
+    """Impedance of a loop at the hand, over frequency.
 
-    In continuous time, late or not, no hand changes it. In a sampled loop it is the ratio of
-    fundamentals under a sinusoidal muscle force: the arm of the operator sends sidebands back, so
-    another arm changes it a little. For a loop that is unstable with this hand the answer is only
-    formal: no steady state has it.
+    In continuous time, with or without delay, it does not depend on the hand. In a sampled loop it
+    is the ratio of fundamentals under a sinusoidal muscle force. The operator's arm returns
+    sidebands, so the result depends slightly on the arm. For a loop that is unstable with this hand
+    the result is only formal, because there is no steady state.
 
     Args:
         loop: the loop with its K; or axis, K, b, omega, and other parts by name.
@@ -208,7 +209,7 @@ def frequencies(omega: Sequence[float] | np.ndarray) -> np.ndarray:
 
 
 def late_impedance(loop: Loop, omega: np.ndarray) -> np.ndarray:
-    """fh/v of a loop in continuous time, its motors late by loop.delay [N.s/m], complex, (n,).
+    """fh/v of a loop in continuous time with motors delayed by loop.delay [N.s/m], complex, (n,).
 
     The closed-loop polynomial is P + Th N with any hand Th, so p = (N/P) fh without one.
 
@@ -219,7 +220,7 @@ def late_impedance(loop: Loop, omega: np.ndarray) -> np.ndarray:
     s = 1j * omega
     late = np.exp(-s * loop.delay)
     now, then = _now_and_late(replace(loop, operator=None))
-    # N, which clay does not change, is what a hand of Th = 1 N/m adds
+    # N does not depend on the clay: it is the term added by a hand of Th = 1 N/m
     bare = replace(loop, b=0.0, k=0.0, operator=None)
     touched = zip(
         _now_and_late(replace(bare, operator=UNIT_SPRING)), _now_and_late(bare), strict=True
@@ -229,7 +230,7 @@ def late_impedance(loop: Loop, omega: np.ndarray) -> np.ndarray:
 
 
 def _now_and_late(loop: Loop) -> tuple[Polynomial, Polynomial]:
-    """The closed-loop polynomial as what acts at once, and what the motors do."""
+    """The closed-loop polynomial as its undelayed part and its delayed part from the motors."""
     physical, motors, driven = linear_loop.delayed_polynomials(loop)
     return physical, motors + loop.gain * driven
 
@@ -237,7 +238,7 @@ def _now_and_late(loop: Loop) -> tuple[Polynomial, Polynomial]:
 def _sampled_response(loop: Loop, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Fundamentals of v, fh and fe per unit of a sinusoidal muscle force in the sampled loop.
 
-    The law of the motors is that of `linear_loop.sampled_differences`, at z = exp(j omega Ts).
+    The control law is that of `linear_loop.sampled_differences`, at z = exp(j omega Ts).
     """
     Ts, th, b, k, n = loop.Ts, loop.hand, loop.b, loop.k, loop.compensator.order
     assert Ts is not None
@@ -273,13 +274,13 @@ def _sampled_response(loop: Loop, omega: np.ndarray) -> tuple[np.ndarray, np.nda
 
 @checked
 def wall_response(wall: VirtualWall, omega: np.ndarray) -> Impedance:
-    """What the hand at a virtual wall feels, over frequency: the fundamental, exact.
+    """Impedance of a virtual wall at the hand, over frequency: the fundamental, exact.
 
-    The wall acts everywhere (unilateral=False), without Coulomb friction and encoder steps. The arm
-    of the operator sends sidebands back, so another arm changes the answer a little.
+    The wall acts everywhere (unilateral=False), without Coulomb friction and encoder steps. The
+    operator's arm returns sidebands, so the result depends slightly on the arm.
 
     Args:
-        wall: the wall; its device's friction and quantum do not matter.
+        wall: the wall; friction and quantum of its device are ignored.
         omega: [rad/s], > 0, shape (n,).
 
     Raises:
@@ -308,12 +309,12 @@ def wall_response(wall: VirtualWall, omega: np.ndarray) -> Impedance:
 def wall_impedance(wall: VirtualWall, omega: np.ndarray) -> np.ndarray:
     """Force of the hand over velocity of the device with the wall, fh/v, without a hand: exact.
 
-    The Z of `wall_response`. At multiples of pi/Ts a real force meets its own mirror image in the
-    samples, and what it feels depends on its phase.
+    The Z of `wall_response`. At multiples of pi/Ts a real force aliases onto itself, so its
+    impedance depends on its phase.
 
     Args:
-        wall: the wall with its K; friction, quantum, surface and hand are left out. If it is
-            unstable without a hand, the motion lasts as long as a hand keeps it.
+        wall: the wall with its K; friction, quantum, surface and hand are ignored. If it is
+            unstable without a hand, the motion needs a hand that stabilises it.
         omega: frequencies, > 0 [rad/s], shape (n,).
 
     Returns:

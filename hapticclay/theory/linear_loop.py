@@ -1,7 +1,7 @@
 """The linear loop (Fig. 2): its parts, closed-loop polynomials, state space and sampled map.
 
-Everything that `theory` and `studies` say of a loop starts from one axis at the nominal pose.
-Polynomials treat one such axis; state spaces one, or both where a pose couples them.
+`theory` and `studies` model a loop as one axis at the nominal pose. Polynomials describe one axis;
+state spaces describe one axis, or both where a pose couples them.
 """
 
 from __future__ import annotations
@@ -39,18 +39,18 @@ class LinearLoop:
         b: clay [N.s/m], 0 to 1e9.
         operator: Th, the arm at the handle; None for no hand (Th = 0).
         servo: G and Sh; None for the printed ones of the axis. The gain of Sh is the mobility of
-            the handle that the loop has, the arm's own or a shaped one.
-        compensator: shape of C. Systems of python-control and scipy.signal are taken as well.
-        K: gain of the compensator, >= 0; None where the analysis asks for none.
+            the handle in the loop, the arm's own or a shaped one.
+        compensator: shape of C. Systems of python-control and scipy.signal are accepted too.
+        K: gain of the compensator, >= 0; None where the analysis needs none.
         Ts: control sample [s], 1e-6 to 1; None for continuous time.
-        delay: from a measurement to the torque computed from it [s], 0 to 1, at most 100 Ts.
-            Everything the motors do is late by it: the servo's feedback, what the compensator
-            commands, and clay that is held.
-        render: the clay is "held" (a force of the motors) or "physical" (physical, never late).
-        mobility: of the bare handle where the servo shapes its inertia [1/kg], which tells with
+        delay: from a measurement to the torque computed from it [s], 0 to 1, at most 100 Ts. It
+            delays every action of the motors: the servo's feedback, the compensator's command, and
+            held clay.
+        render: the clay is "held" (a force of the motors) or "physical" (physical, never delayed).
+        mobility: mobility of the bare handle where the servo shapes its inertia [1/kg], needed with
             sampling or delay; None for the gain of Sh.
         k: stiffness of the clay, an elastic wall with its rest at p = 0, Te = b s + k [N/m], 0 to
-            1e9; held, physical or late as b is.
+            1e9; held, physical or delayed like b.
     """
 
     axis: Literal["x", "y"] = "x"
@@ -103,19 +103,20 @@ def steady_speed(
 ) -> Any:
     """Speed under a constant hand force, K f/(10 + K b) with the printed parts [m/s].
 
-    The compensator's damper and the clay share the force: f = (1/(K c) + b) v, c the limit of
-    s C G/K as s goes to 0 (Eqs. 20, 21). Without an integrator in C the handle comes to rest; with
-    two it gives way until the clay takes all of the force, and without clay its speed grows.
+    The compensator's damper and the clay share the force: f = (1/(K c) + b) v, c the limit of s C
+    G/K as s goes to 0 (Eqs. 20, 21). Without an integrator in C the handle comes to rest. With two
+    it speeds up until the clay carries all of the force; without clay its speed grows without
+    bound.
 
     Args:
         K: compensator gain.
         f: hand force [N].
         b: clay [N.s/m], a float or an array.
         compensator: shape of C.
-        servo: of the axis; the printed ones follow C without loss.
+        servo: servo of the axis; the printed ones have a static gain of 1.
 
     Returns:
-        The speed, inf with the sign of f where it grows without end.
+        The speed; inf with the sign of f where it grows without bound.
     """
     num, den = (p.coef for p in reduced(compensator).fraction)
     n = np.count_nonzero(np.cumsum(den != 0.0) == 0)  # integrators
@@ -130,7 +131,7 @@ def steady_speed(
 
 
 def steady_damper(K: float, compensator: Compensator = PRINTED, servo: Servo = SERVO[0]) -> float:
-    """Damper that the handle is in steady motion, 10/K with the printed parts [N.s/m].
+    """Equivalent damper of the handle in steady motion, 10/K with the printed parts [N.s/m].
 
     Args:
         K: compensator gain.
@@ -150,14 +151,14 @@ def steady_velocity(f: Any, damper: Any, Fy: float, K: float, n: float) -> np.nd
     """Velocity in clay that yields under a constant force: f = damper v + (Fy + K |v|^n) v/|v|.
 
     Args:
-        f: force along the axes that the clay resists as one [N], shape (n,).
+        f: force along the axes on which the clay acts jointly [N], shape (n,).
         damper: of `steady_damper` and the clay together, along each [N.s/m], shape (n,).
         Fy: yield force [N].
         K: consistency [N/(m/s)^n].
         n: flow index.
 
     Returns:
-        [m/s], shape (n,): 0 where the yield force holds, inf where nothing else resists.
+        [m/s], shape (n,): 0 below the yield force, inf where nothing else resists.
     """
     f, damper = np.asarray(f, dtype=float), np.asarray(damper, dtype=float)
     size = math.hypot(*f)
@@ -182,7 +183,7 @@ def steady_velocity(f: Any, damper: Any, Fy: float, K: float, n: float) -> np.nd
 
 
 def reduced(compensator: Compensator) -> Compensator:
-    """A compensator without the factors s that numerator and denominator share.
+    """A compensator with the common factors s of numerator and denominator cancelled.
 
     Args:
         compensator: shape of C.
@@ -203,7 +204,7 @@ def loop_polynomials(loop: LinearLoop) -> tuple[Polynomial, Polynomial, Polynomi
     (G C + Sh)(Te + Th) is (passive + K driven)/denominator.
 
     Args:
-        loop: the loop, in continuous time without delay; its K does not matter.
+        loop: the loop, in continuous time without delay; its K is ignored.
 
     Returns:
         (denominator, passive, driven).
@@ -215,7 +216,7 @@ def loop_polynomials(loop: LinearLoop) -> tuple[Polynomial, Polynomial, Polynomi
 
 
 def delayed_polynomials(loop: LinearLoop) -> tuple[Polynomial, Polynomial, Polynomial]:
-    """Parts of the closed-loop polynomial with late motors: physical + late (motors + K driven).
+    """Parts of the closed-loop polynomial with delayed motors: physical + late (motors + K driven).
 
     With late = exp(-s delay), W the mobility of the bare handle, Wn the gain of Sh (the same
     without shaping) and T = Te + Th,
@@ -226,7 +227,7 @@ def delayed_polynomials(loop: LinearLoop) -> tuple[Polynomial, Polynomial, Polyn
     times the denominator of G C.
 
     Args:
-        loop: the loop, in continuous time; its K does not matter.
+        loop: the loop, in continuous time; its K is ignored.
 
     Returns:
         (physical, motors, driven).
@@ -264,7 +265,7 @@ def device_admittance(loop: LinearLoop) -> tuple[Polynomial, Polynomial]:
     """G C + Sh, handle position over net force, as (numerator, denominator).
 
     Args:
-        loop: the loop; hand and clay do not matter.
+        loop: the loop; hand and clay are ignored.
     """
     unit_spring = replace(loop, b=0.0, k=0.0, operator=Operator(0.0, 0.0, 1.0))
     denominator, passive, driven = loop_polynomials(unit_spring)
@@ -275,7 +276,7 @@ def device_impedance(loop: LinearLoop) -> tuple[Polynomial, Polynomial]:
     """1/(s (G C + Sh)), net force over handle velocity, as (numerator, denominator).
 
     Args:
-        loop: the loop; hand and clay do not matter.
+        loop: the loop; hand and clay are ignored.
     """
     e, d = device_admittance(loop)
     return (d, roots.VARIABLE * e) if d.coef[0] else (d // roots.VARIABLE, e)
@@ -331,18 +332,18 @@ def state_space(
 def sampled_differences(
     *loops: LinearLoop, pose: tuple[np.ndarray, bool] | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The sampled loop x(k+1) = (M + beta K gamma) x(k), x at the sample before it acts.
+    """The sampled loop x(k+1) = (M + beta K gamma) x(k), x at the sample before its control acts.
 
     x holds (p, v, states of the compensator, y, y') of each of the n axes, then the motors' force
     on the handle u(k-1), ..., u(k-1-N) [N] on each axis, with N the whole samples in the delay.
     Between samples handle and hand move under held u (matrix exponential); a fraction of a sample
     in the delay splits the hold in two (Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed.,
     3.2). As in `Sampled`, the net force f = gamma x that drives the compensator is measured before
-    u changes, so it holds the share of the hand's mass under the u that acted until then.
+    u changes, so its inertial part of the hand belongs to the previous u.
 
     Args:
         *loops: of one axis, or of x and y; Ts, delay and render are those of the first, the gains
-            do not matter.
+            are ignored.
         pose: mobility of the arm [1/kg], shape (n, n), and whether the servo shapes the inertia;
             None for the nominal pose.
 
@@ -416,7 +417,7 @@ def whole_samples(delay: float, Ts: float) -> tuple[int, float]:
 
 
 def _places(loops: Sequence[LinearLoop]) -> list[int]:
-    """Where the states of each axis begin, and where those of the last end."""
+    """Index of the first state of each axis, and of the end of the last."""
     at = [0]
     for loop in loops:
         at.append(at[-1] + 4 + loop.compensator.order)
@@ -441,7 +442,7 @@ def _resistance(loops: Sequence[LinearLoop]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _feedback(loops: Sequence[LinearLoop]) -> np.ndarray:
-    """The servo's law over the states of all axes, without what passes straight through C."""
+    """The servo's law over the states of all axes, without the direct feedthrough of C."""
     at = _places(loops)
     out = np.zeros((len(loops), at[-1]))
     for j, loop in enumerate(loops):
@@ -455,7 +456,7 @@ def _over_states(
     place: Sequence[float] | np.ndarray,
     rate: Sequence[float] | np.ndarray,
 ) -> np.ndarray:
-    """Rows over the states of all axes that hold a factor on p and one on p' of each."""
+    """Rows over the states of all axes, with a factor on p and one on p' of each axis."""
     at = _places(loops)
     out = np.zeros((len(loops), at[-1]))
     for j, k in enumerate(at[:-1]):
@@ -470,10 +471,10 @@ def _moved(
     dampers: np.ndarray,
     t: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Change of (p of each axis, v of each axis) over t [s], and that for held forces.
+    """Transition of (p of each axis, v of each axis) over t [s], and the response to held forces.
 
-    In the directions, columns, hand and handle have one mass each: there the axes are decoupled if
-    all have the same hand.
+    In the directions (columns) hand and handle have one mass each, so the axes are decoupled there
+    if all have the same hand.
     """
     n = len(masses)
     if np.ptp(springs) or np.ptp(dampers):
@@ -489,7 +490,7 @@ def _moved(
 
 
 def _moved_together(force: np.ndarray, w: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
-    """As `held_motion`, of axes that no direction decouples: p'' = w (force @ (p, v) + u)."""
+    """As `held_motion`, for axes that cannot be decoupled: p'' = w (force @ (p, v) + u)."""
     n = len(w)
     a = np.zeros((3 * n, 3 * n))
     a[:n, n : 2 * n] = np.eye(n)
@@ -499,10 +500,10 @@ def _moved_together(force: np.ndarray, w: np.ndarray, t: float) -> tuple[np.ndar
 
 
 def held_motion(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.ndarray]:
-    """Change of place and velocity over a time under p'' = own @ (p, v) + w u.
+    """Change of position and velocity over a time under p'' = own @ (p, v) + w u.
 
     The response to a pulse, and its integral, are divided differences of exp(s t) at the roots 0,
-    slow and fast, written so that nothing cancels however stiff the clay.
+    slow and fast, written without cancellation for clay of any stiffness.
 
     Args:
         own: acceleration per place [1/s^2] and per velocity [1/s], shape (2,).
@@ -532,20 +533,20 @@ def held_motion(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.nda
 def crossing_times(
     loop: LinearLoop, uh: float, edges: Sequence[float], b: Sequence[float], t_max: float = 100.0
 ) -> list[float]:
-    """Times at which a handle that starts at rest under a constant force passes each border.
+    """Times at which a handle crosses each border, from rest under a constant force.
 
-    Exact: between borders the loop is linear, so a matrix exponential moves it, and the times are
-    found by bisection to rounding (Brent 1973).
+    The times are exact to rounding: between borders the loop is linear, so matrix exponentials
+    advance it, and bisection locates the crossings (Brent 1973).
 
     Args:
-        loop: the loop with its K, in continuous time; its own clay does not matter.
+        loop: the loop with its K, in continuous time; its clay is ignored.
         uh: muscle force [N].
         edges: borders, ascending [m].
         b: clay before each border [N.s/m].
         t_max: end of the search [s].
 
     Returns:
-        One time for each border that is passed before t_max [s].
+        One time for each border crossed before t_max [s].
     """
     from scipy.optimize import brentq
 

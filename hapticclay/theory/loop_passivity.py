@@ -1,4 +1,4 @@
-"""Passivity of the device as the hand feels it: stability with every passive hand.
+"""Passivity of the device at the hand: stability with every passive hand.
 
 A sampled loop that is stable with one hand may still be active; `margins` judges coupled stability.
 """
@@ -22,16 +22,16 @@ from .stability_margins import LINEAR, Verdict
 def passivity(loop: Loop) -> Verdict:
     """Whether the impedance shown to the hand is passive, in continuous time.
 
-    Z = fh/v = b + k/s + 1/(s (G C + Sh)) is positive real if the handle left to itself is stable,
+    Z = fh/v = b + k/s + 1/(s (G C + Sh)) is positive real if the handle without a hand is stable,
     Re Z(j omega) >= 0, and Z is a spring at rest and a mass at high frequency, not their negatives
     (Colgate, Hogan, Int. J. Control 48, 1988).
 
     Args:
-        loop: the loop with its K, whose hand does not matter; or axis, K, b, and other parts by
-            name.
+        loop: the loop with its K, its hand ignored; or axis, K, b, and other parts by name.
 
     Returns:
-        Verdict with the least Re Z [N.s/m]: the damping that the clay has to spare, or lacks.
+        Verdict with the least Re Z [N.s/m]: the excess damping of the clay, negative if it lacks
+        damping.
     """
     z, e = (p.trim() for p in linear_loop.device_impedance(loop))
     R, Q = roots.real_part(z, e), roots.squared_magnitude(e)
@@ -66,7 +66,7 @@ def colgate_schenkel(
         H: pulse transfer function from sampled position to held force [N/m] at complex z, (n,) to
             (n,).
         Ts: control sample [s].
-        damping: of the device itself, physical [N.s/m].
+        damping: physical damping of the device [N.s/m].
         n: number of frequencies.
     """
     Ts = number("Ts", Ts, 0.0, above=True, unit="s")
@@ -91,17 +91,17 @@ def colgate_schenkel(
 
 @checked
 def clay_passivity(b: float, Ts: float, damping: float = 0.0, stiffness: float = 0.0) -> Verdict:
-    """Passivity of held clay alone, its velocity the difference of two samples.
+    """Passivity of held clay alone, its velocity a backward difference.
 
-    Servo and compensator are left out. In closed form: damping > stiffness Ts/2 + b, the second
-    term at the Nyquist frequency (Colgate, Schenkel 1997). The handle has no physical damper of its
-    own, so held clay is never passive by itself; clay with render="physical" is.
+    Servo and compensator are not modelled. The condition is damping > stiffness Ts/2 + b, the
+    second term at the Nyquist frequency (Colgate, Schenkel 1997). The handle has no physical
+    damper, so held clay alone is never passive; clay with render="physical" is.
 
     Args:
         b: clay [N.s/m].
         Ts: control sample [s].
-        damping: physical, of the handle [N.s/m].
-        stiffness: of a wall beside the clay [N/m].
+        damping: physical damping of the handle [N.s/m].
+        stiffness: stiffness of a wall beside the clay [N/m].
     """
     b, k = number("b", b, 0.0, unit="N.s/m"), number("stiffness", stiffness, 0.0, unit="N/m")
     return colgate_schenkel(lambda z: k + b * (1.0 - 1.0 / z) / Ts, Ts, damping)

@@ -23,41 +23,41 @@ from .linear_loop import LinearLoop, characteristic
 
 Answer = TypeVar("Answer")
 NO_TIMING = "must be {} here: the analysis is one of continuous time without delay"
-MOST_DAMPINGS = 64  # of the clay of a scenario, of which the worst is sought
+MOST_DAMPINGS = 64  # dampings of a scenario's clay among which the worst is searched
 TIMING = {"Ts": None, "delay": 0.0}  # of such a loop
 
 
 @named
 @dataclass(frozen=True)
 class Loop(LinearLoop):
-    """The linear loop of one axis at the nominal pose: the parts of a run, for the analysis.
+    """The linear loop of one axis at the nominal pose: the parts of a run for the analysis.
 
-    What is said of it holds for the machine at the nominal pose, where the axes are decoupled, in
-    small motions and with the motors within their torque limits. Elsewhere it holds with inertia
+    The analysis applies to the machine at the nominal pose, where the axes are decoupled, for small
+    motions and with the motors within their torque limits. At other poses it applies with inertia
     shaping in continuous time.
 
-    Its parts are those of `LinearLoop`.
+    It has the parts of `LinearLoop`.
     """
 
     @classmethod
     def of(cls, scenario: Scenario, axis: str, b: float | None = None) -> Loop:
         """The loop of one axis of a scenario, at the nominal pose of its arm.
 
-        Muscle force, pose, friction and what else the hardware has besides its delay are not part
-        of it. Of clay that yields or springs back it has b alone: Fy, K and springs are left out,
-        so that in clay of b = 0 a gain limit may be inf however large Fy is. For clay that yields
-        see `push_outcomes` and `limit_cycles`.
+        The loop has no muscle force, pose or friction, and of the hardware only the delay. For
+        yielding or elastic clay it has b alone, without Fy, K and springs. In clay of b = 0 a gain
+        limit may therefore be inf for any Fy. For yielding clay see `push_outcomes` and
+        `limit_cycles`.
 
         Args:
             scenario: the run.
             axis: "x" or "y".
-            b: clay [N.s/m]; None for that of the scenario's clay, before it grows, with the least
-                gain limit, 0 without clay. Of more than MOST_DAMPINGS values so many are tried;
-                clay with rotated axes resists by those of both of its own axes.
+            b: clay [N.s/m]; None for the damping of the scenario's clay, before growth, with the
+                least gain limit, 0 without clay. At most MOST_DAMPINGS values are tested; clay with
+                rotated axes contributes the values of both of its axes.
 
         Raises:
-            ParameterError: no scenario, one with a controller of the user's own, unknown axis, or b
-                out of its bounds.
+            ParameterError: no scenario, a scenario with a user's controller, unknown axis, or b out
+                of its bounds.
         """
         if not isinstance(scenario, Scenario):
             raise ParameterError("scenario", scenario, "must be a Scenario")
@@ -100,16 +100,17 @@ PARTS = tuple(f.name for f in fields(Loop))
 def of_loop(
     *order: str, timing: bool = False
 ) -> Callable[[Callable[..., Answer]], Callable[..., Answer]]:
-    """Lets an analysis of a `Loop` be asked of the parts of one, too.
+    """Lets an analysis of a `Loop` accept the parts of a loop, too.
 
     `f(loop, ...)`, `f(loop, K=2.0, ...)`; `f(scenario, "x", ...)`, with b= for another clay, which
-    asks of `Loop.of`; or `f("x", *order, servo=..., compensator=..., ...)`: the axis, what `order`
+    calls `Loop.of`; or `f("x", *order, servo=..., compensator=..., ...)`: the axis, what `order`
     names by position or by name, and every other part of a Loop by name.
 
     Args:
         order: parts of the loop and arguments of the analysis that may follow the axis by position;
-            all but the operator must be given. Only the latter may follow a Loop by position.
-        timing: whether the analysis is one of sampled and late loops too.
+            all but the operator are required. After a Loop only arguments of the analysis may
+            follow by position.
+        timing: whether the analysis supports sampled and delayed loops.
 
     Returns:
         A decorator.
@@ -148,9 +149,9 @@ def of_loop(
 
 
 def _loop_first(name: str, args: Sequence[Any], given: dict[str, Any]) -> Sequence[Any]:
-    """What an analysis was asked by position, after a Loop, that of a Scenario, or an axis.
+    """Positional arguments of an analysis, after a Loop, the Loop of a Scenario, or an axis.
 
-    What makes the first is taken from `given`, the arguments by name.
+    The parts of the first argument are taken out of `given`, the arguments by name.
     """
     if args and isinstance(args[0], Scenario):
         scenario, *rest = args
@@ -167,7 +168,7 @@ def _loop_first(name: str, args: Sequence[Any], given: dict[str, Any]) -> Sequen
 
 
 def _by_name(name: str, names: Sequence[str], rest: Sequence[Any], given: dict[str, Any]) -> None:
-    """Puts arguments that follow by position among those by name."""
+    """Moves positional arguments to the arguments by name."""
     if len(rest) > len(names):
         raise TypeError(f"{name}() takes {1 + len(names)} positional arguments at most")
     for word, value in zip(names, rest, strict=False):
@@ -177,14 +178,14 @@ def _by_name(name: str, names: Sequence[str], rest: Sequence[Any], given: dict[s
 
 
 def _refuse_timing(loop: Loop) -> None:
-    """Refuses a loop that is sampled or late."""
+    """Refuses a sampled or delayed loop."""
     for word, value in TIMING.items():
         if getattr(loop, word) != value:
             raise ParameterError(word, getattr(loop, word), NO_TIMING.format(value))
 
 
 def _with_gain(loop: Loop, parts: dict[str, Any]) -> Loop:
-    """The loop, with K where it is given."""
+    """The loop, with K if given."""
     for word, value in parts.items():
         if word != "K":
             raise ParameterError(word, value, "must not be given beside a Loop, which has its own")
@@ -192,7 +193,7 @@ def _with_gain(loop: Loop, parts: dict[str, Any]) -> Loop:
 
 
 def _signature(order: Sequence[str], own: Sequence[inspect.Parameter]) -> inspect.Signature:
-    """What an analysis takes: an axis or a Loop, what may follow by position, and the rest."""
+    """Signature of an analysis: an axis or a Loop, the positional arguments, and the rest."""
     P, more = inspect.Parameter, {p.name: p for p in own}
     blank = {"operator": None}
     out = [P("axis", P.POSITIONAL_OR_KEYWORD, annotation="str | Loop | Scenario")]
@@ -211,7 +212,7 @@ def _signature(order: Sequence[str], own: Sequence[inspect.Parameter]) -> inspec
 def closed_loop_poles(loop: Loop) -> np.ndarray:
     """Poles of the loop at the nominal pose [rad/s], shape (4 + order of C,).
 
-    With an integrator in C and no spring in Th one of them is that which moves the handle (s = 0).
+    With an integrator in C and no spring in Th one pole lies at s = 0: free motion of the handle.
 
     Args:
         loop: the loop with its K; or axis, K, b, operator, and other parts by name.

@@ -1,7 +1,7 @@
 """The masses, dampers and springs that a device renders stably, and its dynamic range.
 
-A virtual mass M, damper B and spring K on a bare device (`VirtualWall`), and the admittance
-1/(M s^2 + B s + K) on the arm, whose compensator it is. M-width, the range of virtual masses that
+The module treats a virtual mass M, damper B and spring K on a bare device (`VirtualWall`), and the
+admittance 1/(M s^2 + B s + K) as compensator of the arm. M-width, the range of virtual masses that
 are stable, follows Colonnese, Okamura, M-Width: Stability and accuracy of haptic rendering of
 virtual mass, Robotics: Science and Systems 2012; dynamic range, or Z-width, Colgate, Brown, Factors
 affecting the Z-width of a haptic display, ICRA 1994.
@@ -28,29 +28,29 @@ from .roots import bisect
 from .wall_limits import wall_differences
 
 Plane = Literal["mass-damper", "mass-stiffness", "damper-stiffness"]
-PLANES: dict[str, tuple[str, str]] = {  # along the plane and up it, as fields of a VirtualWall
+PLANES: dict[str, tuple[str, str]] = {  # fields of VirtualWall: horizontal, vertical
     "mass-damper": ("M", "B"),
     "mass-stiffness": ("M", "K"),
     "damper-stiffness": ("B", "K"),
 }
-BAND_POINTS = 96  # of a search along one part, before its ends are refined
-DIVISIONS, REFINEMENTS = 24, 7  # of the step of the grid that holds an end: to 2e-10 of it
-# In units of the mass that moves, and of Ts, parts beyond this are not tried.
+BAND_POINTS = 96  # grid points of a search along one part, before its ends are refined
+DIVISIONS, REFINEMENTS = 24, 7  # of the grid step that holds an end: refined to 2e-10 of it
+# End of the search, in units of the moving mass and Ts.
 WIDEST = 16.0
-SLIGHT = 1e-8  # of that: the least spring that is tried
+SLIGHT = 1e-8  # share of that end: the least spring in the search
 
 
 @named
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Where a virtual wall is stable, over a plane of two of its parts; between low and high.
+    """Stable range of a virtual wall over a plane of two of its parts: between low and high.
 
     Attributes:
         plane: one of PLANES.
-        wall: the wall; its part up the plane, and that along it, do not matter.
-        x: the part along the plane, in SI units, shape (n,).
-        low: least stable part up the plane, shape (n,).
-        high: largest stable one, shape (n,).
+        wall: the wall; its values of the two parts of the plane are ignored.
+        x: the part on the horizontal axis, in SI units, shape (n,).
+        low: least stable value of the part on the vertical axis, shape (n,).
+        high: largest stable value, shape (n,).
     """
 
     plane: str
@@ -62,19 +62,19 @@ class Region:
 
 @checked
 def stable_band(wall: VirtualWall, part: str) -> tuple[float, float]:
-    """Values of one part between which the linear wall is stable, the other two being its own.
+    """Range of one part in which the linear wall is stable, with its own values of the other two.
 
-    Eigenvalues of the sampled loop tell at each of a grid of values; the ends are then refined to
-    2e-10 of a step of it. A band narrower than a step, 19 % for B and M and 21 % for K, may be
-    missed; of several bands this is the lowest.
+    Eigenvalues of the sampled loop are computed on a grid of values; the ends are then refined to
+    2e-10 of a grid step. A band narrower than a step, 19 % for B and M and 21 % for K, may be
+    missed. Of several bands the lowest is returned.
 
     Args:
-        wall: all but the part, which does not matter; friction, quantum and surface are left out.
+        wall: all but the part, which is ignored; friction, quantum and surface are ignored too.
         part: "K" [N/m], "B" [N.s/m] or "M" [kg]; the band of M is the M-width.
 
     Returns:
         (low, high) in the unit of the part; low of B and M is mostly negative. high is inf where
-        even 16 mass/Ts^2, 16 mass/Ts or 16 mass is stable; both are NaN if nothing is.
+        even 16 mass/Ts^2, 16 mass/Ts or 16 mass is stable; both are NaN if no value is stable.
     """
     grid, stable = _stability(wall, choice("part", part, ("K", "B", "M")))
 
@@ -99,7 +99,7 @@ def stable_band(wall: VirtualWall, part: str) -> tuple[float, float]:
 def _stability(
     wall: VirtualWall, part: str
 ) -> tuple[np.ndarray, Callable[[np.ndarray], np.ndarray]]:
-    """Values of a part to try, ascending; and which of given values are stable, (n,) to (n,)."""
+    """Grid of a part, ascending; and a function that tests values for stability, (n,) to (n,)."""
     d, hand = wall.device, wall.hand
     mass, own = d.mass + hand.mass, d.damper + hand.damper
     unit = mass / wall.Ts ** {"K": 2, "B": 1, "M": 0}[part]
@@ -123,10 +123,10 @@ def _stability(
 
 @checked
 def renderable(wall: VirtualWall, plane: str = "mass-damper", n: int = 41) -> Region:
-    """Where a virtual wall is stable over a plane, exact at each of n columns.
+    """Stable region of a virtual wall over a plane, exact at each of n columns.
 
     Args:
-        wall: the wall, whose third part is kept: K, B or M.
+        wall: the wall; its third part, K, B or M, is kept.
         plane: "mass-damper", "mass-stiffness" or "damper-stiffness".
         n: number of columns, 3 to 1001, over all masses or dampers that are stable with any damper
             or spring of the plane.
@@ -169,7 +169,7 @@ def rendering(loop: Loop, M: float, B: float, K: float = 0.0) -> Loop:
     """The loop whose compensator is the admittance 1/(M s^2 + B s + K).
 
     Args:
-        loop: all but compensator and gain; one with more parts keeps them.
+        loop: all but compensator and gain; a subclass keeps its further parts.
         M: virtual mass [kg], > 0.
         B: virtual damping [N.s/m], >= 0.
         K: virtual stiffness [N/m], >= 0.
@@ -186,15 +186,15 @@ def rendering(loop: Loop, M: float, B: float, K: float = 0.0) -> Loop:
 def least_mass(
     loop: Loop, decay: float, box: Box | None = None, samples: int = 24
 ) -> tuple[float, float]:
-    """Least virtual mass that the arm renders stably, with a damper of decay times it.
+    """Least virtual mass that the arm renders stably, with a damper B = decay M.
 
-    Every larger mass with the same B/M is stable, too: 1/M is the gain of the compensator.
+    Every larger mass with the same B/M is stable too, because 1/M is the gain of the compensator.
 
     Args:
         loop: all but compensator and gain.
         decay: B/M of the admittance [1/s], >= 0.
-        box: hands, with all of which it is to be stable; None for the loop's own.
-        samples: random members of the box tried in a sampled or late loop, see `worst_case`.
+        box: hands that must all be stable; None for the loop's own hand.
+        samples: random members of the box tested in a sampled or delayed loop, see `worst_case`.
 
     Returns:
         M [kg] and B [N.s/m]; 0 where any mass is stable, inf where none is.
@@ -215,7 +215,7 @@ def least_mass(
 @named
 @dataclass(frozen=True, eq=False)
 class DynamicRange:
-    """What a device spans, from its free motion to its stiffest stable wall.
+    """Impedance range of a device, from free motion to its stiffest stable wall.
 
     Attributes:
         omega: [rad/s], shape (n,).
@@ -224,7 +224,8 @@ class DynamicRange:
             within `share` [N.s/m], shape (n,).
         most: |Z| of `stiffest` [N.s/m], shape (n,).
         stiffest: the wall of the largest stable K over B, its K times `share`.
-        share: of the limit that is rendered: at the limit itself nothing comes to rest.
+        share: share of the limit that is rendered, because at the limit itself motion does not
+            decay.
     """
 
     omega: np.ndarray
@@ -256,9 +257,9 @@ def dynamic_range(
     """Range of impedance of a device over frequency, from free motion to the stiffest stable wall.
 
     Args:
-        wall: device, hand, sampling and filter; its K, B and M do not matter.
+        wall: device, hand, sampling and filter; its K, B and M are ignored.
         omega: [rad/s], > 0, ascending, shape (n,).
-        share: of the limits to render, 0.1 to 0.999.
+        share: share of the limits to render, 0.1 to 0.999.
 
     Raises:
         ParameterError: a value is out of its bounds, or no wall is stable.

@@ -1,10 +1,10 @@
 """The exact symmetric oscillation of the linear loop in Coulomb and Bingham clay.
 
-Sliding and stuck, the loop is linear, so matrix exponentials move it. Half a period is a slide and,
-maybe, a time at which the handle sticks; the other half is its mirror image. With both times given,
-the state at the start follows from one linear system; they follow from the velocity at the
-end of the slide, 0, and the held force at the end of the stuck time, the yield force (for a relay
-that never rests: Tsypkin, Relay Control Systems, 1984).
+The loop is linear while sliding and while stuck, so matrix exponentials advance it. Half a period
+consists of a slide and possibly a stuck phase; the other half is its mirror image. Given both
+durations, one linear system yields the initial state. Two conditions determine the durations: the
+velocity is 0 at the end of the slide, and the held force equals the yield force at the end of the
+stuck phase (for a relay without a stuck phase: Tsypkin, Relay Control Systems, 1984).
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from .loops import Loop, of_loop
 from .roots import first_failure
 
 SPAN = np.geomspace(0.5, 2.0, 61)  # half periods tried, as shares of the predicted one
-SLIDING_SHARES = (0.9, 0.75, 0.5)  # of half a period, from which a cycle that sticks is sought
-STEPS, PERIODS = 60, 14  # of a run that tells whether a push ends stuck, of the threshold
+SLIDING_SHARES = (0.9, 0.75, 0.5)  # of half a period: initial guesses for a cycle that sticks
+STEPS, PERIODS = 60, 14  # steps per period, periods: a run that tests whether a push sticks
 SAMPLES = 400  # of half a period at which a solution is checked
 CYCLE_TOLERANCE = 1e-9  # of the largest velocity, or of the yield force
 
@@ -38,11 +38,11 @@ class ExactCycle:
 
     Attributes:
         speed: largest velocity [m/s].
-        amplitude: half of the way between its ends [m].
+        amplitude: half the distance between its ends [m].
         omega: frequency [rad/s].
         stuck: share of the time at which the handle rests.
-        multiplier: by which the least stable deviation grows in half a period; below 1 the cycle
-            is stable.
+        multiplier: growth of the least stable deviation in half a period; below 1 the cycle is
+            stable.
     """
 
     speed: float
@@ -53,7 +53,7 @@ class ExactCycle:
 
     @property
     def stable(self) -> bool:
-        """Whether motions around it tend to it."""
+        """Whether nearby motions converge to it."""
         return self.multiplier < 1.0
 
     @property
@@ -68,11 +68,11 @@ class _Pieces:
 
     A: np.ndarray
     B: np.ndarray
-    neutral: int  # motions that nothing brings back: where the handle rests
+    neutral: int  # motions without a restoring force: the rest position of the handle
 
     @property
     def held(self) -> np.ndarray:
-        """Row over z of the force of the clay that keeps the velocity as it is [N]."""
+        """Row over z of the clay force that keeps the velocity constant [N]."""
         return self.A[1] / self.B[1]
 
     @property
@@ -95,7 +95,7 @@ class _Pieces:
         return start, E @ start - g
 
     def valid(self, slide: float, stuck: float) -> bool:
-        """Whether it slides forward all the time, and rests when and while it must."""
+        """Whether it slides forward throughout, and stays stuck throughout the stuck phase."""
         start, end = self.ends(slide, stuck)
         v = self.path(slide, start)[:, 1]
         if v.min() < -CYCLE_TOLERANCE * v.max() or v.max() <= 0.0:
@@ -118,7 +118,7 @@ class _Pieces:
         return np.array(out)
 
     def sticks(self, z: np.ndarray, step: float, t_max: float) -> bool:
-        """Whether a motion that begins at z, sliding forward, ends stuck."""
+        """Whether a motion that starts at z, sliding forward, ends stuck."""
         E, g = self.slide(step)
         S = matrix_exponential(step * self.stuck)
         t, sign, rest = 0.0, 1.0, False
@@ -140,14 +140,14 @@ class _Pieces:
         return rest
 
     def _stop(self, z: np.ndarray, sign: float, step: float) -> tuple[np.ndarray, float]:
-        """z where a slide ends within a step, and how long before the end of it."""
+        """z at the end of a slide within a step, and the time from there to the end of the step."""
         from scipy.optimize import brentq
 
         def moved(t: float) -> np.ndarray:
             E, g = self.slide(t)
             return E @ z - sign * g
 
-        # a slide that has just begun starts at v = 0, or past it to rounding
+        # a slide that has just begun starts at v = 0, up to rounding
         t = 1e-6 * step
         if sign * moved(t)[1] > 0.0:
             t = float(brentq(lambda t: moved(t)[1], t, step, xtol=1e-12))  # type: ignore[arg-type]
@@ -170,30 +170,30 @@ class _Pieces:
 
 
 def _onto(flow: np.ndarray, event: np.ndarray) -> np.ndarray:
-    """Change of a deviation that waits, along the flow, until the event."""
+    """Change of a deviation carried along the flow to the event."""
     return np.eye(len(flow)) - np.outer(flow, event) / (event @ flow)
 
 
 @of_loop("flow", "K", "operator")
 def critical_push(loop: Loop, *, flow: Flow) -> float:
-    """Velocity of a push from which on the handle does not end stuck.
+    """Least velocity of a push after which the handle does not end stuck.
 
-    Of a push as in `Scenario.velocity`: compensator and servo move with the handle. Sliding
-    and stuck, matrix exponentials move the loop; the velocity is found by bisection, as if every
-    stronger push went on too. It is another one than the speed of the threshold, to which a
-    motion on the edge is drawn.
+    The push is that of `Scenario.velocity`: compensator and servo move with the handle. Matrix
+    exponentials advance the loop. Bisection finds the velocity and assumes that every stronger push
+    keeps sliding, too. The result differs from the speed of the threshold, to which a motion at the
+    limit converges.
 
     Args:
-        loop: the loop with its K, whose own b does not matter; or axis, flow, K, operator, and
-            other parts by name; or a Scenario and an axis.
-        flow: the law of the clay: a yield force and, maybe, a damper.
+        loop: the loop with its K, its b ignored; or axis, flow, K, operator, and other parts by
+            name; or a Scenario and an axis.
+        flow: the law of the clay: a yield force and optionally a damper.
 
     Returns:
         [m/s], within 1 %; inf where every push is predicted to end stuck, 0 where none is.
 
     Raises:
         ParameterError: the clay has no yield force, or a consistency with n other than 1; or the
-            compensator does not integrate, so that nothing but the handle moves.
+            compensator has no integrator, so that only the handle moves.
     """
     pieces, moving = _pieces(loop, flow), _moving_state(loop)
     cycles = [x for x in limit_cycles(loop, flow=flow) if x.kind == "threshold"]
@@ -214,15 +214,15 @@ def critical_push(loop: Loop, *, flow: Flow) -> float:
 
 @of_loop("flow", "K", "operator")
 def exact_cycles(loop: Loop, *, flow: Flow) -> tuple[ExactCycle, ...]:
-    """Symmetric oscillations of the loop in Coulomb or Bingham clay, as exact as rounding.
+    """Symmetric oscillations of the loop in Coulomb or Bingham clay, exact to rounding.
 
-    They are sought from half to twice each frequency that `limit_cycles` predicts. What is found
-    is exact; that nothing is found is no proof that nothing is there.
+    The search covers half to twice each frequency predicted by `limit_cycles`. Every cycle found is
+    exact, but the search may miss a cycle.
 
     Args:
-        loop: the loop with its K, whose own b does not matter; or axis, flow, K, operator, and
-            other parts by name; or a Scenario and an axis.
-        flow: the law of the clay: a yield force and, maybe, a damper.
+        loop: the loop with its K, its b ignored; or axis, flow, K, operator, and other parts by
+            name; or a Scenario and an axis.
+        flow: the law of the clay: a yield force and optionally a damper.
 
     Returns:
         The cycles, speed ascending.
@@ -252,7 +252,7 @@ def exact_cycles(loop: Loop, *, flow: Flow) -> tuple[ExactCycle, ...]:
 
 
 def _pieces(loop: Loop, flow: Flow) -> _Pieces:
-    """The loop in clay of 1 N and the flow's dampers: all else is in proportion to Fy."""
+    """The loop in clay with a yield force of 1 N and the flow's dampers: motions scale with Fy."""
     is_flow(flow)
     without_spring(loop)
     if not flow.Fy or (flow.K and flow.n != 1.0):
@@ -265,7 +265,7 @@ def _pieces(loop: Loop, flow: Flow) -> _Pieces:
 
 
 def _moving_state(loop: Loop) -> np.ndarray:
-    """State of a loop that has long moved at 1 m/s, the handle now at 0, as a run begins."""
+    """Steady state of a loop moving at 1 m/s with the handle at 0, as at the start of a run."""
     shape, n = loop.compensator, loop.compensator.order
     gain, damping, stiffness = loop.servo.numbers[:3]
     A, _, C, _ = shape.state_space()
@@ -276,7 +276,7 @@ def _moving_state(loop: Loop) -> np.ndarray:
 
 
 def _times(pieces: _Pieces, half: float) -> list[tuple[float, float]]:
-    """Times of sliding and sticking of the oscillations near a half period [s]."""
+    """Sliding and sticking times of the oscillations near a given half period [s]."""
     from scipy.optimize import brentq, root
 
     def speed(h: float) -> float:

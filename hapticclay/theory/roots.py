@@ -1,7 +1,7 @@
 """Roots, extremes and signs of polynomials; bisection.
 
 Every polynomial of the package is a `numpy.polynomial.Polynomial`, lowest power first. Roots of
-continuous functions are SciPy's (`brentq`); a yes or no needs bisection.
+continuous functions use SciPy's `brentq`; a change of a boolean property uses bisection.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ VARIABLE = Polynomial([0.0, 1.0])  # s itself
 
 
 def roots(p: Polynomial) -> np.ndarray:
-    """Roots of p, those at zero exactly zero (`polyroots` gives them as rounding errors).
+    """Roots of p, with roots at zero exactly zero (`polyroots` returns rounding errors).
 
     Args:
         p: polynomial.
@@ -104,9 +104,9 @@ def squared_magnitude(p: Polynomial) -> Polynomial:
 def crossings(A: Polynomial, B: Polynomial) -> list[tuple[float, float]]:
     """Every K > 0 at which a root of A + K B lies on the imaginary axis, and its frequency.
 
-    Exact: on the imaginary axis A + K B vanishes, so Im(A B*) = 0, a polynomial in omega, whose
-    positive roots give the K at which a pair of roots can cross; one root can do so at 0 and at
-    infinity. Roots that stay at zero do not count.
+    The result is exact. On the imaginary axis A + K B vanishes, so Im(A B*) = 0. The positive roots
+    of this polynomial in omega give every K at which a pair of roots can cross. A single root can
+    cross at 0 and at infinity. Roots that stay at zero do not count.
 
     Args:
         A: polynomial.
@@ -117,7 +117,7 @@ def crossings(A: Polynomial, B: Polynomial) -> list[tuple[float, float]]:
     """
     AB = cross_spectrum(A, B)
     omega = positive_roots(Polynomial(AB.coef.imag))
-    with np.errstate(divide="ignore", invalid="ignore"):  # B(j omega) = 0: no K puts a pole there
+    with np.errstate(divide="ignore", invalid="ignore"):  # B(j omega) = 0: no K places a pole there
         K = -AB(omega).real / np.abs(on_axis(B)(omega)) ** 2
         n = multiplicity_of_zero(A)
         ends = [-A.coef[n] / B.coef[n] if n == multiplicity_of_zero(B) else math.nan]
@@ -194,7 +194,7 @@ def runs_of_true(mask: np.ndarray) -> list[tuple[int, int]]:
 def bisect(
     holds: Callable[[float], bool], low: float, high: float, rtol: float = 1e-12
 ) -> tuple[float, float]:
-    """Narrow the bracket of a change.
+    """Narrow the bracket of a change by bisection.
 
     Args:
         holds: the property; true at low, false at high.
@@ -223,7 +223,7 @@ def first_failure(
 
     Args:
         holds: the property. A failure narrower than the grid may be missed.
-        grid: ascending positive values at which to look.
+        grid: ascending positive values to test.
         below: value below the grid at which the property is known to hold; None if there is none.
         rtol: width of the result, relative to its upper end.
 

@@ -34,11 +34,11 @@ LINEAR = "one axis at the nominal pose, linear, motors within their torque limit
 @named
 @dataclass(frozen=True)
 class Verdict:
-    """An answer and its distance from the other one; true if the verdict is.
+    """A verdict and its margin; true if the verdict is.
 
     Attributes:
         verdict: whether the property holds.
-        margin: distance from a change; `measures` names its quantity and unit.
+        margin: distance from a change of the verdict; `measures` names its quantity and unit.
         omega: limiting frequency [rad/s]; NaN if there is none.
         assumptions: conditions under which the verdict applies to the machine.
         method: how it was found, and whether that is exact, sufficient or sampled.
@@ -77,13 +77,13 @@ class Margins:
 
     Attributes:
         stable: whether the closed loop is.
-        gain: factors on the loop's gain that it tolerates, (less, more); (0, inf) for any.
+        gain: tolerated factors on the loop gain, (less, more); (0, inf) for any.
         phase: phase margin [rad].
-        delay: delay margin, in the loop where it is broken [s].
-        disk: alpha, the largest at which the loop tolerates every complex factor
-            (1 + d/2)/(1 - d/2), |d| < alpha (Seiler, Packard, Gahinet, An Introduction to Disk
-            Margins, IEEE CSM 2020; skew 0). From 2 up every positive gain and every phase short of
-            a half turn is among them.
+        delay: delay margin at the point where the loop is opened [s].
+        disk: alpha, the largest at which the loop tolerates every complex factor (1 + d/2)/(1 -
+            d/2), |d| < alpha (Seiler, Packard, Gahinet, An Introduction to Disk Margins, IEEE CSM
+            2020; skew 0). From 2 up these include every positive gain and every phase below a half
+            turn.
         gain_omega: frequencies at which the gain margins are reached [rad/s]; NaN for none.
         phase_omega: the same for the phase margin.
         delay_omega: the same for the delay margin.
@@ -135,7 +135,7 @@ def open_loop(loop: Loop, *, at: str = "force") -> tuple[Polynomial, Polynomial]
 
     Args:
         loop: the loop with its K; or axis, K, b, operator, and other parts by name.
-        at: where the loop is broken: at the net "force", L = (G C + Sh)(Te + Th) (Eq. 8), or at the
+        at: where the loop is opened: at the net "force", L = (G C + Sh)(Te + Th) (Eq. 8), or at the
             "compensator", G C (Te + Th)/(1 + Sh (Te + Th)) (Eq. 12), whose gain margin is that of
             K.
 
@@ -157,12 +157,12 @@ def open_loop(loop: Loop, *, at: str = "force") -> tuple[Polynomial, Polynomial]
 def nyquist(loop: Loop, *, at: str = "force") -> Nyquist:
     """The Nyquist curve and its encirclements.
 
-    With sampling the contour is the unit circle, z = exp(j omega Ts), and P and Z count what lies
+    With sampling the contour is the unit circle, z = exp(j omega Ts), and P and Z count poles
     outside it.
 
     Args:
         loop: the loop with its K; or axis, K, b, operator, and other parts by name.
-        at: where the loop is broken, as in `open_loop`; "compensator" with sampling or delay.
+        at: where the loop is opened, as in `open_loop`; "compensator" with sampling or delay.
 
     Raises:
         ParameterError: a value is out of its bounds.
@@ -176,7 +176,7 @@ def nyquist(loop: Loop, *, at: str = "force") -> Nyquist:
 
 
 def encirclements(n: Polynomial, d: Polynomial) -> tuple[int, int]:
-    """N and P of the loop n/d, counted along its curve and never from the closed-loop poles.
+    """N and P of the loop n/d, counted along its curve, not from the closed-loop poles.
 
     The contour passes poles on the axis on their right, in arcs so small that |L| is large all over
     them; such an arc turns L by -pi for each such pole. Beyond the largest frequency L is constant.
@@ -223,13 +223,13 @@ def encirclements(n: Polynomial, d: Polynomial) -> tuple[int, int]:
 def margins(loop: Loop, *, at: str = "compensator") -> Margins:
     """Gain, phase, delay and disk margins, in continuous time from roots of polynomials.
 
-    With sampling or delay they are read from the frequency response at the compensator, up to half
-    the sampling frequency: crossings as in `gain_limit`, the disk from a grid, refined.
+    With sampling or delay the margins follow from the frequency response at the compensator, up to
+    half the sampling frequency: crossings as in `gain_limit`, the disk margin on a refined grid.
 
     Args:
         loop: the loop with its K; or axis, K, b, operator, and other parts by name.
         at: "compensator": a factor on K, a delay of the compensator alone; "force": a factor on, or
-            a delay of, everything that the net force does, in continuous time without delay.
+            a delay of, all effects of the net force, in continuous time without delay.
 
     Raises:
         ParameterError: a value is out of its bounds.
@@ -243,7 +243,7 @@ def margins(loop: Loop, *, at: str = "compensator") -> Margins:
     omega = roots.positive_roots(Polynomial(nd.coef.imag))
     with np.errstate(divide="ignore"):
         factor = -(np.abs(roots.on_axis(d)(omega)) ** 2) / nd(omega).real
-        ends = [-d.coef[0] / n.coef[0]]  # L is real at 0 and, if it does not fall off, at infinity
+        ends = [-d.coef[0] / n.coef[0]]  # L is real at 0 and, if it does not roll off, at infinity
         ends += [-d.coef[-1] / n.coef[-1]] if n.degree() == d.degree() else []
     factor = np.concatenate((factor, ends))
     omega = np.concatenate((omega, [0.0, math.inf][: len(ends)]))
@@ -257,7 +257,7 @@ def margins(loop: Loop, *, at: str = "compensator") -> Margins:
     phase, phase_at = _extreme(turn, omega, every, np.argmin, math.inf)
     delay, delay_at = _extreme(lag / omega, omega, every, np.argmin, math.inf)
     if n.degree() == d.degree() and abs(n.coef[-1]) >= abs(d.coef[-1]):
-        delay, delay_at = 0.0, math.inf  # L does not fall off: any delay turns it round -1
+        delay, delay_at = 0.0, math.inf  # L does not roll off: any delay makes it encircle -1
     far, near = roots.squared_magnitude(d - n), roots.squared_magnitude(d + n)
     worst, disk_at = roots.least_ratio(-far, near)
     disk = 2.0 / math.sqrt(-worst)
@@ -267,7 +267,7 @@ def margins(loop: Loop, *, at: str = "compensator") -> Margins:
 
 
 def _is_timed(loop: Loop, at: str) -> bool:
-    """Whether the loop is sampled or late; it can then be broken at the compensator alone."""
+    """Whether the loop is sampled or delayed; it can then be opened at the compensator only."""
     timed = loop.Ts is not None or loop.delay > 0.0
     if choice("at", at, BREAKS) != "compensator" and timed:
         raise ParameterError("at", at, "must be 'compensator' with sampling or delay")
@@ -287,7 +287,7 @@ def _response_nyquist(family: gain_crossings.LoopFamily, K: float) -> Nyquist:
     while family.order and K and abs(back(np.array([low]))[0]) < 1e3:
         low *= 0.1
     last = [w for w in family.ends if w > omega[-1]]  # the Nyquist frequency
-    if not last:  # L falls off, or its absolute value stays below 1
+    if not last:  # L rolls off, or its absolute value stays below 1
         top = float(omega[-1])
         while abs(back(np.array([top]))[0] - 1.0) > max(0.5, 0.5 * (1.0 + K / family.most)):
             top *= 2.0
@@ -340,7 +340,7 @@ def _response_margins(family: gain_crossings.LoopFamily, K: float) -> Margins:
 def _extreme(
     value: np.ndarray, omega: np.ndarray, mask: np.ndarray, pick: Callable, none: float
 ) -> tuple[float, float]:
-    """The value that pick chooses where mask holds, and its omega; (none, nan) if it never does."""
+    """The value that `pick` selects within the mask, and its omega; (none, nan) if it is empty."""
     if not np.any(mask):
         return none, math.nan
     i = np.flatnonzero(mask)[pick(value[mask])]
@@ -351,8 +351,8 @@ def _extreme(
 def coupled_stability(loop: Loop) -> Verdict:
     """Whether the loop with this hand is stable.
 
-    The margin is the gain limit over K. A loop that is stable again above its first limit has a
-    verdict of True beside a margin below 1.
+    The margin is the gain limit over K. A loop that is stable again above its first limit has the
+    verdict True with a margin below 1.
 
     Args:
         loop: the loop with its K > 0; or axis, K, b, operator, and other parts by name.
@@ -410,7 +410,7 @@ def small_gain(loop: Loop, *, equation: int = 13) -> Verdict:
 
 @of_loop("K", "b", "omega")
 def transparency(loop: Loop, omega: np.ndarray) -> np.ndarray:
-    """fe/fh, the clay's share of the hand's force (Eq. 7), which no hand changes.
+    """fe/fh, the clay's share of the hand's force (Eq. 7), independent of the hand.
 
     Args:
         loop: the loop with its K; or axis, K, b, omega, and other parts by name.

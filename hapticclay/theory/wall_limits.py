@@ -1,8 +1,8 @@
-"""Virtual walls on a bare device: the exact linear loop, and the limits that have been published.
+"""Virtual walls on a bare device: the exact linear loop and published limits.
 
-The device (mass, damper) and the hand at it are linear between samples, so the sampled loop is a
-matrix: exact. Friction, encoder and the surface of a wall are no part of it: what is said of a wall
-with a surface holds while it is pressed. `docs/equations.md`, section 7, has the derivations.
+The device (mass, damper) and the hand are linear between samples, so the sampled loop is exactly a
+matrix. It has no friction, encoder or wall surface: for a wall with a surface the results hold
+while the wall is pressed. `docs/equations.md`, section 7, has the derivations.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from ..scene.virtual_wall import Device, VirtualWall
 from . import gain_crossings, linear_loop, roots
 from .hand_boxes import Box
 
-MOST_STATES = 600  # of a map whose eigenvalues are asked for
-SLOWEST_TURN = 1e-7  # [rad] least omega Ts at which the condition of passivity is tried
-TRIED_ANGLES = 4000  # values of omega Ts at which it is tried, twice
+MOST_STATES = 600  # largest order of a map whose eigenvalues are computed
+SLOWEST_TURN = 1e-7  # [rad] least omega Ts at which the passivity condition is evaluated
+TRIED_ANGLES = 4000  # values of omega Ts in this grid, used twice
 TOP_OMEGA = 1e7  # [rad/s]
-HUGE = 1e30  # [N/m] in place of infinity, which a search cannot subtract
+HUGE = 1e30  # [N/m] replaces infinity, which a search cannot subtract
 REFINED = 3  # rounds of the search within a box of hands
 
 
@@ -38,13 +38,13 @@ def stable_wall(wall: VirtualWall) -> bool:
     """Whether the linear loop of wall, device and hand is stable.
 
     Every eigenvalue of the sampled loop lies within the unit circle. Without springs (K = 0, none
-    in the hand) the one at z = 1 that moves the handle does not count.
+    in the hand) the eigenvalue at z = 1, free motion of the handle, does not count.
 
     Args:
-        wall: the wall with its K; friction, quantum and surface are left out.
+        wall: the wall with its K; friction, quantum and surface are ignored.
 
     Raises:
-        ParameterError: window and delay are of more than 600 samples together.
+        ParameterError: window and delay together exceed 600 samples.
     """
     less = wall_differences(wall)
     if not np.any(less[:, 0]):  # nothing depends on the place
@@ -54,21 +54,21 @@ def stable_wall(wall: VirtualWall) -> bool:
 
 @checked
 def stiffness_band(wall: VirtualWall) -> tuple[float, float]:
-    """Stiffness K between which the linear wall is stable at its own B and M [N/m].
+    """Band of stiffness K in which the linear wall is stable at its own B and M [N/m].
 
-    K multiplies one signal of the loop, so a pole crosses the unit circle at the K = 1/h(omega)
-    where h is real and positive (see `gain_limit`): exact to rounding. Eigenvalues tell which of
-    the intervals between two such K are stable. Of several stable intervals, as large delays give
-    them, this is the lowest.
+    K multiplies one signal of the loop, so a pole crosses the unit circle at K = 1/h(omega) where h
+    is real and positive (see `gain_limit`): exact to rounding. Eigenvalues decide which of the
+    intervals between two such K are stable. Large delays give several stable intervals; the lowest
+    is returned.
 
     Args:
-        wall: all but K, which does not matter.
+        wall: all but K, which is ignored.
 
     Returns:
         (low, high), low mostly 0; high is 0 if no K is stable, inf if there is no limit.
 
     Raises:
-        ParameterError: window and delay are of more than 600 samples together.
+        ParameterError: window and delay together exceed 600 samples.
     """
     family, typical = _every_stiffness(wall), (wall.device.mass + wall.hand.mass) / wall.Ts**2
     edges = [0.0, *sorted(K for K, _ in gain_crossings.gain_crossings(family)), math.inf]
@@ -89,9 +89,9 @@ def stiffness_band(wall: VirtualWall) -> tuple[float, float]:
 def wall_differences(wall: VirtualWall) -> np.ndarray:
     """The sampled loop x(k+1) = (1 + D) x(k) of wall, device and hand, x at the sample.
 
-    x holds place and velocity, then, as far as the wall needs them: the displacements between the
-    last `window` samples, the filtered velocity and the measured one of the sample before, and the
-    forces on their way, newest first. A fraction of a sample in the delay splits the hold in two.
+    x holds position and velocity, then, if the wall needs them: the displacements between the last
+    `window` samples, the filtered velocity and the measured velocity of the previous sample, and
+    the delayed forces, newest first. A fraction of a sample in the delay splits the hold in two.
 
     Args:
         wall: the wall with its K.
@@ -100,7 +100,7 @@ def wall_differences(wall: VirtualWall) -> np.ndarray:
         D, shape (n, n), without the loss of digits of a difference.
 
     Raises:
-        ParameterError: window and delay are of more than 600 samples together.
+        ParameterError: window and delay together exceed 600 samples.
     """
     change, soon, late, whole, part = _motion(wall)
     Ts, moves = wall.Ts, wall.B != 0.0 or wall.M != 0.0
@@ -145,7 +145,7 @@ def wall_differences(wall: VirtualWall) -> np.ndarray:
 
 
 def _kept(wall: VirtualWall) -> float:
-    """Share of its state that the velocity's filter keeps over a sample."""
+    """Decay factor of the velocity filter over a sample."""
     f = wall.velocity_filter
     return 0.0 if f is None else math.exp(-2.0 * math.pi * f * wall.Ts)
 
@@ -156,11 +156,11 @@ def _split_delay(wall: VirtualWall) -> tuple[int, float]:
 
 
 def _motion(wall: VirtualWall) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, float]:
-    """How (place, velocity) of device and hand change over a sample.
+    """Change of (position, velocity) of device and hand over a sample.
 
     Returns:
-        The change for those before, shape (2, 2); for a force that comes `part` of a sample after
-        it began, shape (2,); for the one that acts until then, shape (2,); whole samples of the
+        The change per previous state, shape (2, 2); per force that starts `part` of a sample after
+        the sample, shape (2,); per force that acts until then, shape (2,); whole samples of the
         delay; part.
     """
     d, hand = wall.device, wall.hand
@@ -176,14 +176,14 @@ def _motion(wall: VirtualWall) -> tuple[np.ndarray, np.ndarray, np.ndarray, int,
 
 def _within(less: np.ndarray) -> bool:
     """Whether every eigenvalue of 1 + less lies within the unit circle."""
-    if not np.all(np.any(less, axis=0)):  # a state that nothing depends on: one lies at z = 1
+    if not np.all(np.any(less, axis=0)):  # a state without effect: an eigenvalue at z = 1
         return False
     z1 = gain_crossings.eigenvalues(less)
     return bool(np.all(2.0 * z1.real + np.abs(z1) ** 2 < 0.0))
 
 
 def _at_samples(wall: VirtualWall, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Place and velocity at the samples per force of the wall, late and held; turn is omega Ts."""
+    """Position and velocity at the samples per delayed, held wall force; turn is omega Ts."""
     change, soon, late, whole, _ = _motion(wall)
     z1 = np.expm1(1j * turn)
     back = np.exp(-1j * turn)
@@ -194,7 +194,7 @@ def _at_samples(wall: VirtualWall, turn: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _object(wall: VirtualWall, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Force of the wall per measured place, without K, and per exact velocity, without delay."""
+    """Force of the wall per measured position, without K, and per exact velocity, without delay."""
     back = -np.expm1(-1j * turn)  # 1 - 1/z
     law = wall.B + wall.M / wall.Ts * back
     if wall.velocity == "exact":
@@ -230,12 +230,12 @@ def _every_stiffness(wall: VirtualWall) -> gain_crossings.LoopFamily:
 def hand_box_limit(wall: VirtualWall, box: Box) -> float:
     """Least stable K over a box of hands at the wall [N/m].
 
-    Searched: the 27 hands at ends and middles of the box, then along each side through the worst of
-    them. No proof for the hands between.
+    The search covers the 27 hands at ends and middles of the box, then the lines through the worst
+    of them along each side. It is no proof for the other hands.
 
     Args:
-        wall: all but K and the hand, which do not matter.
-        box: the hands; a rigid arm stops every wall and does not count.
+        wall: all but K and the hand, which are ignored.
+        box: the hands; a rigid arm is ignored, because it holds every wall at rest.
 
     Returns:
         The least `high` of `stiffness_band`; 0 if no K is stable for all of these hands.
@@ -281,17 +281,18 @@ def colgate_schenkel_limit(wall: VirtualWall) -> float:
     """Largest K at which the wall is passive at its own B and M [N/m].
 
     Colgate, Schenkel (J. Robotic Systems 14, 1997): necessary and sufficient for a sampled object
-    behind a mass and a damper b, whatever passive hand holds it. With window 1 and without filter,
-    delay and M it is 2 (b - |B|)/Ts. Otherwise it is found over the frequencies up to pi/Ts: with a
-    delay of whole samples by their condition, its H late; with a fraction of a sample, after which
-    the force changes between two samples, by the condition of `passivity_index`.
+    behind a mass and a damper b, with any passive hand. With window 1 and without filter, delay and
+    M it is 2 (b - |B|)/Ts. Otherwise it is the minimum over the frequencies up to pi/Ts: for a
+    delay of whole samples by their condition with H delayed; for a fraction of a sample, where the
+    force changes between two samples, by the condition of `passivity_index`.
 
     Args:
-        wall: all but K; hand, friction and quantum do not matter.
+        wall: all but K; hand, friction and quantum are ignored.
 
     Returns:
         K; 0 if no K > 0 is passive: without damper, and where B or M act on an exact velocity,
-        which a hand can give the handle at the samples alone, at no cost.
+        because a hand can give the handle a velocity at the sampling instants only, at no cost of
+        energy.
     """
     b, Ts = wall.device.damper, wall.Ts
     if wall.velocity == "exact" and (wall.B or wall.M):
@@ -333,18 +334,18 @@ def colgate_schenkel_limit(wall: VirtualWall) -> float:
 
 @checked
 def passivity_index(wall: VirtualWall, omega: Any) -> np.ndarray:
-    """Physical damping to spare at each frequency: the wall is passive where it is never negative.
+    """Excess physical damping at each frequency: the wall is passive if it is never negative.
 
     That is b less
 
         Ts Re{(1 - 1/z) H(z)}/(2 (1 - cos omega Ts)),    z = exp(j omega Ts)
 
-    (Colgate, Schenkel 1997), with H late by the whole samples of the delay. If the delay has a
-    fraction T' of a sample beside them, it is b less (r + sqrt(r^2 + T' (Ts - T') |H|^2))/2 with
-    r = Re{(1 - 1/z) (Ts - T' + T'/z) H}/(2 (1 - cos omega Ts)), necessary and sufficient as well.
+    (Colgate, Schenkel 1997), with H delayed by the whole samples of the delay. If the delay has a
+    further fraction T' of a sample, it is b less (r + sqrt(r^2 + T' (Ts - T') |H|^2))/2 with r =
+    Re{(1 - 1/z) (Ts - T' + T'/z) H}/(2 (1 - cos omega Ts)), necessary and sufficient as well.
 
     Args:
-        wall: the wall with its K; hand, friction and quantum do not matter.
+        wall: the wall with its K; hand, friction and quantum are ignored.
         omega: frequencies, > 0 and up to pi/Ts, beyond which the condition repeats itself [rad/s],
             shape (n,).
 
@@ -366,20 +367,20 @@ def passivity_index(wall: VirtualWall, omega: Any) -> np.ndarray:
 
 
 def worst_middle(wall: VirtualWall, turn: float) -> complex | None:
-    """Where the worst hand has the device when a late force changes between two samples.
+    """Position of the device under the worst hand when a delayed force changes between samples.
 
-    For samples cos(k turn) it is there at Re{middle exp(j k turn)}, of all places the one that
-    leaves the wall the least to spare.
+    For samples cos(k turn) the position is Re{middle exp(j k turn)}, the one with the least excess
+    damping.
 
     Args:
         wall: the wall with its K, of a device with a damper.
         turn: omega Ts, 0 to pi.
 
     Returns:
-        The middle; None if the force changes at the samples, so that there is none.
+        The middle; None if the force changes at the samples.
 
     Raises:
-        ParameterError: the device has no damper, so that no hand is the worst.
+        ParameterError: the device has no damper, so there is no worst hand.
     """
     b = number("device.damper", wall.device.damper, 0.0, above=True, unit="N.s/m")
     whole, part = _split_delay(wall)
@@ -408,7 +409,7 @@ def _turns(wall: VirtualWall) -> np.ndarray:
 
 
 def _lowest(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, y: np.ndarray) -> float:
-    """Least f near the point of a grid x at which it is least; y is f(x)."""
+    """Refined minimum of f near its least value y on a grid x."""
     from scipy.optimize import minimize_scalar
 
     i = int(np.argmin(y))
@@ -423,13 +424,13 @@ def _lowest(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, y: np.ndarray)
 
 @checked
 def abbott_okamura_limit(wall: VirtualWall) -> float:
-    """Largest K at which a wall behind damper, friction and encoder is passive [N/m].
+    """Largest passive K of a wall behind damper, friction and encoder [N/m].
 
     min(2 b/Ts, 2 fc/Delta): necessary and sufficient for a wall of K alone (Abbott, Okamura, IEEE
     Trans. Robotics 21, 2005). Without an encoder (Delta = 0) it is 2 b/Ts.
 
     Args:
-        wall: all but K, with B = M = 0 and delay = 0; the hand does not matter.
+        wall: all but K, with B = M = 0 and delay = 0; the hand is ignored.
 
     Raises:
         ParameterError: B, M or delay is not zero.
@@ -456,7 +457,7 @@ def hulin_limit(wall: VirtualWall) -> float:
 
     Args:
         wall: all but K; b is the damping of device and hand together; M, window, filter and the
-            hand's mass and spring do not matter.
+            hand's mass and spring are ignored.
     """
     b = wall.device.damper + wall.hand.damper
     return max(0.0, (b + wall.B) / (0.5 * wall.Ts + wall.delay))
@@ -520,16 +521,16 @@ def jury_limit(wall: VirtualWall) -> float:
 def hulin_boundary(
     mass: float, damper: float, Ts: float, samples: float = 0.0, n: int = 401
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Boundary of stability of the held, late wall in the plane of B and K: exact.
+    """Exact stability boundary of the held, delayed wall in the plane of B and K.
 
     A pair of poles lies at z = exp(+-j omega Ts) where real and imaginary part of the loop's
-    equation vanish, two lines in that plane; their crossing moves along the boundary with omega,
-    from K = 0 at B = -damper to K = 0 at the largest stable B. A pole at z = -1 cuts it by the line
-    K + 2 B/Ts = const.
+    equation vanish. These are two lines in that plane. Their intersection moves along the boundary
+    with omega, from K = 0 at B = -damper to K = 0 at the largest stable B. A pole at z = -1 cuts it
+    by the line K + 2 B/Ts = const.
 
     Args:
-        mass: of device and hand [kg], 1e-4 to 1e4.
-        damper: of device and hand [N.s/m], 0 to 1e9.
+        mass: mass of device and hand [kg], 1e-4 to 1e4.
+        damper: damping of device and hand [N.s/m], 0 to 1e9.
         Ts: control sample [s].
         samples: delay in samples, 0 to 100, with a fraction.
         n: number of points, 3 to 100001.

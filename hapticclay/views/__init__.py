@@ -1,4 +1,4 @@
-"""Figures, films, the window and the page; figures are loaded when they are drawn."""
+"""Figures, films, the window and the page; figures are imported when drawn."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Error against run time, drawn."""
+"""Figure of error against run time."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ ERROR_AXES = {"s": "error of the border times [s]", "m": "error of the position 
 
 
 def accuracy_plot(ladder: Ladder) -> Figure:
-    """Plots error against run time, a panel a unit, a curve a method, a mark a step.
+    """Plots error against run time: one panel per unit, one curve per method, one mark per step.
 
-    Rings mark settings that are the cheapest for an error; in the grey band, the error of the
-    reference hides that of a setting.
+    Rings mark the cheapest setting for an error. In the grey band the error of the reference hides
+    that of a setting.
 
     Args:
         ladder: from `accuracy_ladder`.
@@ -78,7 +78,7 @@ def _accuracy_panel(ax: Axes, ladder: Ladder, unit: str) -> None:
         ax.plot(*zip(*best, strict=True), label="cheapest for an error", **ring)
     ax.margins(x=0.15, y=0.1)
     (first, last), (low, high) = ax.get_xlim(), ax.get_ylim()
-    ax.set_xlim(first, 2.5 * last)  # room for the last step
+    ax.set_xlim(first, 2.5 * last)  # space for the label of the last step
     if left := ladder.left[unit]:
         low = min(low, 0.3 * left)
         ax.axhspan(low, CLEAR * left, color=PALE_GREY, lw=0, label="hidden by the reference")

@@ -19,7 +19,7 @@ MOST_TITLED = 8  # that a title lists
 
 
 def in_math(text: str) -> str:
-    """A text on clay, its letters and units as formulas; the consistency K is not the gain.
+    """Typesets a text on clay with letters and units as formulas; K is the consistency here.
 
     Args:
         text: such as "Fy = 2 N".

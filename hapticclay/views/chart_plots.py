@@ -27,11 +27,11 @@ MARKS = "osD^vPX"
 def chart_plot(chart: Chart) -> Figure:
     """Plots a chart.
 
-    Curves of a kind "line" take the colours of the style in turn; marks take that of the line
-    before them, as runs beside their theory, and are black without one.
+    Curves of the kind "line" cycle through the colours of the style. Marks have the colour of the
+    preceding line, as runs match their theory, and are black without one.
 
     Args:
-        chart: what to plot.
+        chart: the chart.
     """
     with figure_style():
         figure = Figure(figsize=figure_size(1, 4.4))

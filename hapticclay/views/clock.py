@@ -1,4 +1,4 @@
-"""Real time beside simulated time."""
+"""Simulated time paced by real time."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ from collections import deque
 import numpy as np
 
 FRAME_TIME = 1.0 / 60.0  # [s] between two slices
-LONGEST_SLICE = 0.05  # [s]; a machine that needs longer for it slows the clock
+LONGEST_SLICE = 0.05  # [s]; the clock slows down if the machine needs longer
 LATE_EDGES = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)  # of a histogram [ms]
 RECENT = 1.0  # [s] over which the real-time factor is averaged
 
 
 class Clock:
-    """Deals out simulated time as real time passes, and less of it on a machine that is too slow.
+    """Schedules simulated time in real time, and slows down on a machine that is too slow.
 
     Attributes:
-        frames: number of slices dealt out.
-        late: histogram of how late they came, with edges LATE_EDGES.
-        slow: whether the machine is too slow now.
-        real: real time that has passed [s].
-        simulated: simulated time dealt out [s].
+        frames: number of slices scheduled.
+        late: histogram of their lateness, with edges LATE_EDGES.
+        slow: whether the machine is currently too slow.
+        real: elapsed real time [s].
+        simulated: scheduled simulated time [s].
     """
 
     def __init__(self, span: float = FRAME_TIME):
         """Begins with the first slice.
 
         Args:
-            span: real time between two slices, as it should be [s].
+            span: nominal real time between two slices [s].
         """
         self._span = span
         self.frames, self.late, self.slow = 0, np.zeros(len(LATE_EDGES) - 1, dtype=int), False
@@ -37,7 +37,7 @@ class Clock:
         self._owed = 0.0
 
     def due(self, now: float) -> float:
-        """Returns the simulated time to make now [s], LONGEST_SLICE at most.
+        """Returns the simulated time to advance now [s], at most LONGEST_SLICE.
 
         Args:
             now: real time [s].
@@ -59,12 +59,12 @@ class Clock:
         return due
 
     def rest(self) -> None:
-        """Lets time pass that is not made up for: a pause."""
+        """Skips real time without catching up: a pause."""
         self._then, self._owed = None, 0.0
 
     @property
     def factor(self) -> float:
-        """Simulated over real time, over the last frames."""
+        """Real-time factor: simulated over real time, averaged over the last frames."""
         real, simulated = (
             (sum(x) for x in zip(*self._recent, strict=True)) if self._recent else (1.0, 1.0)
         )

@@ -1,4 +1,4 @@
-"""Figures of several controllers, or of several bare devices, over one another."""
+"""Figures of several controllers, or of several bare devices, superimposed."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def compare_figures(found: Comparison) -> dict[str, tuple[str, shown.Figure]]:
 
 
 def main_overlay(found: Comparison) -> Figure:
-    """Plots what tells the files apart first: walls that are stable, or velocity over position.
+    """Plots the main difference between the files: stable walls, or velocity over position.
 
     Args:
         found: from `compare_files`.
@@ -76,7 +76,7 @@ def main_overlay(found: Comparison) -> Figure:
 def _overlay(
     found: Comparison, curve: Callable[[Compared], tuple[Any, Any]], **axes: Any
 ) -> Figure:
-    """One curve a file, each in a look of its own."""
+    """One curve per file, each in its own style."""
     with figure_style():
         figure = Figure(figsize=figure_size(1, 3.6))
         ax = figure.add_subplot()
@@ -112,7 +112,7 @@ def velocity_overlay(found: Comparison) -> Figure:
 
 
 def gain_overlay(found: Comparison) -> Figure:
-    """Plots the gain limit over b, with the sampling of each file; a mark at its own b and K.
+    """Plots the gain limit over b, with the sampling of each file, and marks its b and K.
 
     Args:
         found: scenarios.
@@ -134,14 +134,14 @@ def gain_overlay(found: Comparison) -> Figure:
 
 
 def _shown_band(x: Compared) -> np.ndarray:
-    """Frequencies [rad/s], of a wall below half of its sampling frequency."""
+    """Frequencies [rad/s]; for a wall below half of its sampling frequency."""
     if isinstance(x.subject, VirtualWall):
         return BAND[BAND < 0.95 * math.pi / x.subject.Ts]
     return BAND
 
 
 def spare_plot(found: Comparison) -> Figure:
-    """Plots the damping to spare: the index of a sampled wall, Re Z of an arm.
+    """Plots the excess damping: passivity index of a sampled wall, Re Z of an arm.
 
     Args:
         found: all of one kind.
@@ -160,7 +160,7 @@ def spare_plot(found: Comparison) -> Figure:
 
 
 def impedance_overlay(found: Comparison) -> Figure:
-    """Plots the size of the impedance fh/v over frequency.
+    """Plots the magnitude of the impedance fh/v over frequency.
 
     Args:
         found: all of one kind.
@@ -175,7 +175,7 @@ def impedance_overlay(found: Comparison) -> Figure:
 
 
 def parts_overlay(found: Comparison) -> Figure:
-    """Plots effective stiffness, damping and mass over frequency; a panel with none is left out.
+    """Plots effective stiffness, damping and mass over frequency; empty panels are omitted.
 
     Args:
         found: all of one kind.
@@ -222,7 +222,7 @@ def transparency_overlay(found: Comparison) -> Figure:
 
 
 def wall_region_plot(found: Comparison) -> Figure:
-    """Plots the walls that each device renders stably, by runs and exact, and the wall itself.
+    """Plots the walls that each device renders stably, by runs and by theory, and its own wall.
 
     Args:
         found: walls.

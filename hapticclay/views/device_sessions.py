@@ -1,7 +1,7 @@
-"""Sessions beside a device: one that is a device for other programs, one whose hand is a device.
+"""Sessions with a device: one serves as a device for other programs, one has a device as its hand.
 
-Their slices are those of the device, a millisecond or two; frames are kept as often as a picture
-needs them.
+Their slices have the period of the device, one or two milliseconds; frames are kept at the rate of
+the picture.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from .live_verdict import LiveVerdict
 from .session import Session, refuse_other
 
 SERVED_SPAN = 0.002  # [s] between two slices of an arm that programs drive
-WATCHED = 1.0  # [s] over which their rate is taken
+WATCHED = 1.0  # [s] over which their rate is averaged
 
 
 class ServedSession(Session):
-    """A session whose arm is a simulated device: programs drive the motors, a person is the hand.
+    """A session with a simulated device: programs drive the motors, a person is the hand.
 
-    The clay of the scenario acts beside their forces; compensator and servo do not act.
+    The clay of the scenario acts in addition to their forces; compensator and servo are off.
 
     Attributes:
         arm: the motors.
-        service: that programs talk to; None before there is one.
+        service: service for the programs; None before it exists.
     """
 
     frame_time = FRAME_TIME
@@ -54,10 +54,10 @@ class ServedSession(Session):
 
         Args:
             scenario: clay, arm and hardware.
-            stiffness: as of a session.
-            tool: at the handle.
-            every: keep each every-th sample.
-            largest_force: longer forces are shortened to this [N], > 0, at most 1e3.
+            stiffness: as in `Session`.
+            tool: tool at the handle.
+            every: keep every `every`-th sample.
+            largest_force: limit on the magnitude of forces [N], > 0, at most 1e3.
 
         Raises:
             ParameterError: a value is out of its bounds, or the scenario is accurate.
@@ -68,7 +68,7 @@ class ServedSession(Session):
         super().__init__(scenario, stiffness, tool, every)
 
     def prepared(self, scenario: Scenario) -> Scenario:
-        """The scenario with motors that do what programs ask.
+        """The scenario with motors commanded by programs.
 
         Args:
             scenario: as it was given.
@@ -80,11 +80,11 @@ class ServedSession(Session):
         return replace(self.undriven, controller=self.arm.controller)
 
     def kernel(self) -> Kernel:
-        """Steps in Python: the motors' law changes while it runs."""
+        """Steps in Python, because the motors' law changes during the run."""
         return PLAIN
 
     def verdict(self) -> LiveVerdict:
-        """Says who drives the arm: whether their loop is stable is told by the loop report."""
+        """Names the programs that drive the arm; the loop report judges their stability."""
         if self.service is None or not self.service.clients:
             return LiveVerdict("no program drives the arm", False)
         force = math.hypot(*self.arm.force)
@@ -93,7 +93,7 @@ class ServedSession(Session):
         return LiveVerdict(f"{who} the arm: {self._rate():.0f} Hz, {force:.2f} N", False)
 
     def _rate(self) -> float:
-        """Messages in a second, of late [Hz]."""
+        """Recent rate of messages [Hz]."""
         assert self.service is not None
         now, count = time.monotonic(), sum(log.count for log in self.service.logs)
         self._seen.append((now, count))
@@ -103,12 +103,12 @@ class ServedSession(Session):
         return (count - fewer) / (now - before) if now > before else 0.0
 
     def record(self) -> Record:
-        """Ends the run and returns its record, without the law that the programs stand for."""
+        """Ends the run and returns its record, without the control law of the programs."""
         return replace(super().record(), scenario=self.undriven)
 
 
 class _Pace:
-    """Slices that are short enough for a program's loop."""
+    """Slices short enough for a program's loop."""
 
     span = SERVED_SPAN
 
@@ -123,7 +123,7 @@ class _Pace:
 
 
 class LiveDevice:
-    """The arm of a session as the device of a service, which the session's player moves."""
+    """The arm of a session as the device of a service; the session's player advances it."""
 
     paced = True
 
@@ -131,7 +131,7 @@ class LiveDevice:
         """The arm of a session.
 
         Args:
-            session: which may begin anew.
+            session: the session; it may restart.
         """
         self._session = session
 
@@ -152,21 +152,21 @@ class LiveDevice:
 
     @property
     def torques(self) -> tuple[float, float]:
-        """Torques that act beside that force [N.m]."""
+        """Torques in addition to that force [N.m]."""
         return self._session.arm.asked.torques
 
     @property
     def ended(self) -> str:
-        """ "": a person may begin the session again."""
+        """Always "", because a person may restart the session."""
         return ""
 
     @property
     def scenario(self) -> Scenario:
-        """What is simulated."""
+        """The simulated scenario."""
         return self._session.undriven
 
     def drive(self, drive: Drive) -> tuple[float, float]:
-        """Changes what the motors do from the next control sample on.
+        """Changes the drive of the motors from the next control sample on.
 
         Args:
             drive: in the plane of the arm.
@@ -177,10 +177,10 @@ class LiveDevice:
         return self._session.arm.drive(drive)
 
     def advance(self, samples: int | None = None) -> None:
-        """Does nothing: the player moves the arm.
+        """Does nothing, because the player advances the arm.
 
         Args:
-            samples: are not made.
+            samples: ignored.
         """
 
 
@@ -199,8 +199,8 @@ class DeviceSession(Session):
         Args:
             scenario: clay, gain and arm.
             hand: the device.
-            tool: at the handle.
-            every: keep each every-th sample.
+            tool: tool at the handle.
+            every: keep every `every`-th sample.
 
         Raises:
             ParameterError: a value is out of its bounds, or the scenario is sampled or accurate.
@@ -223,19 +223,19 @@ class DeviceSession(Session):
 
 
 class DevicePartner:
-    """Exchanges force and place with a device, a slice for each sample.
+    """Exchanges force and position with a device, one slice per sample.
 
-    Where the session stands still, the device gets no force.
+    While the session is paused, the device receives no force.
     """
 
     def __init__(self, hand: DeviceHand):
-        """Between a device and a session.
+        """Connects a device to a session.
 
         Args:
             hand: the device.
         """
         self.hand, self.span = hand, hand.client.limits.Ts
-        self._handle: Any = None  # place and velocity of the simulated handle; None at rest
+        self._handle: Any = None  # position and velocity of the simulated handle; None at rest
 
     def exchange(self) -> None:
         """Sends the force of the coupling, and reads the device."""
@@ -246,7 +246,7 @@ class DevicePartner:
             self.hand.exchange(*handle)
 
     def lead(self, play: Session) -> None:
-        """Pulls the handle to where the device is; lets go where that is not known.
+        """Pulls the handle to the position of the device; releases it if the position is unknown.
 
         Args:
             play: the session.
@@ -257,7 +257,7 @@ class DevicePartner:
         play.run.pull.carried = (B * hand.rate[0], B * hand.rate[1]) if held else (0.0, 0.0)
 
     def follow(self, play: Session) -> None:
-        """Takes where the handle has come.
+        """Stores the new position of the handle.
 
         Args:
             play: the session.

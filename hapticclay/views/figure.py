@@ -1,4 +1,4 @@
-"""One figure as a thing: how it is drawn, what numbers it shows, and its files."""
+"""A figure as an object: its drawing, its numbers and its files."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ UNDATED: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None},
 
 
 class Figure:
-    """A figure that can be drawn in every style, and the numbers that it shows.
+    """A figure that can be drawn in every style, with the numbers that it shows.
 
     Args:
-        draw: returns the figure of matplotlib in the style of now (`style.figure_style`), or None
-            where it does not apply.
+        draw: returns the matplotlib figure in the current style (`style.figure_style`), or None if
+            it does not apply.
         tables: the numbers by name of table, and by name and unit of column; or a function that
-            returns them, called when they are asked for; None for the curves as they are drawn.
+            returns them, called on demand; None for the drawn curves.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class Figure:
         self._tables = tables
 
     def draw(self, style: str = "screen") -> matplotlib.figure.Figure | None:
-        """Draws the figure, ready to be shown.
+        """Draws the figure.
 
         Args:
             style: "screen", "print" (8.5 cm wide) or "print-wide" (17.5 cm).
@@ -69,20 +69,20 @@ class Figure:
         style: str = "screen",
         data: bool = False,
     ) -> list[Path]:
-        """Writes the figure, each file whole or not at all; all are made before one is written.
+        """Writes the figure, each file whole or not at all, after all files are rendered.
 
         Args:
-            path: the file; its ending says the format unless `formats` does.
-            formats: of "png", "svg" and "pdf"; path is then without an ending. "png" without
-                either.
-            dpi: pixels an inch, of PNG and of pictures within the others [1/inch]; None for that
-                of the style, 100 on a screen and 300 in print.
+            path: the file; its ending gives the format unless `formats` does.
+            formats: of "png", "svg" and "pdf"; path is then without an ending. Without both it is
+                "png".
+            dpi: pixels per inch of PNG files and of embedded pictures [1/inch]; None for that of
+                the style, 100 on a screen and 300 in print.
             style: "screen", "print" (8.5 cm wide) or "print-wide" (17.5 cm).
             data: whether to write the numbers too: the first table as PATH.csv, each other one as
                 PATH-TABLE.csv.
 
         Returns:
-            The files written; none where the figure does not apply.
+            The files written; none if the figure does not apply.
 
         Raises:
             ParameterError: an unknown format or style, dpi out of bounds, no numbers to write, or
@@ -116,7 +116,7 @@ class Figure:
         return written
 
     def svg(self, style: str = "screen") -> str:
-        """Returns the figure as the text of an SVG file, empty where it does not apply.
+        """Returns the figure as the text of an SVG file, empty if it does not apply.
 
         Args:
             style: as in `draw`.
@@ -124,7 +124,7 @@ class Figure:
         return self._bytes("svg", style).decode()
 
     def png(self, style: str = "screen") -> bytes:
-        """Returns the figure as a PNG file, empty where it does not apply.
+        """Returns the figure as a PNG file, empty if it does not apply.
 
         Args:
             style: as in `draw`.
@@ -147,10 +147,10 @@ def _encoded(figure: matplotlib.figure.Figure, kind: str, dpi: float) -> bytes:
 
 
 def curves_drawn(figure: matplotlib.figure.Figure) -> dict[str, Table]:
-    """Returns the curves of a figure, a table a panel: columns curve, and x and y as labelled.
+    """Returns the curves of a figure, one table per panel: columns curve, and x and y as labelled.
 
     Args:
-        figure: with its curves as lines; what else is drawn is left out.
+        figure: figure with curves as lines; other artists are ignored.
     """
     out: dict[str, Table] = {}
     axes: Any = figure.axes
@@ -176,7 +176,7 @@ def curves_drawn(figure: matplotlib.figure.Figure) -> dict[str, Table]:
 
 
 def csv_text(table: Table) -> str:
-    """Returns a table as CSV; numbers read back as the same bits.
+    """Returns a table as CSV; numbers read back bit-identically.
 
     Args:
         table: columns by name and unit.

@@ -1,4 +1,4 @@
-"""Films of a run: the arm cutting the clay, and its plots growing beside the picture."""
+"""Films of a run: the arm cuts the clay, and plots grow beside the picture."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from ..studies.removal import TOOL, Tool
 from .stage import CAMERAS, Stage, held_words
 
 FRAME_RATES = {".mp4": 30, ".webp": 20, ".gif": 20}  # [1/s], by kind of file
-LEAST_ASPECT = 1.2  # width over height that the cameras of room.xml are made for
+LEAST_ASPECT = 1.2  # aspect ratio for which the cameras of room.xml are designed
 PLOTS_SHARE = 0.375  # of the width
 ONE_LINE_WIDTH = 240  # [pixels] of a picture from which its title is one line
 SOFT_SAMPLES, SOFT_SHADOW = 4, 2048  # a pixel; width of the shadow map [pixels]
@@ -35,14 +35,14 @@ GL_PACKAGES = "apt-get install libegl1 libgl1 (or libosmesa6 and MUJOCO_GL=osmes
 
 @dataclass(frozen=True)
 class FilmOptions:
-    """How a run is filmed.
+    """Options of a film.
 
     Attributes:
         camera: "room", "top" or "close".
         speed: of the film; 1 is real time.
         size: width and height [pixels].
         plots: whether plots grow on the right, if there is room: from 320 x 100.
-        smooth: whether edges and shadows are softened, at twice the time.
+        smooth: whether edges and shadows are softened, which doubles the time.
         tool: at the handle.
     """
 
@@ -68,7 +68,7 @@ class Lens:
             width: of the picture [pixels].
             height: of the picture [pixels].
             camera: of the room.
-            smooth: whether edges and shadows are softened, at twice the time.
+            smooth: whether edges and shadows are softened, which doubles the time.
 
         Raises:
             ParameterError: OpenGL is missing.
@@ -86,7 +86,7 @@ class Lens:
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
         self._camera.fixedcamid = which = model.camera(camera).id
-        if width < LEAST_ASPECT * height:  # keep what the camera shows from left to right
+        if width < LEAST_ASPECT * height:  # keep the camera's horizontal field of view
             half = (
                 math.tan(math.radians(0.5 * model.cam_fovy[which])) * LEAST_ASPECT * height / width
             )
@@ -155,7 +155,7 @@ def _opened(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, mujoco
 
 
 def ready(out: Path, options: FilmOptions = FILM_OPTIONS) -> tuple[str, FilmOptions]:
-    """Checks that a film can be made here; to be called before a long run.
+    """Checks that a film can be made on this machine; call it before a long run.
 
     Args:
         out: the file.
@@ -253,7 +253,7 @@ def frames(
 
 
 def samples_shown(record: Record, speed: float, rate: int) -> np.ndarray:
-    """Counts the samples that each frame of a film has seen.
+    """Counts the samples up to each frame of a film.
 
     Args:
         record: the run.

@@ -1,4 +1,4 @@
-"""Figure of a fitted law of resistance: force against velocity, and what the law leaves."""
+"""Figure of a fitted law of resistance: force against velocity, and residuals."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .style import (
 DOTS_SHOWN = 6000  # of a panel
 BINS = 24  # of speeds, in which residuals are averaged
 LEAST_IN_BIN = 5
-LEAST_RESIDUAL = 1e-3  # share of the largest force that a panel of residuals shows at least
+LEAST_RESIDUAL = 1e-3  # least range of a panel of residuals, as a share of the largest force
 LAGS = 60  # of the autocorrelation
 DOTS: Any = dict(mew=0.0, color=BLUE, alpha=0.45, zorder=2.2, rasterized=True)
 
@@ -77,7 +77,7 @@ def fit_plot(fitted: Fitted) -> Figure:
 
 
 def _fitted_curve(ax: Axes, fitted: Fitted) -> None:
-    """The law on both sides of rest as far as the data go, and its band."""
+    """The law on both sides of rest over the range of the data, and its band."""
     for way in (-1.0, 1.0):
         speeds = np.abs(fitted.v[fitted.v * way > 0.0])
         if not len(speeds):
@@ -94,7 +94,7 @@ def _fitted_curve(ax: Axes, fitted: Fitted) -> None:
 
 
 def _interval(value: float, low: float, high: float) -> str:
-    """A value with its interval, to the digits that the interval allows."""
+    """A value with its interval, rounded to the precision of the interval."""
     width = max(high - low, 1e-6 * abs(value), 1e-300)
     digits = int(np.clip(1 - np.floor(np.log10(width)), 0, 9))
     return f"{value:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
@@ -121,7 +121,7 @@ def _residual_panel(ax: Axes, x: np.ndarray, left: np.ndarray, label: str, least
 
 
 def _binned(ax: Axes, fitted: Fitted) -> None:
-    """Mean residual of samples of like velocity, with its 95 % bars."""
+    """Mean residual of samples of similar velocity, with its 95 % bars."""
     v, left = fitted.v, fitted.residuals
     edges = np.quantile(v, np.linspace(0.0, 1.0, BINS + 1))
     place = np.clip(np.searchsorted(edges, v, "right") - 1, 0, BINS - 1)

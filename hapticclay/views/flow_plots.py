@@ -1,4 +1,4 @@
-"""Force over velocity in clay that yields."""
+"""Force over velocity in yielding clay."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def force_velocity_plot(record: Record) -> Figure:
     """Plots the force of clay that yields over the velocity, with the law of each region.
 
     Clay that resists along the motion has one panel: force and speed along the motion, negative
-    where the handle goes back. Otherwise each axis on which it yields has one, of the clay's own
-    axes where they are rotated. b v is left out of forces and laws where b is not one number a
+    where the handle moves back. Otherwise each axis with a yield force has a panel; rotated clay
+    uses its own axes. The term b v is omitted from forces and laws where b is not constant in a
     region.
 
     Args:
@@ -89,12 +89,12 @@ def force_velocity_plot(record: Record) -> Figure:
 
 
 def flows_met(record: Record, i: int, whole: bool = True) -> dict[Flow, np.ndarray]:
-    """Samples in each flow of an axis that yields, those with the most samples first.
+    """Samples in each flow of a yielding axis, ordered by decreasing number of samples.
 
     Args:
         record: the run, in clay.
         i: axis, 0 for x, 1 for y.
-        whole: whether flows that differ in b alone are told apart.
+        whole: whether flows that differ only in b are distinguished.
 
     Returns:
         Indices by flow.
@@ -117,7 +117,7 @@ def _forces_over_velocity(
     force: np.ndarray,
     held: np.ndarray,
 ) -> None:
-    """Draws measured forces, those of a handle that is held, and the laws."""
+    """Draws measured forces, forces on a held handle, and the laws."""
     for flow, where in met.items():
         some = spread(where[~held[where]], MOST_DOTS)
         ax.plot(v[some], force[some], ".", color=colors[flow], ms=stroke(6), mew=0)
@@ -132,7 +132,7 @@ def _forces_over_velocity(
 
 
 def law_curve(flow: Flow, low: float, high: float, back: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Velocities [m/s] and forces [N] of a law, and at rest the forces that it can hold.
+    """Velocities [m/s] and forces [N] of a law, including the range of holding force at rest.
 
     Args:
         flow: the law.
@@ -140,7 +140,7 @@ def law_curve(flow: Flow, low: float, high: float, back: bool) -> tuple[np.ndarr
         high: largest velocity [m/s].
         back: whether it held the handle against a push in either direction.
     """
-    share = np.linspace(0.0, 1.0, 200)[1:] ** 3  # close together where |v|^n bends
+    share = np.linspace(0.0, 1.0, 200)[1:] ** 3  # dense where |v|^n is curved
     up = share * high if high > 0.0 else np.zeros(0)
     down = share[::-1] * low if low < 0.0 else np.zeros(0)
     least = -flow.Fy if back or low < 0.0 else 0.0

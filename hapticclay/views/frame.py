@@ -1,4 +1,4 @@
-"""The state of a session in a frame, and who listens to it."""
+"""The state of a session in a frame, and its listeners."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from typing import Any, NamedTuple, Protocol
 
 
 class Listener(Protocol):
-    """Takes each slice of a session or a replay, as a `UdpStream` does."""
+    """Receives each slice of a session or a replay, as a `UdpStream` does."""
 
     def send(self, play: Any) -> None:
-        """Takes a slice.
+        """Receives a slice.
 
         Args:
-            play: the session or replay that has played it.
+            play: the session or replay that played it.
         """
 
 
 class Partner(Protocol):
-    """A device beside a session, whose slices follow its samples.
+    """A device coupled to a session, whose slices follow its samples.
 
     Attributes:
         span: real time between two slices [s].
@@ -26,17 +26,17 @@ class Partner(Protocol):
     span: float
 
     def exchange(self) -> None:
-        """Talks to the device, and may wait for it; other threads may use the session meanwhile."""
+        """Talks to the device, may wait for it; other threads may use the session meanwhile."""
 
     def lead(self, play: Any) -> None:
-        """Tells the session what the device did, before a slice.
+        """Passes the state of the device to the session before a slice.
 
         Args:
             play: the session.
         """
 
     def follow(self, play: Any) -> None:
-        """Takes what the device is to be told, after a slice.
+        """Stores the state for the device after a slice.
 
         Args:
             play: the session.
@@ -44,7 +44,7 @@ class Partner(Protocol):
 
 
 class Frame(NamedTuple):
-    """State at the end of a slice, for plots that run along.
+    """State at the end of a slice, for live plots.
 
     Attributes:
         t: time [s].
@@ -52,7 +52,7 @@ class Frame(NamedTuple):
         v: velocity of the handle [m/s], (2,).
         fe: force of the clay [N], (2,).
         fh: force of the hand [N], (2,).
-        held: whether clay that yields holds the handle still, along x and along y.
+        held: whether yielding clay holds the handle, along x and along y.
     """
 
     t: float

@@ -1,4 +1,4 @@
-"""What a run leaves of clay that stays cut."""
+"""Figure of clay that stays cut, after a run."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .style import (
 
 
 def ground_plot(record: Record) -> Figure:
-    """Plots what a run has left of clay that stays cut, and the path of the tool.
+    """Plots the remaining clay after a run, and the path of the tool.
 
     Args:
         record: the run, in a groove.
@@ -63,7 +63,7 @@ def ground_plot(record: Record) -> Figure:
 
 
 def ground_of(record: Record) -> Any:
-    """The cells that were cut in a run: see `Clay.ground`.
+    """The cells cut in a run: see `Clay.ground`.
 
     Args:
         record: the run.

@@ -1,4 +1,4 @@
-"""Responses that were identified, drawn."""
+"""Figures of identified responses."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from .style import (
 
 
 class PlottedBlock(NamedTuple):
-    """How an identified block is presented.
+    """Labels of an identified block.
 
     Attributes:
         figure: file name, after the figure of the paper.

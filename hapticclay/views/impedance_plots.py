@@ -1,4 +1,4 @@
-"""Figures of the impedance that a hand feels, and of what a device renders stably."""
+"""Figures of the impedance at the hand, and of the stable renderings of a device."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ PART_LABELS = {"M": "virtual mass M [kg]", "B": "virtual damper B [N.s/m]", "K":
 def impedance_plot(found: MeasuredImpedance) -> Figure:
     """Plots effective stiffness, damping and mass over frequency, measured and computed.
 
-    Thin lines are the values that are rendered. A panel in which nothing is felt is left out.
+    Thin lines are the rendered values. Empty panels are omitted.
 
     Args:
         found: from `measure_impedance`.
@@ -214,7 +214,7 @@ def least_mass_plot(found: ArmMBK) -> Figure:
 
 
 def rendered_part(subject: Subject, part: str) -> float | None:
-    """Value of a part that a wall or clay renders, beside the effective one; None for none.
+    """Rendered value of a part of a wall or clay, for comparison with the effective one; or None.
 
     Args:
         subject: a wall or a loop.
@@ -256,7 +256,7 @@ def _border_dots(ax: Axes, borders: tuple[Border, ...]) -> None:
 
 
 def _scale(ax: Axes, y: np.ndarray, also: float | None, log: bool = True) -> None:
-    """A scale that shows zero, or where log is True and positive values span much, that of logs."""
+    """A linear scale with zero, or logarithmic if log is True and positive values span much."""
     some = y[np.isfinite(y)]
     some = np.append(some, also) if also is not None else some
     if log and some.min() > 0.0 and some.max() / some.min() > LOG_SPAN:

@@ -1,4 +1,4 @@
-"""The run of a session: a hand that pulls to a point, steps made in slices."""
+"""The run of a session: a hand pulls to a point, and steps are made in slices."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from ..stepping import monitor, path
 from ..stepping.run import PLAIN, Kernel, Run
 
 LONGEST_SESSION = 3600.0  # [s]
-PULL_MARGIN = (0.05, 0.02)  # of the point pulled to, to the folded and the stretched arm [m]
-KEEPS_UP = 0.4  # of real time, that steps may take; the rest is for the picture
+PULL_MARGIN = (0.05, 0.02)  # distance of the target point from the folded and the stretched arm [m]
+KEEPS_UP = 0.4  # share of real time for steps; the rest is for the picture
 
 
 class Pull:
-    """The muscle force of a hand that pulls to a point through the spring of its impedance.
+    """The muscle force of a hand that pulls to a point with the spring of its impedance.
 
-    The force is k times the position of the point. With the impedance of the hand, which the loop
-    holds against p itself, this makes fh = -Th applied to p - point.
+    The force is k times the position of the point. The loop applies the impedance of the hand to p,
+    so the sum is fh = -Th applied to p - point.
 
     Attributes:
         spring: k of x and y [N/m], (2,).
-        force: steady force beside it [N], (2,).
-        carried: force by which the damper of a hand that moves along carries the handle [N], (2,).
+        force: additional steady force [N], (2,).
+        carried: force of the damper of a moving hand on the handle [N], (2,).
         knots: (t [s], x, y [m]) of the point's path so far.
     """
 
     def __init__(self, spring: tuple[float, float], p: tuple[float, float]):
-        """Puts the point at the handle.
+        """Places the point at the handle.
 
         Args:
             spring: k of x and y [N/m].
@@ -47,22 +47,22 @@ class Pull:
         self._from, self._rate, self._since = np.array(p), np.zeros(2), 0.0
 
     def lead(self, t: float, to: tuple[float, float], span: float) -> None:
-        """Moves the point evenly to a place.
+        """Moves the point to a place at constant speed.
 
         Args:
-            t: from when on [s].
+            t: start time [s].
             to: the place [m].
-            span: time to get there [s].
+            span: duration of the motion [s].
         """
         now = self.at(t)
         self._from, self._rate, self._since = now, (np.array(to) - now) / span, t
         self.knots += [(t, *now), (t + span, *to)]
 
     def jump(self, t: float, p: tuple[float, float], v: tuple[float, float]) -> None:
-        """Lets go: the point moves with the handle.
+        """Releases the handle: the point moves with it.
 
         Args:
-            t: from when on [s].
+            t: start time [s].
             p: position of the handle [m].
             v: velocity of the handle [m/s].
         """
@@ -88,18 +88,18 @@ class Pull:
 
         Args:
             t: centre of the interval [s].
-            h: half its length [s]; the force changes evenly, and h does not matter.
+            h: half its length [s]; ignored, because the force changes linearly.
         """
         return np.array(self.force) + np.array(self.carried) + self.spring * self.at(t)
 
 
 class LiveRun(Run):
-    """A run that goes on slice by slice, and whose muscle, gain and clay may change in between.
+    """A run in slices, whose muscle force, gain and clay may change between slices.
 
     Args:
-        scenario: what to run.
+        scenario: scenario to run.
         every: keep each every-th sample.
-        kernel: how the steps are made.
+        kernel: kernel of the steps.
 
     Attributes:
         pull: the muscle.
@@ -111,13 +111,13 @@ class LiveRun(Run):
         super().__init__(scenario, every, kernel)
         x, y = (th or NO_HAND for th in scenario.operators)
         self.pull = Pull((x.spring, y.spring), scenario.start)
-        # motion is the person's: growing motion is no instability while the gain is below its limit
+        # a person moves it: growing motion is no instability while the gain is below its limit
         self.watch = monitor.StabilityMonitor(replace(scenario, muscle=Multisine()))
         self.keeping = True
         self.gains = [(0, scenario.gain)]
 
     def slice(self, steps: int) -> None:
-        """Makes this many steps, unless the run ends.
+        """Makes the given number of steps, unless the run ends.
 
         Args:
             steps: number of steps.
@@ -129,7 +129,7 @@ class LiveRun(Run):
             self.flush()
 
     def change(self, scenario: Scenario) -> None:
-        """Goes on with another gain, or with other damping between the same borders.
+        """Continues with another gain, or with other damping between the same borders.
 
         Args:
             scenario: with the new gain and clay.
@@ -141,7 +141,7 @@ class LiveRun(Run):
 
     @property
     def held(self) -> tuple[bool, bool]:
-        """Whether clay that yields holds the handle still, along x and along y."""
+        """Whether yielding clay holds the handle, along x and along y."""
         reaction = self.state.clay.reaction
         if reaction is None or reaction.contact is None:
             return False, False
@@ -149,7 +149,7 @@ class LiveRun(Run):
         return bool(x), bool(y)
 
     def judge(self, made: np.ndarray) -> int:
-        """As Run.judge; forgets the samples while they are not to be kept.
+        """As Run.judge; discards the samples while recording is off.
 
         Args:
             made: as in Run.judge.
@@ -161,14 +161,14 @@ class LiveRun(Run):
         return good
 
     def end(self) -> None:
-        """Ends the run here, as one that reached its end."""
+        """Ends the run, with the status of a completed run."""
         self.state = path.closed(self.state)
         self.advance(self.filled + 1)
         self.flush()
 
 
 def live_kernel(scenario: Scenario) -> Kernel:
-    """How the steps of a session are made: compiled where Python could not keep up with real time.
+    """The kernel of a session: compiled where Python would be slower than real time.
 
     Args:
         scenario: that is played.
@@ -183,11 +183,11 @@ def live_kernel(scenario: Scenario) -> Kernel:
 
 
 def played(scenario: Scenario, stiffness: float = 1.0) -> Scenario:
-    """Returns the scenario as a session runs it: a person as the muscle, and no end of the path.
+    """Returns the scenario of a session: a person as the muscle, and no end of the path.
 
     Args:
         scenario: clay, gain and arm.
-        stiffness: factor on the spring of Th; its damper takes the square root.
+        stiffness: factor on the spring of Th; its damper has the square root as factor.
     """
     stiffness = number("stiffness", stiffness, 1e-3, 1e4)
     x, y = (

@@ -1,4 +1,4 @@
-"""Whether the loop of a session is stable, and what its clay resists with."""
+"""Stability of the loop of a session, and the resistance of its clay."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from ..scene.scenario import Scenario
 from ..stepping.monitor import Outcome
 from ..theory import gain_limits
 
-CALM_TIME = 1.0  # [s] without growing swings after which an unstable arm is called calm
+CALM_TIME = 1.0  # [s] without growing oscillation after which an unstable arm counts as calm
 
 
 def is_viscous(scenario: Scenario, p: tuple[float, float]) -> bool:
-    """Whether the clay at a place is viscous: elsewhere the linear loop's limit of K does not hold.
+    """Whether the clay at a place is viscous; otherwise the linear gain limit does not apply.
 
     Args:
         scenario: of the run.
@@ -25,7 +25,7 @@ def is_viscous(scenario: Scenario, p: tuple[float, float]) -> bool:
 
 
 def clay_here(scenario: Scenario, p: tuple[float, float], b: tuple[float, float]) -> str:
-    """What the clay at a place resists with, in a window.
+    """Text of the clay's resistance at a place, for the window.
 
     Args:
         scenario: of the run.
@@ -38,11 +38,11 @@ def clay_here(scenario: Scenario, p: tuple[float, float], b: tuple[float, float]
 
 @dataclass(frozen=True)
 class LiveVerdict:
-    """A verdict on the loop at present.
+    """The current verdict on the loop.
 
     Attributes:
         text: one line.
-        unstable: whether the arm swings with growing amplitude.
+        unstable: whether the arm oscillates with growing amplitude.
     """
 
     text: str
@@ -60,8 +60,8 @@ def live_verdict(
     Args:
         gain: K [1/kg].
         limit: of K in the clay at the handle; None if unknown.
-        onset: instability that the monitor has found; None for none.
-        swings: whether the arm still swings.
+        onset: instability found by the monitor; None for none.
+        swings: whether the arm still oscillates.
     """
     far = limit or (math.inf, math.inf)
     above = [
@@ -87,7 +87,7 @@ def live_verdict(
 def live_gain_limits(scenario: Scenario, b: tuple[float, float]) -> tuple[float, float]:
     """Returns the gain limit of the linear loop on each axis [1/kg], inf for none.
 
-    It is that of continuous time at the nominal pose.
+    It applies to continuous time at the nominal pose.
 
     Args:
         scenario: the run.

@@ -1,4 +1,4 @@
-"""The figure of a loop report: the wall that a client rendered beside what its loop carries."""
+"""The figure of a loop report: the wall of a client and the stable walls of its loop."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ INSIDE_ALPHA = 0.22
 
 
 def loop_plot(report: LoopReport) -> Figure:
-    """Plots the walls that a client's period, delay and hand carry, and the wall it rendered.
+    """Plots the stable walls for a client's period, delay and hand, and the wall it rendered.
 
     Args:
         report: from `loop_report`.
@@ -59,7 +59,7 @@ def loop_plot(report: LoopReport) -> Figure:
 
 
 def _window(report: LoopReport) -> tuple[float, float]:
-    """B and K up to which the plane is shown: as far as the line is within reach of the wall."""
+    """Upper limits of B and K in the figure, from the wall and the line near it."""
     if math.isnan(report.K):
         return 1.0, 1.0
     limit = report.limit if math.isfinite(report.limit) else 0.0
@@ -70,7 +70,7 @@ def _window(report: LoopReport) -> tuple[float, float]:
 
 
 def _parts(report: LoopReport, told: bool) -> list[str]:
-    """What the title says."""
+    """Phrases of the title."""
     if not told:
         return [report.note]
     late = f"{report.delay / report.period:.2g} samples late"

@@ -66,8 +66,8 @@ class Page:
         url: address of the page, with the token if it needs one.
         port: of the page.
         guard: admits the requests.
-        server: viser's.
-        player: plays the session.
+        server: viser's server.
+        player: player of the session.
         stage: holds the map of the clay.
     """
 
@@ -161,7 +161,7 @@ class Page:
             grid, origin = self.stage.removal, self.session.scenario.origin
             self._plan, faces = _clay_sheet(grid.x + origin[0], grid.y + origin[1])
             look: Any = dict(color=rgb_bytes(CLAY_DEEP), flat_shading=True, side="front")
-            look.update(cast_shadow=False, receive_shadow=0.45)  # its own would be all stripes
+            look.update(cast_shadow=False, receive_shadow=0.45)  # self-shadowing gives stripes
             self._clay = add.add_mesh_simple("/clay", self._vertices(), faces, **look)
         self._arrow: Any = None
         if self.session.scenario.clay and self.session.scenario.clay.holding:
@@ -263,10 +263,10 @@ class Page:
             act()
 
     def _slid(self, slider: Any, act: Callable[[], None]) -> None:
-        """Acts on a slider; a number out of its range, typed beside it, becomes the range's end."""
+        """Handles a slider; a number typed out of its range is clipped to the range."""
         if slider.min <= slider.value <= slider.max:
             self._locked(act)
-        else:  # an update that comes here again
+        else:  # an update that triggers this callback again
             slider.value = slider.max if slider.value > slider.max else slider.min
 
     def _change_gain(self) -> None:
@@ -275,7 +275,7 @@ class Page:
         self.session.change(gain=(K, K * first[1] / (first[0] or 1.0)))
 
     def _press(self) -> None:
-        """Presses along the scenario's force, along x without one."""
+        """Presses along the scenario's force, or along x if there is none."""
         fx, fy = self.session.given.force
         size = math.hypot(fx, fy)
         along = (fx / size, fy / size) if size else (1.0, 0.0)
@@ -336,7 +336,7 @@ class Page:
             self.status.content, self.verdict.content = f"{status}  \n{removed}", banner
 
     def _point_arrow(self, frame: Frame, q: Any) -> None:
-        """Shows the force of clay that yields."""
+        """Shows the force of yielding clay."""
         stage = self.stage
         stage.pose(q)
         stage.push(frame.fe, all(frame.held))
@@ -380,7 +380,7 @@ def _clay_sheet(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _by_position(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The curve as a function of x, as uPlot needs it; where the hand came twice, its last pass."""
+    """The curve as a function of x, as uPlot requires; of repeated passes the last."""
     grid = np.linspace(x.min(), max(x.max(), x.min() + 0.1), PLOT_POINTS)
     out = np.zeros(PLOT_POINTS)
     for k in range(len(x) - 1):
@@ -400,13 +400,13 @@ NO_TOKEN = "hapticclay: the address lacks the token that was printed at the star
 class Guard:
     """Admits requests that name this machine and come from its own page.
 
-    A foreign page can make a browser send requests here, under our name or under its own (DNS
-    rebinding), but it cannot forge the Host and Origin headers. Where other machines can connect, a
-    token is required as well: first in the address (?token=), then in a cookie.
+    A foreign page can make a browser send requests to this server, under our name or under its own
+    (DNS rebinding), but it cannot forge the Host and Origin headers. Where other machines can
+    connect, a token is required as well: first in the address (?token=), then in a cookie.
 
     Attributes:
         host: address that the page listens on.
-        token: required of each request; "" for none.
+        token: token required in each request; "" for none.
     """
 
     host: str
@@ -469,14 +469,14 @@ def _listening(host: str, port: int) -> socket.socket:
 def _guarded(listening: socket.socket, guard: Guard) -> Iterator[None]:
     """Makes the server that viser starts meanwhile listen on a socket, behind a guard.
 
-    viser has no setting for either. Should a later viser start its server another way, it finds the
+    viser has no setting for either. If a later viser starts its server differently, it finds the
     port taken and listens elsewhere, which Page refuses.
     """
     from websockets.asyncio import server
 
     serve = server.serve
     quiet = logging.Logger("page")
-    quiet.addHandler(logging.NullHandler())  # requests that are not HTTP are no news
+    quiet.addHandler(logging.NullHandler())  # do not log requests that are not HTTP
 
     def guarded(handler: Any, host: str, port: int, *, process_request: Any, **options: Any) -> Any:
         def answer(connection: Any, request: Any) -> Any:
@@ -505,11 +505,11 @@ def _guarded(listening: socket.socket, guard: Guard) -> Iterator[None]:
 
 
 def _url_host(host: str) -> str:
-    """The host of an address: for "all addresses" the one by which others know this machine."""
+    """The host of an address: for "all addresses" the address of this machine for others."""
     if host in ("", "0.0.0.0", "::"):
         try:
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
-                s.connect(("192.0.2.1", 9))  # nowhere: asks for a route and sends nothing
+                s.connect(("192.0.2.1", 9))  # selects a route without sending anything
                 host = s.getsockname()[0]
         except OSError:
             host = socket.gethostname()

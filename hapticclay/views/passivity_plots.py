@@ -28,13 +28,13 @@ from .style import (
 
 HERTZ = 2.0 * np.pi
 ACTIVE_LABEL = "active"
-ACTIVE_ROOM = 0.15  # share of the height that the half plane takes, at least, to be named
+ACTIVE_ROOM = 0.15  # least share of the height of a labelled half plane
 BELOW_ZERO = 0.03  # share of the height shown below 0 where no curve is active
 REGION_MARKS = ("o", "s", "^", "D", "v")
 
 
 def index_plot(found: IndexOverFrequency) -> Figure:
-    """Plots the damping to spare over frequency, theory as lines and runs as marks.
+    """Plots the excess damping over frequency, theory as lines and runs as marks.
 
     Args:
         found: from `wall_index` or `arm_index`.
@@ -72,7 +72,7 @@ def index_plot(found: IndexOverFrequency) -> Figure:
 
 
 def _shade_active(ax: Axes) -> None:
-    """Shades the half plane in which a hand can draw energy; names it at the emptier corner."""
+    """Shades the half plane in which a hand can draw energy, labelled in the emptier corner."""
     points = np.concatenate([line.get_xydata() for line in ax.lines])
     points = points[np.isfinite(points).all(axis=1)]
     least = float(points[:, 1].min(initial=0.0))
@@ -97,7 +97,7 @@ def _shade_active(ax: Axes) -> None:
 
 
 def port_energy_plot(found: EnergyOverTime) -> Figure:
-    """Plots the energy that rendered clay has taken, and the velocity, of both runs.
+    """Plots the energy absorbed by rendered clay, and the velocity, of both runs.
 
     Args:
         found: from `energy_over_time`.
@@ -128,7 +128,7 @@ def port_energy_plot(found: EnergyOverTime) -> Figure:
 
 
 def region_plot(found: PassiveRegion) -> Figure:
-    """Plots the largest passive stiffness over the control sample, a line a delay, with runs.
+    """Plots the largest passive stiffness over the control sample, one line per delay, with runs.
 
     Args:
         found: from `passive_region`.

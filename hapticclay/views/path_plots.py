@@ -63,7 +63,7 @@ def path_plot(record: Record) -> Figure:
 
 
 def _clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
-    """Shades each region of the clay and names what it resists with."""
+    """Shades each region of the clay and labels its resistance."""
     for block in clay.blocks:
         (x0, x1), (y0, y1) = block.x, block.y
         size = 100.0 * (x1 - x0), 100.0 * (y1 - y0)
@@ -91,7 +91,7 @@ def _clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
 
 
 def _clay_image(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
-    """Shades clay of many cells by a picture of it [cm]."""
+    """Shades clay of many cells with an image [cm]."""
     x, y = (np.linspace(low[i], high[i], PICTURE_SIZE + 1) for i in (0, 1))
     middle = 0.005 * (x[1:] + x[:-1]), 0.005 * (y[1:] + y[:-1])
     share = clay_share(clay, middle[0], middle[1][:, None])

@@ -15,12 +15,12 @@ PATH = 600  # points of a path that are drawn
 
 
 class Plan(NamedTuple):
-    """What a picture shows.
+    """Content of a picture.
 
     Attributes:
         joints: shoulder, elbow and handle [m], shape (3, 2).
         path: of the handle [m], shape (n, 2).
-        line: to be followed [m], shape (k, 2); None for none.
+        line: reference line [m], shape (k, 2); None for none.
         blocks: of clay, (x, y, width, height) [m]; () for clay everywhere.
         radius: of the tool [m].
         close: middle of the closer view and half its side, (x, y, half) [m].
@@ -37,7 +37,7 @@ class Plan(NamedTuple):
 
 
 class PlanPicture:
-    """A picture that is drawn again and again.
+    """A picture that is redrawn repeatedly.
 
     Args:
         window: whether to show it in a window, where matplotlib has a display.
@@ -60,7 +60,7 @@ class PlanPicture:
         """Draws.
 
         Args:
-            plan: what to show.
+            plan: content of the picture.
 
         Returns:
             Pixels, shape (height, width, 3), uint8; None where a window shows them.
@@ -108,7 +108,7 @@ def _fill(ax: Any, plan: Plan, closer: bool) -> None:
             Rectangle((unit * x, unit * y), unit * w, unit * h, color=style.CLAY_PALE, lw=0)
         )
     if plan.blocks:
-        for point in plan.path[-PATH:]:  # what the tool has taken away
+        for point in plan.path[-PATH:]:  # the removed clay
             ax.add_patch(Circle(unit * point, unit * plan.radius, color=ax.get_facecolor(), lw=0))
     if plan.line is not None:
         ax.plot(*(unit * plan.line.T), color=style.BLACK, lw=1.0, ls="--", label="line")

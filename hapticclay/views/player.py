@@ -16,19 +16,19 @@ class Player(threading.Thread):
 
     Attributes:
         play: what is played.
-        lock: to be held by any other thread that reads or changes it.
-        error: that ended the thread, None if none did.
+        lock: lock for other threads that read or change the session.
+        error: error that ended the thread; None for none.
     """
 
     def __init__(self, play: Session | Replay):
-        """Does not play yet: call `start`.
+        """Prepares the thread; call `start` to play.
 
         Args:
             play: what to play.
         """
         super().__init__(name="player", daemon=True)
         self.play = play
-        self.lock = threading.RLock()  # a change of the page's controls calls back at once
+        self.lock = threading.RLock()  # a change of the page's controls calls back immediately
         self.error: Exception | None = None
         self._stop_now = threading.Event()
 
@@ -49,7 +49,7 @@ class Player(threading.Thread):
             self.error = error
 
     def _slice(self, partner: Partner | None) -> None:
-        """Plays on as far as is due."""
+        """Advances to the time that is due."""
         play = self.play
         if play.paused or play.ended:
             play.clock.rest()

@@ -73,12 +73,12 @@ class RecordPlots:
     def force(self, axis: str | None = None, over: str | None = None) -> Figure:
         """The forces of hand and clay: their ratio to the velocity over position (Fig. 8, bottom).
 
-        In a maneuver, in clay that is not viscous, and where `over` is given, the forces themselves
+        In a maneuver, in clay that is not viscous, and if `over` is given, it shows the forces
         (Fig. 11).
 
         Args:
             axis: "x" or "y"; None for the one along which the operator pushes.
-            over: "time" or "position"; None for the ratio where it says more.
+            over: "time" or "position"; None for the ratio where it is more informative.
 
         Raises:
             ParameterError: there is no such axis, or the record has no samples.
@@ -100,7 +100,7 @@ class RecordPlots:
         return _with_picture(path_plots.path_plot(self._sampled()))
 
     def energy(self) -> Figure:
-        """Energy over time: what hand and motors have put in, what the clay took, what moves.
+        """Energy over time: supplied by hand and motors, absorbed by the clay, and kinetic.
 
         See `energy_plot`.
 
@@ -118,7 +118,7 @@ class RecordPlots:
 def energies(record: Record) -> dict[str, np.ndarray]:
     """Energies over time, from the samples.
 
-    Integrals are trapezoidal: they miss what happens between samples kept far apart, and while a
+    Integrals are trapezoidal: they miss changes between samples that are far apart, and while a
     session did not record.
 
     Args:
@@ -144,10 +144,9 @@ def energies(record: Record) -> dict[str, np.ndarray]:
 
 
 def energy_plot(record: Record) -> Figure:
-    """Plots `energies` over time, and as dots what the run itself has added up at every step.
+    """Plots `energies` over time, and as dots the run's own energy balance.
 
-    Hand and motors put in what clay and motion have: without friction, hand + motors = clay +
-    kinetic energy gained.
+    Energy is conserved: without friction, hand + motors = clay + kinetic energy gained.
 
     Args:
         record: of a run.
@@ -176,7 +175,7 @@ def energy_plot(record: Record) -> Figure:
 
 
 def _added_up(record: Record) -> dict[str, float]:
-    """The run's own balance at the end, in the terms of `energies`; empty where it has none."""
+    """The run's own balance at the end, in the terms of `energies`; empty if it has none."""
     e = record.energy
     if not {"muscle", "hand_damper", "hand_stored", "motors", "clay"} <= set(e):
         return {}
@@ -185,7 +184,7 @@ def _added_up(record: Record) -> dict[str, float]:
 
 
 def _with_picture(figure: Figure) -> Figure:
-    """The figure, which a notebook shows although pyplot does not know of it."""
+    """The figure, displayed by a notebook without pyplot."""
 
     def picture() -> bytes:
         file = io.BytesIO()

@@ -1,4 +1,4 @@
-"""A record, played as a session is."""
+"""Playback of a record like a session."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from .live_verdict import LiveVerdict, is_viscous, live_gain_limits, live_verdic
 
 
 class Replay:
-    """A record, played as if it were a session.
+    """A record played like a session.
 
     Attributes:
         source: the record.
         scenario: of the record.
         tool: at the handle, as in the session that was recorded.
-        paused: whether it stands still.
+        paused: whether it is paused.
         clock: of real time.
-        t: time reached [s].
-        n: sample reached.
+        t: current time [s].
+        n: current sample.
         frames: states shown so far.
         stream: as of a session.
         partner: as of a session: None.
@@ -43,17 +43,17 @@ class Replay:
         self.restart()
 
     def restart(self) -> None:
-        """Begins again at the first sample."""
+        """Restarts at the first sample."""
         self.paused, self.clock, self.t, self.n = False, Clock(), 0.0, 0
         self.frames = [self._frame(0)]
 
     @property
     def ended(self) -> str:
-        """How the record ended, once its end is reached; empty before."""
+        """The status of the record once its end is reached; empty before."""
         return self.source.status if self.n >= len(self.source.t) - 1 else ""
 
     def advance(self, seconds: float) -> np.ndarray:
-        """Plays on; not while paused.
+        """Advances, unless paused.
 
         Args:
             seconds: simulated time to play [s].
@@ -73,7 +73,7 @@ class Replay:
 
     @property
     def gain(self) -> tuple[float, float]:
-        """K [1/kg] at present."""
+        """Current K [1/kg]."""
         x, y = (
             self.source.extra["gain"][self.n].tolist()
             if "gain" in self.source.extra
@@ -88,7 +88,7 @@ class Replay:
         return x, y
 
     def verdict(self) -> LiveVerdict:
-        """As of a session; the monitor's finding is the outcome of the record."""
+        """As for a session; the outcome of the record replaces the monitor's finding."""
         r, n, s = self.source, self.n, self.scenario
         found = r.outcome.code in ("diverged", "limit cycle") and r.t[n] >= r.outcome.time
         known = s.control == "continuous" and is_viscous(s, self.frames[-1].p)

@@ -34,9 +34,9 @@ from .style import (
 
 CONTOURS = (0.01, 0.1, 0.5)  # probabilities whose contours are drawn ...
 BOUNDED = 0.1  # ... and the one whose interval is
-LEAST_EVENTS = 2.0  # expected in a cell of that probability, or its contour is left out
+LEAST_EVENTS = 2.0  # least expected count in a cell for its contour to be drawn
 CONTOUR_STYLES = (":", "--", "-")
-MOST_RATIO = 100.0  # of limits that a band shows
+MOST_RATIO = 100.0  # largest ratio of limits shown in a band
 MOST_PANELS = 4
 PANEL_BINS = 10  # of a panel
 PARAMETER_NAMES = {
@@ -67,7 +67,7 @@ def band_plot(band: Band) -> Figure:
         least = float(seen.min()) if seen.size else 1.0
         top = min(1.5 * float(seen.max(initial=least)), MOST_RATIO * least)
 
-        def drawn(y: np.ndarray) -> np.ndarray:  # no limit leaves the figure upwards
+        def drawn(y: np.ndarray) -> np.ndarray:  # hands without a limit lie above the figure
             return np.minimum(y, 1e6 * top)
 
         low, high = drawn(band.quantile(0.05)), drawn(band.quantile(0.95))
@@ -79,7 +79,7 @@ def band_plot(band: Band) -> Figure:
         ax.plot(band.x, drawn(band.nominal), color=BLACK, ls=":", label="hand of medians")
         if _spans_decades(band.x):
             ax.set_xscale("log")
-        if top > LOG_SPAN * least:  # limits of 0 leave it downwards
+        if top > LOG_SPAN * least:  # limits of 0 lie below it
             ax.set_yscale("log", nonpositive="clip")
             ax.set_ylim(0.5 * least, top)
         else:
@@ -92,7 +92,7 @@ def band_plot(band: Band) -> Figure:
 
 
 def instability_plot(result: Instability) -> Figure:
-    """Plots the probability of instability: over the grid, or over each parameter that varies.
+    """Plots the probability of instability over the grid, or over each varying parameter.
 
     Args:
         result: of `monte_carlo`.
@@ -117,7 +117,7 @@ def instability_plot(result: Instability) -> Figure:
 
 
 def _panels(result: Instability) -> list[RiskMap]:
-    """Charts over the parameters that vary, those that tell most first."""
+    """Charts over the varying parameters, the most influential first."""
     varied = [
         n
         for n in result.trials.names
@@ -149,7 +149,7 @@ def _risk_plane(result: Instability) -> Figure:
     x_name, y_name = chart.x_name, chart.y_name
     x, y, share = chart.x, chart.y, chart.probability
     low, high = chart.interval()
-    turned = x_name == "K"  # the limit is that of K: it goes upwards
+    turned = x_name == "K"  # the limit is one of K, on the vertical axis
     if turned:
         x_name, y_name, x, y = y_name, x_name, y, x
         share, low, high = share.T, low.T, high.T
@@ -216,7 +216,7 @@ def _spans_decades(values: np.ndarray) -> bool:
 
 
 def _cell_borders(values: np.ndarray) -> np.ndarray:
-    """Borders half way between the values, on the scale they are drawn on."""
+    """Borders half way between the values, on the scale of the axis."""
     if len(values) == 1:
         return values[0] + np.array([-0.5, 0.5])
     return map_edges(values, _spans_decades(values))

@@ -31,11 +31,11 @@ MOST_DOTS = 20_000  # of a kind in a plot
 
 
 def spread(where: np.ndarray, most: int) -> np.ndarray:
-    """At most so many of some indices, evenly.
+    """Evenly spaced selection of indices, at most a given number.
 
     Args:
         where: the indices.
-        most: how many.
+        most: largest number of indices.
     """
     return where[:: -(-len(where) // most) or 1]
 
@@ -86,7 +86,7 @@ def held_spans(record: Record, axis: str) -> list[tuple[float, float]]:
 
 
 def is_viscous(s: Scenario) -> bool:
-    """Whether the clay of a scene is viscous; no clay is.
+    """Whether the clay of a scene is viscous; true without clay.
 
     Args:
         s: the scenario.
@@ -129,7 +129,7 @@ def position_axes(record: Record, axes: str) -> tuple[Figure, list[Axes]]:
 
 
 def shades(record: Record, axis: str) -> tuple[list[float], list[float]]:
-    """Borders [m] and force of a slow cut [N] along an axis; of a grid, as the path met them.
+    """Borders [m] and force of a slow cut [N] along an axis; for a grid, along the path.
 
     Args:
         record: the run.
@@ -155,13 +155,13 @@ def shades(record: Record, axis: str) -> tuple[list[float], list[float]]:
 
 
 def steps_of_law(ax: Axes, record: Record, i: int, law: Any, **look: Any) -> None:
-    """Draws law(b) over each stretch of the path that had one b.
+    """Draws law(b) over each stretch of the path with constant b.
 
     Args:
         ax: axes over the position [cm].
         record: the run.
         i: axis, 0 for x, 1 for y.
-        law: what to draw, of the damping [N.s/m].
+        law: function to draw, of the damping [N.s/m].
         **look: of the lines.
     """
     pieces = record.stretches(AXES[i])

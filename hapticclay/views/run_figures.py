@@ -50,7 +50,7 @@ def _force(record: Record) -> Figure | None:
 
 
 def _path(record: Record) -> Figure | None:
-    """Where the handle may leave the line of one experiment: driven, or in clay of an image."""
+    """The path, if the handle may leave a straight line: driven, or in clay of an image."""
     s = record.scenario
     if s.clay is None or record.ground is not None:  # which shows the path
         return None
@@ -89,7 +89,7 @@ def _stretches(record: Record) -> dict[str, dict[str, Any]]:
 
 
 def _cells(record: Record) -> dict[str, dict[str, Any]]:
-    """What is left of each cell of clay that stays cut."""
+    """Remaining clay in each cell of clay that stays cut."""
     if record.ground is None:
         return {}
     x, y = (0.5 * (e[1:] + e[:-1]) for e in ground_of(record).edges)
@@ -101,8 +101,8 @@ class RunFigure(NamedTuple):
     """A figure of a run.
 
     Attributes:
-        draw: returns it for a record, or None where it does not apply.
-        columns: of the record, whose samples it shows.
+        draw: returns the figure for a record, or None if it does not apply.
+        columns: columns of the record that it shows.
         tables: other numbers that it shows, by the name of their table and of their column.
     """
 
@@ -124,7 +124,7 @@ COLUMN_UNITS = {"p": "m", "v": "m/s", "fh": "N", "fe": "N", "b": "N.s/m"}
 
 
 def record_figures(record: Record) -> dict[str, shown.Figure]:
-    """Returns every figure of FIGURES, to be drawn in any style; some may not apply to the run.
+    """Returns every figure of FIGURES, for any style; some may not apply to the run.
 
     Args:
         record: the run.
@@ -153,7 +153,7 @@ def run_tables(record: Record, name: str) -> dict[str, dict[str, Any]]:
 
 
 def figure_files(folder: Path) -> set[Path]:
-    """Lists the files that figures of FIGURES, in any format, and their numbers have in a folder.
+    """Lists the files of the FIGURES, in any format, and of their numbers in a folder.
 
     Args:
         folder: of a record.

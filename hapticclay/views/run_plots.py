@@ -67,8 +67,8 @@ def velocity_plot(record: Record, axis: str = "x") -> Figure:
 def force_ratio_plot(record: Record, axis: str = "x") -> Figure:
     """Plots fe/v and fh/v over position, with b and 10/K + b (Fig. 8, bottom).
 
-    In steady motion the printed compensator resists as a damper of 10/K, another one as a damper
-    of 1/(K c), c the limit of s C G/K as s goes to 0; without an integrator there is no such line.
+    In steady motion the printed compensator acts as a damper of 10/K, any other as a damper of 1/(K
+    c), c the limit of s C G/K as s goes to 0. Without an integrator this line is omitted.
 
     Args:
         record: the run.
@@ -95,7 +95,7 @@ def force_ratio_plot(record: Record, axis: str = "x") -> Figure:
 
 
 def _compensator_damper(scenario: Scenario, i: int) -> float:
-    """K times the damper that hand and compensator end up with; 0 if there is none."""
+    """K times the steady damper of hand and compensator; 0 if there is none."""
     if not scenario.gain[i] or scenario.controller is not None:
         return 0.0
     num, den = (p.coef for p in linear_loop.reduced(scenario.compensators[i]).fraction)
@@ -107,8 +107,8 @@ def _compensator_damper(scenario: Scenario, i: int) -> float:
 def maneuver_plot(records: Sequence[Record], axis: str = "x", over: str = "time") -> Figure:
     """Plots the operator's force during a maneuver, a panel for each run (Fig. 11).
 
-    In clay also the force of the clay, and the time for which clay that yields held the handle. In
-    clay that resists along the motion the forces are those along it.
+    In clay it also shows the force of the clay, and the times at which yielding clay held the
+    handle. In clay that resists along the motion the forces are those along the motion.
 
     Args:
         records: the runs.
@@ -150,7 +150,7 @@ def maneuver_plot(records: Sequence[Record], axis: str = "x", over: str = "time"
 
 
 def _along(record: Record, i: int, turned: bool, force: np.ndarray) -> np.ndarray:
-    """The part of a force along the motion where the clay resists so, else along an axis [N]."""
+    """The force along the motion if the clay resists along it, else along an axis [N]."""
     return along_motion(record.v, force, i)[1] if turned else force[:, i]
 
 

@@ -35,10 +35,10 @@ class Panel(NamedTuple):
 
     Attributes:
         x: of its curves, shape (n,); NaN where they break.
-        y_range: values that the y axis must hold.
-        labels: of x and y, drawn where there is room.
+        y_range: least range of the y axis.
+        labels: labels of x and y, drawn where there is room.
         title: where there is room for labels.
-        short: title without labels.
+        short: title used without labels.
         curves: (y, colour) of each curve.
     """
 
@@ -51,7 +51,7 @@ class Panel(NamedTuple):
 
 
 def plots_fit(width: int, height: int) -> bool:
-    """Tells whether running plots fit into a picture of this size.
+    """Whether running plots fit into a picture of this size.
 
     Args:
         width: of the picture [pixels].
@@ -139,7 +139,7 @@ def running_figure(
             at: Any = dict(xycoords=("axes fraction", "data"), textcoords="offset points")
             panels[1].annotate("b", (1.0, value), (-2, 2), color=VERMILION, ha="right", **at)
         canvas = FigureCanvasAgg(figure)
-        figure.draw_without_rendering()  # settles the ticks, and so the room that they take
+        figure.draw_without_rendering()  # fixes the ticks and the space that they need
         canvas.draw()
     both = zip(panels, plans, strict=True)
     return figure, [(ax, plan.x, y, color) for ax, plan in both for y, color in plan.curves]
@@ -180,7 +180,7 @@ def _running_panels(r: Record, i: int, roomy: bool) -> tuple[Panel, ...]:
 
 
 def _over_velocity(r: Record, i: int) -> tuple[np.ndarray, np.ndarray]:
-    """Velocity and force of the clay, along the motion if it resists so; NaN in free air."""
+    """Velocity and force of the clay, along the motion if it resists along it; NaN in free air."""
     clay = r.scenario.clay
     assert clay is not None
     v, fe = along_motion(r.v, r.fe, i) if clay.along_motion else (r.v[:, i], r.fe[:, i])
@@ -189,7 +189,7 @@ def _over_velocity(r: Record, i: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _running_laws(ax: Axes, r: Record, i: int) -> None:
-    """Draws the laws of clay that yields over the velocity, where they hold for an axis alone."""
+    """Draws the laws of yielding clay over the velocity, if they apply to one axis alone."""
     clay = r.scenario.clay
     if (
         clay is None

@@ -1,9 +1,8 @@
 """Interactive sessions: a person pulls the handle of a running simulation, frame by frame.
 
-`Session` is the run, `Replay` plays a record in its place, `Player` advances either in real time,
-and `live_verdict` says whether the loop is stable. Nothing here draws: the window and the page tell
-the session where the hand pulls to, and a script can do the same. A slice is stepped as any run is,
-by kicks.
+`Session` is the run, `Replay` plays a record instead, `Player` advances either in real time, and
+`live_verdict` judges the stability of the loop. This module draws nothing: the window, the page or
+a script sets the point to which the hand pulls. A slice is stepped by kicks, like any run.
 """
 
 from __future__ import annotations
@@ -32,19 +31,19 @@ class Session:
 
     Attributes:
         tool: at the handle.
-        stiffness: of the hand's spring, as a multiple of Th's.
+        stiffness: stiffness of the hand's spring, as a multiple of Th's.
         every: samples per sample kept.
         given: scenario as it was given.
-        scenario: scenario that runs, with the present gain and damping.
-        run: that steps it.
-        paused: whether simulated time stands still.
+        scenario: running scenario, with the present gain and damping.
+        run: the run that steps it.
+        paused: whether simulated time is paused.
         recording: whether samples are kept.
-        clock: of real time.
-        point: that the hand pulls to [m]; None if it does not.
+        clock: clock of real time.
+        point: target point of the hand [m]; None if it does not pull.
         frames: end of each slice so far.
-        stream: that a player tells of each slice; None for none.
-        partner: a device whose samples the slices follow; None for none.
-        frame_time: simulated time that two frames lie apart at least [s].
+        stream: listener that receives each slice; None for none.
+        partner: device whose samples the slices follow; None for none.
+        frame_time: least simulated time between two frames [s].
     """
 
     stream: Listener | None = None
@@ -54,13 +53,13 @@ class Session:
     def __init__(
         self, scenario: Scenario, stiffness: float = 1.0, tool: Tool = TOOL, every: int = 1
     ):
-        """Begins at the start of a scenario; its force, length and t_max do not count.
+        """Begins at the start of a scenario; its force, length and t_max are ignored.
 
         Args:
             scenario: clay, gain and arm.
-            stiffness: factor on the spring of Th; its damper takes the square root.
+            stiffness: factor on the spring of Th; its damper has the square root as factor.
             tool: at the handle.
-            every: keep each every-th sample.
+            every: keep every `every`-th sample.
 
         Raises:
             ParameterError: a value is out of its bounds, or the scenario is sampled or accurate.
@@ -70,7 +69,7 @@ class Session:
         self.start(scenario)
 
     def start(self, scenario: Scenario) -> None:
-        """Begins a scenario: the clay whole, the record empty.
+        """Starts a scenario with uncut clay and an empty record.
 
         Args:
             scenario: clay, gain and arm.
@@ -84,7 +83,7 @@ class Session:
         self._damping = 1.0
         self.frames: list[Frame] = []
         self._carry = 0.0
-        self._swung = -math.inf  # time of the last growing swing [s]
+        self._swung = -math.inf  # time of the last growing oscillation [s]
         self._look()
 
     def prepared(self, scenario: Scenario) -> Scenario:
@@ -100,11 +99,11 @@ class Session:
         return played(scenario, self.stiffness)
 
     def kernel(self) -> Kernel:
-        """How the steps are made."""
+        """Kernel of the steps."""
         return live_kernel(self.scenario)
 
     def restart(self) -> None:
-        """Begins the same scenario again, with the present gain, damping and recording switch."""
+        """Restarts the same scenario with the present gain, damping and recording switch."""
         gain, b, recording = self.scenario.gain, self._damping, self.recording
         self.start(self.given)
         self.change(gain=gain, b=b)
@@ -117,7 +116,7 @@ class Session:
 
     @property
     def ended(self) -> str:
-        """Why the run cannot go on (the arm is stretched, ...); empty if it can."""
+        """Why the run cannot continue (the arm is stretched, ...); empty if it can."""
         return "" if self.run.outcome is None else str(self.run.outcome)
 
     @property
@@ -132,20 +131,20 @@ class Session:
 
     @property
     def gain(self) -> tuple[float, float]:
-        """K [1/kg] at present."""
+        """Current K [1/kg]."""
         return self.scenario.gain
 
     def verdict(self) -> LiveVerdict:
-        """Says whether the loop is stable, by the monitor of the run and its gain limit."""
+        """Judges the stability of the loop by the monitor of the run and the gain limit."""
         s, onset = self.scenario, self.run.watch.onset
         limit = live_gain_limits(s, self.b) if is_viscous(s, self.frames[-1].p) else None
         return live_verdict(self.gain, limit, onset, self.t - self._swung < CALM_TIME)
 
     def pull(self, point: tuple[float, float] | None) -> None:
-        """Makes the hand pull to a point, as far as the arm reaches.
+        """Makes the hand pull to a point, within reach of the arm.
 
         Args:
-            point: where to [m]; None lets go.
+            point: target point [m]; None releases the handle.
         """
         self.point = None if point is None else self._within_reach(point)
 
@@ -177,11 +176,11 @@ class Session:
 
     @property
     def damping(self) -> float:
-        """Damping, yield force and consistency of all clay as a multiple of the given ones."""
+        """Factor on the given damping, yield force and consistency of all clay."""
         return self._damping
 
     def advance(self, seconds: float) -> np.ndarray:
-        """Makes a slice of simulated time; none while paused.
+        """Advances by a slice of simulated time, unless paused.
 
         Args:
             seconds: length of the slice [s].
@@ -240,7 +239,7 @@ class Session:
         return replace(out, extra=extra, notes=notes)
 
     def _removed(self, out: Record) -> tuple[np.ndarray, np.ndarray]:
-        """As `removed`, along the true path where recording was off."""
+        """As `removed`, along the true path, even where recording was off."""
         t, p, v = (np.array(x) for x in zip(*(f[:3] for f in self.frames), strict=True))
         after = np.searchsorted(out.t, t)
         begin = out.t[np.maximum(after - 1, 0)]
@@ -259,7 +258,7 @@ class Session:
         return volume[kept], rate[kept]
 
     def handle(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Place of the handle [m], and its velocity half a step ago [m/s]."""
+        """Position of the handle [m], and its velocity half a step ago [m/s]."""
         p, behind = self.run.position(), self.run.position(-self.scenario.dt)
         vx, vy = ((a - b) / self.scenario.dt for a, b in zip(p, behind, strict=True))
         return p, (vx, vy)
@@ -276,7 +275,7 @@ class Session:
         spring, damper = np.array([(th.spring, th.damper) for th in hands]).T
         hand = self.run.pull.mean(self.t, 0.0) - spring * np.array(p) - damper * np.array(v)
         fe = b[0] * v[0], b[1] * v[1]
-        if self.run.last_rendered:  # of clay that yields, at the last sample
+        if self.run.last_rendered:  # of yielding clay, at the last sample
             fe = tuple(self.run.last_rendered)
         self.frames.append(Frame(self.t, p, v, fe, tuple(hand.tolist()), self.run.held))
 
@@ -296,7 +295,7 @@ def refuse_other(scenario: Scenario, **fields: str) -> None:
 
     Args:
         scenario: to be played.
-        **fields: its fields, and the only value that each can have.
+        **fields: fields with the only permitted value of each.
 
     Raises:
         ParameterError: a field has another value.

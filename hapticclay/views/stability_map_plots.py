@@ -1,4 +1,4 @@
-"""A stability map, drawn."""
+"""Figure of a stability map."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ BOUNDARY_MARKS: Any = (dict(marker="o", mfc=BLACK), dict(marker="D", mfc=WHITE))
 def stability_map_plot(chart: StabilityMap) -> Figure:
     """Plots a map of stability.
 
-    Lines are analytic boundaries, dots are boundaries found by runs, and a mark in each cell shows
-    the outcome of its run, ringed where it contradicts the analysis. The linear loop of these runs
-    is unstable where it is hatched.
+    Lines are analytic boundaries, and dots are boundaries found by runs. A mark in each cell shows
+    the outcome of its run, ringed where it contradicts the analysis. Hatching marks where the
+    linear loop of these runs is unstable.
 
     Args:
         chart: from `stability_map`.
@@ -99,7 +99,7 @@ def stability_map_plot(chart: StabilityMap) -> Figure:
 
 
 def _map_span(chart: StabilityMap) -> tuple[float, float]:
-    """Limits of y that hold every cell, the lines among them, and boundaries found nearby."""
+    """Limits of y that contain every cell, the lines among them, and boundaries found nearby."""
     cells = [c.y for c in chart.cells]
     top = 3.0 * max(cells)
     found = [y for _, v in chart.found.values() for y in v if math.isfinite(y) and 0.0 < y < top]

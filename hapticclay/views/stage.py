@@ -1,4 +1,4 @@
-"""The scene that films, window and page show: arm, room, and a block of clay that the tool cuts.
+"""The scene of films, window and page: arm, room, and a block of clay cut by the tool.
 
 The model is for drawing only: `Stage.pose` copies the joint angles of the run into it, and
 `Stage.carve` lowers the clay along the path of the tool.
@@ -20,7 +20,7 @@ from ..studies.removal import TOOL, Removal, Tool
 from .style import BLUE, PART_COLORS, SKY_BLUE, clay_color, clay_share, cutting_force, rgb
 
 CAMERAS = ("room", "top", "close")
-HIDDEN = (0.0, 0.0, -5.0)  # place of the hand's target while nobody pulls [m]
+HIDDEN = (0.0, 0.0, -5.0)  # position of the hand's target without a pull [m]
 GROUND = -0.06  # height of the table, the plane of the arm at 0 [m], as in room.xml
 THICKNESS = 0.03  # of a block of clay [m]
 GRAIN = 0.03  # rms of the brightness of clay, as a share
@@ -31,7 +31,7 @@ ARROW_WIDTH = 0.006  # [m]
 
 
 def plotted_axes(scenario: Scenario) -> tuple[int, ...]:
-    """Returns the axes that live plots show: those along which the clay changes, x without clay.
+    """Returns the axes of live plots: those along which the clay changes, x without clay.
 
     Args:
         scenario: that runs.
@@ -49,22 +49,22 @@ def hardest(scenario: Scenario) -> float:
 
 
 def held_words(held: Sequence[bool]) -> str:
-    """Says that clay that yields holds the handle: "held", "held along x", or nothing.
+    """Text if yielding clay holds the handle: "held", "held along x", or nothing.
 
     Args:
-        held: whether it does, along x and along y.
+        held: whether the clay holds the handle, along x and along y.
     """
     names = [f" along {a}" for a, still in zip(AXES, held, strict=True) if still]
     return f"held{names[0] if len(names) == 1 else ''}" if names else ""
 
 
 class Arrow(NamedTuple):
-    """The force of clay that yields on the handle.
+    """The force of yielding clay on the handle.
 
     Attributes:
         begin: at the knob [m], (3,).
         end: tip [m], (3,).
-        held: whether the clay holds the handle still.
+        held: whether the clay holds the handle.
     """
 
     begin: np.ndarray
@@ -134,11 +134,11 @@ class Stage:
         mujoco.mj_camlight(self.model, self.data)
 
     def push(self, fe: Any, held: bool) -> None:
-        """Points the arrow along the force of clay that yields; to be called after `pose`.
+        """Points the arrow along the force of yielding clay; call it after `pose`.
 
         Args:
             fe: resisting force of the clay [N], (2,).
-            held: whether it holds the handle still.
+            held: whether it holds the handle.
         """
         self.arrow = None
         size = float(np.hypot(*fe))
@@ -164,13 +164,13 @@ class Stage:
         scene.ngeom += 1
 
     def carve(self, points: Any) -> float:
-        """Moves the tool through points, from where it is.
+        """Moves the tool through points, from its present position.
 
         Args:
             points: positions of the handle [m], shape (n, 2).
 
         Returns:
-            The volume that this removes [m^3].
+            The removed volume [m^3].
         """
         gained = 0.0
         if self.field < 0:
@@ -182,7 +182,7 @@ class Stage:
         return gained
 
     def restore(self) -> None:
-        """Makes the clay whole again."""
+        """Restores the uncut clay."""
         self.removal.restore()
         self.place, self.stale = None, True
 
@@ -274,7 +274,7 @@ def picture_spec(
 
 
 def room_scale(arm: Arm) -> float:
-    """How much larger the room is than that of the paper's arm, which smaller arms have as well.
+    """Scale of the room relative to that of the paper's arm; at least 1.
 
     Args:
         arm: in the room.
@@ -294,7 +294,7 @@ def _enlarge_room(spec: mujoco.MjSpec, scale: float) -> None:
 
 
 def arm_skin(arm: Arm) -> Any:
-    """What is seen of an arm, in its links.
+    """Visible geometry of an arm, by link.
 
     Args:
         arm: the arm.
@@ -315,7 +315,7 @@ def arm_skin(arm: Arm) -> Any:
 
 
 def _skin(body: Any, shape: str, begin: Any, end: Any, radius: float, material: str) -> None:
-    """Adds a geom that is only seen: it weighs nothing and touches nothing."""
+    """Adds a purely visual geom, without mass or contact."""
     kind = getattr(mujoco.mjtGeom, f"mjGEOM_{shape.upper()}")
     place: Any = {"fromto": (*begin, *end)}
     if begin == end:

@@ -1,4 +1,4 @@
-"""A session as JSON over UDP while it goes on, in the form that PlotJuggler reads."""
+"""Streams a running session as JSON over UDP, in the format of PlotJuggler."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ ADDRESS_FORM = "must be HOST:PORT, as in localhost:9870"
 
 
 class UdpStream:
-    """Sends the present state of a session, a datagram a call, without ever waiting.
+    """Sends the present state of a session, one datagram per call, without waiting.
 
-    A datagram is one JSON object: timestamp [s], which goes on over restarts; t, the time of the
-    session [s]; p [m], v [m/s], fh, fe [N], b [N.s/m] and gain [1/kg], each with x and y; held,
-    1 where clay that yields holds the handle; target [m] while the hand pulls. null stands for a
-    number that is not finite. What nobody receives is lost.
+    A datagram is one JSON object: timestamp [s], which continues over restarts; t, the time of the
+    session [s]; p [m], v [m/s], fh, fe [N], b [N.s/m] and gain [1/kg], each with x and y; held, 1
+    where yielding clay holds the handle; target [m] while the hand pulls. null replaces a number
+    that is not finite. Datagrams without a receiver are lost.
 
     Args:
         address: HOST:PORT, or [HOST]:PORT.
 
     Raises:
-        ParameterError: it is no such address, or there is no such host.
+        ParameterError: the address is invalid, or the host is unknown.
     """
 
     def __init__(self, address: str):
         host, _, port = address.rpartition(":")
         if not host or not port.isdecimal() or not 0 < int(port) < 65536:
             raise ParameterError("stream", address, ADDRESS_FORM)
-        try:  # once: a name server may take its time
+        try:  # once, because a name server may be slow
             found = socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_DGRAM)
         except (OSError, UnicodeError) as error:
             told = getattr(error, "strerror", None) or error
@@ -51,13 +51,13 @@ class UdpStream:
         self._frames: list[Frame] = []
 
     def send(self, play: Session | Replay) -> None:
-        """Sends the last frame, if it is new; drops it where the system does not take it at once.
+        """Sends the last frame if it is new; drops it if the system would block.
 
         Args:
             play: the session, or the replay of a record.
         """
         frame = play.frames[-1]
-        if play.frames is not self._frames:  # it begins, or began again
+        if play.frames is not self._frames:  # it started or restarted
             self._frames, self._before = play.frames, self._before + self._last + FRAME_TIME
         elif frame.t == self._last:
             return

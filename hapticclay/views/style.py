@@ -56,7 +56,7 @@ STYLE: Any = {
     "legend.frameon": False,
     "figure.constrained_layout.use": True,
     "pdf.fonttype": 42,  # text stays text, its fonts within the file; journals refuse type 3
-    "svg.fonttype": "path",  # text drawn as outlines: alike wherever the font is missing
+    "svg.fonttype": "path",  # text drawn as outlines: identical without the font
     "svg.hashsalt": "hapticclay",  # the same figure gives the same file
 }
 PRINT: Any = STYLE | {
@@ -81,7 +81,7 @@ PRINT: Any = STYLE | {
 }
 SCREEN_WIDTHS = {1: 6.4, 2: 9.6}  # [inch] of figures of one and of two columns
 LOG_SPAN = 30.0  # a scale is logarithmic where its values span more
-LEAST_TEXT = 6.0  # [points] that print can be read at
+LEAST_TEXT = 6.0  # [points] legible in print
 TITLE_SIZE = 9.0  # [points] on a screen
 TITLE_MARGIN = 0.9  # [inch] of a figure's width that a title cannot use: left of the axes
 CLAY_ALPHA = 0.35  # of clay behind curves
@@ -93,7 +93,7 @@ SHADED = 0.01, 1e-3  # speed [m/s], about that of the paper's cut, and indentati
 
 
 class Look(NamedTuple):
-    """How a style draws every figure.
+    """Parameters of a style.
 
     Attributes:
         parameters: rcParams of matplotlib.
@@ -118,7 +118,7 @@ _STYLE: ContextVar[str] = ContextVar("style", default="screen")
 
 @contextlib.contextmanager
 def styled(style: str) -> Iterator[Look]:
-    """Draws, and saves, the figures made within this context in a style.
+    """Context in which figures are drawn and saved in a style.
 
     Args:
         style: "screen", "print" for one column of 8.5 cm, or "print-wide" for two, 17.5 cm.
@@ -137,17 +137,17 @@ def styled(style: str) -> Iterator[Look]:
 
 
 def look() -> Look:
-    """Returns how figures are drawn now."""
+    """Returns the current look of figures."""
     return STYLES[_STYLE.get()]
 
 
 def narrow() -> bool:
-    """Tells whether figures are one printed column wide: panels then stand one under another."""
+    """Whether figures are one printed column wide, so that panels are stacked."""
     return _STYLE.get() == "print"
 
 
 def figure_size(columns: int, height: float, width: float | None = None) -> tuple[float, float]:
-    """Returns the size of a figure in the style of now, to be given as `figsize` [inch].
+    """Returns the size of a figure in the current style, for `figsize` [inch].
 
     Args:
         columns: 1 for a usual figure, 2 for one with panels side by side.
@@ -159,7 +159,7 @@ def figure_size(columns: int, height: float, width: float | None = None) -> tupl
 
 
 def map_size(across: float, least: float, ratio: float) -> tuple[float, float]:
-    """Returns the size of a figure of a map to scale, in the style of now [inch].
+    """Returns the size of a figure of a map to scale, in the current style [inch].
 
     Args:
         across: width of its axes on a screen [inch].
@@ -181,7 +181,7 @@ def panel_grid(count: int) -> tuple[int, int]:
 
 
 def points(size: float) -> float:
-    """Returns a size of text in the style of now [points].
+    """Returns a size of text in the current style [points].
 
     Args:
         size: on a screen [points].
@@ -190,7 +190,7 @@ def points(size: float) -> float:
 
 
 def stroke(size: float) -> float:
-    """Returns a width of a line, or the size of a marker, in the style of now [points].
+    """Returns a line width or marker size in the current style [points].
 
     Args:
         size: on a screen [points].
@@ -235,7 +235,7 @@ def rgb_bytes(color: str) -> tuple[int, int, int]:
 
 
 def clay_color(share: Any) -> np.ndarray:
-    """Shades clay by how hard it is to cut.
+    """Colour of clay by cutting force.
 
     Args:
         share: as `clay_share`, 0 to 1, any shape.
@@ -268,9 +268,9 @@ def along_motion(v: np.ndarray, fe: np.ndarray, main: int) -> tuple[np.ndarray, 
 
 
 def clay_share(clay: Clay, x: Any, y: Any) -> np.ndarray:
-    """How hard clay is to cut at some places, over the hardest of the scene, growth aside.
+    """Cutting force of clay at given places relative to the hardest of the scene, growth aside.
 
-    Its force along the harder axis, at a speed and an indentation that are the same for all clay.
+    It is the force along the harder axis, at the same speed and indentation for all clay.
 
     Args:
         clay: of the scene.
@@ -301,7 +301,7 @@ def verdict_color(text: str, unstable: bool) -> str:
 
     Args:
         text: the verdict.
-        unstable: whether the arm swings with growing amplitude.
+        unstable: whether the arm oscillates with growing amplitude.
     """
     kind = "unstable" if unstable else "stable" if text.startswith("stable") else "other"
     return VERDICT_COLORS[kind]
@@ -311,7 +311,7 @@ def figure_style(**more: Any) -> Any:
     """Returns the context in which figures are drawn.
 
     Args:
-        more: rcParams of matplotlib that differ from the style's, dots written as underscores.
+        more: rcParams of matplotlib that override the style's, dots written as underscores.
     """
     import matplotlib
 
@@ -322,13 +322,13 @@ def figure_style(**more: Any) -> Any:
 def set_title(ax: Axes, *parts: str, panel: bool = False, **more: Any) -> None:
     """Puts a title over the axes, in as many lines as keep it within the figure.
 
-    In print only titles that tell panels apart are drawn: the rest stands in the caption.
+    In print only titles that distinguish panels are drawn; the caption has the rest.
 
     Args:
         ax: the axes.
         parts: phrases, joined by commas; lines break between them, and between words only where a
             phrase alone is too long.
-        panel: whether it tells this panel from others of the figure.
+        panel: whether it distinguishes this panel from others of the figure.
         more: further arguments of `Axes.set_title`.
     """
     from matplotlib.textpath import TextPath
@@ -378,8 +378,8 @@ def add_legend(figure: Figure, ax: Axes | None, ncols: int = 5, **more: Any) -> 
 def plain_ticks(axis: Any) -> None:
     """Labels a logarithmic axis with plain numbers, two of them at least.
 
-    They are powers of ten, those times 1, 2 and 5 where the axis spans less than two decades, or
-    evenly spaced numbers where it holds fewer than two of these.
+    The numbers are powers of ten; powers of ten times 1, 2 and 5 if the axis spans less than two
+    decades; or evenly spaced numbers if it holds fewer than two of these.
 
     Args:
         axis: of matplotlib, its limits set.
@@ -417,7 +417,7 @@ def unit_text(text: str) -> str:
 
 
 def shade_clay(ax: Axes, edges: Sequence[float], forces: Sequence[float]) -> None:
-    """Shades the intervals of the x axis that hold clay, darker where it is harder to cut.
+    """Shades the intervals of the x axis with clay, darker where it is harder to cut.
 
     Args:
         ax: axes over the position [cm].
@@ -433,7 +433,7 @@ def shade_clay(ax: Axes, edges: Sequence[float], forces: Sequence[float]) -> Non
 
 
 def shade_held(ax: Axes, spans: Any) -> None:
-    """Shades the times at which clay that yields held the handle.
+    """Shades the times at which yielding clay held the handle.
 
     Args:
         ax: axes over the time [s].

@@ -1,4 +1,4 @@
-"""Tables of sweeps, drawn."""
+"""Figures of tables of sweeps."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ OUTCOME_COLORS = {  # from good to bad
     "unresolved": MID_GREY,
     "refused": BLACK,
 }
-MISSING = {  # why a run has no figure: look of its cell and of its point
+MISSING = {  # why a run has no value: style of its cell and of its point
     "refused": dict(color=BLACK, hatch="", marker="X"),
     "no clay reached": dict(color=PALE_GREY, hatch="////", marker="x"),
     "border not reached": dict(color=PALE_GREY, hatch="////", marker="x"),
@@ -67,10 +67,10 @@ def swept_parameters(table: Any) -> list[str]:
 
 
 def missing_reasons(table: Any, value: str) -> list[str]:
-    """Says why each run has no figure in a column: a key of MISSING, or "" for a run with a figure.
+    """Why each run has no value in a column: a key of MISSING, or "" for a run with a value.
 
-    fe/v and the speed belong to clay: a run that reached no clay has no part in a map of them if
-    any other run did.
+    fe/v and the speed are properties of clay: runs that reached no clay are left out of their maps
+    if any other run did.
 
     Args:
         table: from `read_sweep`.
@@ -97,7 +97,7 @@ def missing_reasons(table: Any, value: str) -> list[str]:
 def sweep_plot(
     table: Any, value: str = "status", x: str | None = None, y: str | None = None
 ) -> Figure:
-    """Maps one column over two parameters: its mean over all others, of the status the worst.
+    """Maps one column over two parameters: its mean over all others, or the worst status.
 
     Args:
         table: from `read_sweep`.
@@ -154,7 +154,7 @@ def sweep_plot(
 def sweep_tables(
     table: Any, value: str = "status", x: str | None = None, y: str | None = None
 ) -> dict[str, dict[str, list]]:
-    """Returns what a map of a sweep shows: its runs with both parameters and the column.
+    """Returns the numbers of a map of a sweep: its runs with both parameters and the column.
 
     Args:
         table: from `read_sweep`.
@@ -170,7 +170,7 @@ def sweep_tables(
 
 
 class Mapped(NamedTuple):
-    """Runs of a sweep to be mapped, an entry a run.
+    """Runs of a sweep to be mapped, one entry per run.
 
     Attributes:
         x: parameter along x, shape (n,).
@@ -250,7 +250,7 @@ def _point_size(data: Mapped) -> float:
 
 
 def _draw_points(ax: Axes, data: Mapped, look: dict[str, Any]) -> tuple[Any, list[Any]]:
-    """Draws runs that lie anywhere as points; returns as _draw_grid."""
+    """Draws runs off a grid as points; returns as _draw_grid."""
     size, good = _point_size(data), np.isfinite(data.z)
     handles = []
     for k, (name, kind) in enumerate(MISSING.items()):

@@ -45,7 +45,7 @@ def bode_plot(
 
     Args:
         loop: the loop with its K; or axis, K, b, and operator and other parts by name.
-        at: where the loop is broken, "compensator" or "force".
+        at: where the loop is opened, "compensator" or "force".
         omega: range shown [rad/s].
     """
     m = stability_margins.margins(loop, at=at)
@@ -88,10 +88,9 @@ def nyquist_plot(
     """Plots Nyquist curves with the unit circle, the point -1 and the margins of each.
 
     Args:
-        loop: the loop, whose own K does not matter; or axis, b, gains, and operator and other parts
-            by name.
+        loop: the loop, its K ignored; or axis, b, gains, and operator and other parts by name.
         gains: K of each curve [1/kg], five at most.
-        at: where the loop is broken, "compensator" or "force".
+        at: where the loop is opened, "compensator" or "force".
     """
     with figure_style():
         height = (4.5 if narrow() else 5.7) + 0.2 * len(gains)  # for the legend
@@ -168,8 +167,8 @@ def transparency_plot(
     """Plots the clay's share of the hand's force, |fe/fh| (Eq. 7), for some compensators.
 
     Args:
-        loop: the loop, whose own compensator, K and hand do not matter; or axis, b, designs, and
-            other parts by name.
+        loop: the loop, its compensator, K and hand ignored; or axis, b, designs, and other parts by
+            name.
         designs: (label, K, shape) of each compensator, five at most.
         omega: range shown [rad/s].
         band: frequencies that `transparency_error` averages over [rad/s].
@@ -210,7 +209,7 @@ def _note(
 
 
 def _arrow(ax: Axes, L: np.ndarray, color: str) -> None:
-    """An arrow along the curve where it passes 1.3 from the origin, or half way."""
+    """An arrow along the curve at a distance of 1.3 from the origin, or half way."""
     near = np.flatnonzero((np.abs(L[:-1]) >= 1.3) & (np.abs(L[1:]) < 1.3))
     i = int(near[-1]) if len(near) else len(L) // 2
     a, b = L[i], L[i + 1]

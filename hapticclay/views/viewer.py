@@ -1,8 +1,8 @@
-"""MuJoCo's own viewer in a process of its own, which `window` starts and answers.
+"""MuJoCo's viewer in a separate process, which `window` starts and answers.
 
-Once its window is closed the viewer's thread, holding the interpreter, deletes the condition on
-which another thread may wait in `update_hfield`: neither comes back. A display that goes away ends
-the process. In a process of its own either costs a picture, not the session.
+When its window is closed, the viewer's thread, which holds the interpreter, deletes the condition
+on which another thread may wait in `update_hfield`: both threads hang. A lost display ends the
+process. In a separate process either costs a picture, not the session.
 """
 
 from __future__ import annotations
@@ -66,13 +66,13 @@ class Writing:
 
 @dataclass(frozen=True)
 class Sight:
-    """What the window shows next.
+    """The next content of the window.
 
     Attributes:
-        frames: of the session, from the last one that was shown on.
-        anew: whether they begin again, with the clay whole.
+        frames: frames of the session since the last one shown.
+        anew: whether they restart, with uncut clay.
         angles: of the arm [rad].
-        target: point that the hand pulls to [m]; None if it does not.
+        target: target point of the hand [m]; None if it does not pull.
         writing: texts; None to keep the old ones.
     """
 
@@ -110,7 +110,7 @@ class Pane:
         self.keys: Rows = ()
 
     def take(self, sight: Sight) -> None:
-        """Takes in what to show; texts and plots follow when there are new texts.
+        """Updates the content; texts and plots change when there are new texts.
 
         Args:
             sight: answer of the session.
@@ -148,7 +148,7 @@ class Pane:
             viewer.cam.lookat[:] = (0.33, 0.19, -0.03)  # the plots cover the right
             viewer.cam.distance, viewer.cam.azimuth, viewer.cam.elevation = 0.80, 90.0, -55.0
             viewer.opt.sitegroup[:] = 0
-            for flag in ("PERTOBJ", "PERTFORCE", "SELECT"):  # a ball of ours shows the target
+            for flag in ("PERTOBJ", "PERTFORCE", "SELECT"):  # our own ball shows the target
                 viewer.opt.flags[getattr(mujoco.mjtVisFlag, f"mjVIS_{flag}")] = 0
             groups = viewer.opt.geomgroup.copy()
         grip: np.ndarray | None = None
@@ -193,7 +193,7 @@ class Pane:
 
 
 def _mouse_displacement(viewer: Any, grip: np.ndarray | None) -> tuple[Any, np.ndarray | None]:
-    """Displacement of the mouse since it took hold (x, y) [m], None while it does not; and grip.
+    """Displacement of the mouse since it grabbed (x, y) [m], None if it does not grab; and grip.
 
     The viewer moves its point in a plane through the grip, upright unless shift is held: height
     counts as distance from the camera.
@@ -211,16 +211,16 @@ def run_viewer() -> None:
     """Runs the viewer's process.
 
     Reads (scenario, tool); then, for every picture, sends (keys, hand) and reads a Sight. Ends when
-    nobody answers.
+    there is no answer.
     """
     import glfw  # glfw and the viewer need the libraries of a desktop
     import mujoco.viewer
 
-    for name in ("SIGINT", "SIGHUP"):  # signals of the shared terminal are the session's
+    for name in ("SIGINT", "SIGHUP"):  # the session handles signals of the shared terminal
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     source, sink = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what the viewer prints
+    os.dup2(2, 1)  # output of the viewer
 
     def ask(words: Any) -> Any:
         try:
@@ -235,7 +235,7 @@ def run_viewer() -> None:
 
     class Simulate(mujoco.viewer._Simulate):
         def destroy(self) -> None:
-            """Ends the process with the window, before anything is deleted that a thread awaits."""
+            """Ends the process with the window, before objects are deleted that a thread awaits."""
             os._exit(0)
 
     mujoco.viewer._Simulate = Simulate
@@ -288,12 +288,12 @@ def _banner() -> mujoco.MjvFigure:
 
 
 def _ratio(force: float, v: float) -> float:
-    """force/v [N.s/m], NaN where the handle stands still."""
+    """force/v [N.s/m], NaN where the handle is at rest."""
     return force / v if abs(v) > 1e-4 else math.nan
 
 
 def _law_point(f: Frame, i: int, isotropic: bool) -> tuple[float, float]:
-    """Velocity [cm/s] and force of the clay, along the motion where it resists so; NaN in air."""
+    """Velocity [cm/s] and force of the clay, along the motion if it resists so; NaN in air."""
     v, fe = f.v[i], f.fe[i]
     if isotropic:
         (speed,), (force,) = along_motion(np.array([f.v]), np.array([f.fe]), i)
@@ -304,8 +304,8 @@ def _law_point(f: Frame, i: int, isotropic: bool) -> tuple[float, float]:
 def _plots(axes: tuple[int, ...], clay: Clay | None = None) -> tuple[LivePlot, ...]:
     """Velocity over position, the clay's law, and forces over time, along these axes.
 
-    Of viscous clay the law is fe/v over position; else fe, over velocity where it follows from
-    that, of isotropic clay along the motion.
+    The law of viscous clay is shown as fe/v over position. Otherwise fe is shown, over velocity
+    where velocity determines it; in isotropic clay along the motion.
     """
     hands, clays = ({i: FORCE_COLORS[who, i] for i in axes} for who in ("hand", "clay"))
     place, named = f"{AXES[axes[0]]} [cm]", ""
@@ -329,7 +329,7 @@ def _plots(axes: tuple[int, ...], clay: Clay | None = None) -> tuple[LivePlot, .
 
 
 def _law_plot(colors: dict[int, str], clay: Clay | None, place: str, named: str) -> LivePlot:
-    """What the clay resists with: see `_plots`."""
+    """Plot of the clay's law: see `_plots`."""
 
     def plot(title: str, over: str, point: Any, span: float, axes: Iterable[int]) -> LivePlot:
         curves = [LiveCurve(colors[i], lambda f, i=i: point(f, i)) for i in axes]
@@ -365,7 +365,7 @@ class LiveCurve:
 
 @dataclass
 class LivePlot:
-    """A plot that grows with the session, drawn by the engine with as many points as it takes.
+    """A plot that grows with the session, drawn by the engine up to its number of points.
 
     Attributes:
         title: over the plot.
@@ -401,7 +401,7 @@ class LivePlot:
         self.figure.linepnt[:] = 0
 
     def extend(self, frames: list[Frame]) -> None:
-        """Adds the frames that are new.
+        """Adds the new frames.
 
         Args:
             frames: all frames of the session so far.
@@ -446,7 +446,7 @@ def _wide(low: float, high: float, least: float) -> tuple[float, float, int]:
 def _snapped(low: float, high: float, least: float) -> tuple[float, float, int]:
     """As _wide for y, whose limits the engine widens to multiples of the range's power of ten.
 
-    The limits returned are a hair inside such multiples, so that it widens them to these.
+    The returned limits lie slightly inside such multiples, so that it widens them to these.
     """
     power = 10.0 ** math.floor(math.log10(max(high - low, least)))
     while True:

@@ -48,16 +48,16 @@ KIND_WORDS = {"exact": "", "sufficient": " (sufficient)", "rule": " (rule)"}
 REGION_ALPHA = 0.22
 LABEL_ROOM = 0.05  # share of the height that the name of a region takes
 SPREAD = 20.0  # ratio of B from which an axis is logarithmic
-SHOWN_SHARE = 1e-4  # of the largest K, down to which a logarithmic axis goes
-NEAR_ORIGIN = 0.05  # share of an axis below which a wall cannot be read on a linear one
+SHOWN_SHARE = 1e-4  # of the largest K: lower end of a logarithmic axis
+NEAR_ORIGIN = 0.05  # share of an axis below which a wall is not legible on a linear one
 LABEL_SIDE = 0.15  # share of the width beside its ends, where a centred label would cross the axis
 
 
 def zwidth_plot(chart: ZWidth) -> Figure:
     """Plots the region of stable walls, or a family of regions.
 
-    Runs are markers and theory is lines. Of a family each region has its runs, the exact line of
-    its linear loop, and, where there is room, its name.
+    Markers are runs and lines are theory. Each region of a family has its runs, the exact line of
+    its linear loop and, where there is room, its name.
 
     Args:
         chart: from `zwidth`.
@@ -78,7 +78,7 @@ def zwidth_plot(chart: ZWidth) -> Figure:
 
 
 def regions_plot(regions: Sequence[ZRegion], walls: Sequence[VirtualWall]) -> Figure:
-    """Plots the regions of several devices over one another, and one wall of each.
+    """Plots the regions of several devices superimposed, and one wall of each.
 
     Args:
         regions: from `zwidth`, with names.
@@ -148,7 +148,7 @@ def _draw_family(ax: Axes, regions: Sequence[ZRegion]) -> None:
 
 
 def _name_regions(ax: Axes, regions: Sequence[ZRegion]) -> None:
-    """Names each region beside its edge, at B = 0 or at its top, where the edges are apart."""
+    """Labels each region beside its edge, at B = 0 or at its top, where the edges are separate."""
     places = {
         "left": [(r.B[0], r.K[0]) for r in regions],
         "top": [max(zip(r.B, r.K, strict=True), key=lambda p: p[1]) for r in regions],
@@ -185,7 +185,7 @@ def _name_regions(ax: Axes, regions: Sequence[ZRegion]) -> None:
 
 
 def _region_edge(r: ZRegion) -> tuple[list[float], list[float]]:
-    """The edge of a region: the exact line where the loop is linear, else from run to run."""
+    """The edge of a region: the exact line if the loop is linear, else a line through the runs."""
     if r.linear and r.limits:
         return list(r.limits[0].B), list(r.limits[0].K)
     B, K = list(r.B), list(r.K)
@@ -199,13 +199,13 @@ def _where_stable(K: Sequence[float]) -> np.ndarray:
 
 
 def _marked(K: Sequence[float], bottom: float) -> np.ndarray:
-    """K of markers, which must not lie under the axes."""
+    """K of markers, kept above the axes."""
     a = _where_stable(K)
     return np.where(a >= bottom, a, np.nan)
 
 
 def _set_axes(ax: Axes, regions: Sequence[ZRegion], walls: Sequence[VirtualWall] = ()) -> None:
-    """Scales and limits that hold every run: logarithmic where they span much, with B = 0."""
+    """Scales and limits for every run: logarithmic where values span much, with B = 0."""
     B = sorted({x for r in regions for x in r.B if x > 0.0} | {w.B for w in walls if w.B > 0.0})
     K = [x for r in regions for x in (*r.K, *r.box_K) if x > 0.0] + [w.K for w in walls]
     least = [x for r in regions for x in r.K[:1] if x > 0.0] + [w.K for w in walls if w.K]
@@ -231,7 +231,7 @@ def _set_axes(ax: Axes, regions: Sequence[ZRegion], walls: Sequence[VirtualWall]
 
 
 def _left_out(r: ZRegion) -> str:
-    """What the linear loop leaves out."""
+    """Effects that the linear loop neglects."""
     assert isinstance(r.wall, VirtualWall)
     d = r.wall.device
     parts = [name for name, x in (("friction", d.friction), ("encoder", d.quantum)) if x]
@@ -239,7 +239,7 @@ def _left_out(r: ZRegion) -> str:
 
 
 def _device_parts(chart: ZWidth) -> list[str]:
-    """Phrases that describe the device in the title: what is the same in all regions."""
+    """Phrases for the title: the parts of the device common to all regions."""
     w = chart.regions[0].wall
     told = {"Ts": f"Ts = {1e3 * (w.Ts or 0.0):g} ms"}
     if w.delay:

@@ -1,4 +1,4 @@
-"""A session in MuJoCo's own viewer: the mouse is the hand."""
+"""A session in MuJoCo's viewer, with the mouse as the hand."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SPACE, BACKSPACE, RIGHT, LEFT, DOWN, UP = 32, 259, 262, 263, 264, 265  # GLFW's 
 EXPERIMENT_KEYS = {ord("1"): "constant", ord("2"): "variable", ord("3"): "free"}
 KEY_FACTOR = 1.25  # on K or b, a keystroke
 WRITE_TIME = 0.1  # [s] between two updates of the texts
-POLL_TIME = 0.05  # [s] that the window waits before it looks at whether to go on
+POLL_TIME = 0.05  # [s] between two checks whether to continue
 INSTEAD = "use --web for a browser, or hapticclay video for a film"
 LIVE_KEYS = (
     ("Ctrl + right drag", "pull the handle"),
@@ -49,20 +49,20 @@ REPLAY_KEYS = tuple(row for row in LIVE_KEYS if row[0] in BOTH)
 class Window:
     """The window on a session or a record, until it is closed.
 
-    The viewer draws in another process (see `viewer`) and asks, once a picture, what to show; when
-    nothing asks any more the window is closed, for whatever reason.
+    The viewer draws in another process (see `viewer`) and requests the content for each picture.
+    When requests stop, the window counts as closed.
 
     Attributes:
-        play: what is shown.
+        play: session or record to show.
         help: whether the keys are listed.
         other: whether a key has chosen another scenario.
-        held: position of the handle when the mouse took hold [m]; None while it does not.
+        held: position of the handle when the mouse grabbed it [m]; None if it does not.
         shown: number of frames sent to the viewer.
         written: time of the last texts sent [s].
     """
 
     def __init__(self, play: Session | Replay):
-        """Shows nothing yet: call `show`.
+        """Prepares the window; call `show` to open it.
 
         Args:
             play: what to show.
@@ -124,11 +124,11 @@ class Window:
                     player.stop()
 
     def look(self, keys: list[int], hand: tuple[float, float] | None) -> Sight:
-        """Acts on keys and mouse and returns what to show; the caller holds the player's lock.
+        """Handles keys and mouse and returns the content; the caller holds the player's lock.
 
         Args:
             keys: pressed since the last call, by GLFW's numbers.
-            hand: displacement of the mouse since it took hold [m]; None while it does not.
+            hand: displacement of the mouse since it grabbed the handle [m]; None if it does not.
         """
         for key in keys:
             self._key(key)
@@ -146,7 +146,7 @@ class Window:
         return Sight(frames, anew, angles, target, writing)
 
     def _mouse(self, hand: tuple[float, float] | None) -> tuple[float, float] | None:
-        """Point that the hand pulls to [m] while the mouse drags."""
+        """Target point of the hand [m] while the mouse drags."""
         if hand is None:
             self.held = None
             return None
@@ -200,7 +200,7 @@ class Window:
 def _viewer(first: Any) -> Iterator[tuple[queue.SimpleQueue, Callable[[Any], None]]]:
     """Starts the viewer's process; yields what it sends and a way to answer.
 
-    It sends (keys, hand) for each picture, or the text of an error, and at last its exit status.
+    It sends (keys, hand) for each picture, or the text of an error, and finally its exit status.
     """
     program = "mjpython" if sys.platform == "darwin" else sys.executable  # macOS needs a launcher
     process = subprocess.Popen(

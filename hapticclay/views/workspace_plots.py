@@ -1,4 +1,4 @@
-"""The drift of gains over the workspace, drawn."""
+"""Figure of the drift of gains over the workspace."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A map of how an operator behaves in clay that yields, drawn."""
+"""Figure of a map of an operator's behaviour in yielding clay."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ PUSH_NAMES = {"sticks": "sticks", "limit cycle": "buzzes (colour: its speed)", "
 
 
 def yield_map_plot(chart: YieldMap) -> Figure:
-    """Plots what a push ends in, over yield force and gain.
+    """Plots the outcome of a push over yield force and gain.
 
-    Colours are the speed of the limit cycle by theory, and, in the dots, in runs.
+    Colours show the speed of the limit cycle, by theory and, in the dots, by runs.
 
     Args:
         chart: from `yield_map`.
