@@ -1,4 +1,4 @@
-"""What public functions and classes check at the door: names and kinds of their arguments."""
+"""Checks of the names and types of arguments of public functions and classes."""
 
 from __future__ import annotations
 
@@ -28,23 +28,23 @@ IN_WORDS: dict[Any, str] = {
     os.PathLike: "a path",
     type(None): "None",
 }
-WIDER: dict[Any, Any] = {Sequence: Iterable, Path: os.PathLike}  # an array is no Sequence
+WIDER: dict[Any, Any] = {Sequence: Iterable, Path: os.PathLike}  # an array is not a Sequence
 
 
 class UnknownArgument(ParameterError, TypeError):
-    """An argument was refused whose name nothing has."""
+    """An argument with an unknown name was refused."""
 
 
 def known_names(name: str, given: Mapping[str, Any], known: Collection[str]) -> None:
     """Refuses arguments of unknown names.
 
     Args:
-        name: what takes the arguments, for the error.
+        name: name of the callee, for the error.
         given: arguments by name.
-        known: names that it takes.
+        known: names that it accepts.
 
     Raises:
-        UnknownArgument: it does not take one; the error suggests the nearest name.
+        UnknownArgument: a name is unknown; the error suggests the nearest name.
     """
     for word, value in given.items():
         if word not in known:
@@ -57,7 +57,7 @@ def named(made: F) -> F:
     """Lets a function or a dataclass suggest the nearest name for an unknown argument.
 
     Args:
-        made: the function, or the class, which remains the same object.
+        made: the function, or the class, which is changed in place.
 
     Raises:
         UnknownArgument: as `known_names`, by what is returned.
@@ -92,7 +92,7 @@ class SignatureInWords:
 
 
 class Words(str):
-    """An annotation that a signature shows as it is."""
+    """An annotation that a signature shows verbatim."""
 
     __repr__ = str.__str__
 
@@ -102,7 +102,7 @@ def in_words(signature: inspect.Signature, scope: Mapping[str, Any]) -> inspect.
 
     Args:
         signature: of the constructor of a dataclass.
-        scope: names of its module.
+        scope: names in its module.
     """
     return signature.replace(
         parameters=[
@@ -113,11 +113,11 @@ def in_words(signature: inspect.Signature, scope: Mapping[str, Any]) -> inspect.
 
 
 def unit_in_words(hint: Any, scope: Mapping[str, Any]) -> Any:
-    """An annotation with a unit in place of a bound, and for its aliases what they stand for.
+    """An annotation with units in place of bounds, and with aliases expanded.
 
     Args:
-        hint: the annotation, as it was written.
-        scope: names that stand for annotations.
+        hint: the annotation, as written.
+        scope: names that may be aliases of annotations.
     """
     if not isinstance(hint, str):
         return hint
@@ -140,7 +140,7 @@ def unit_in_words(hint: Any, scope: Mapping[str, Any]) -> Any:
 
 
 def _alias_text(kind: Any) -> str:
-    """What an alias of a type stands for; "" for what is none."""
+    """The expansion of an alias of a type; "" for anything else."""
     if get_origin(kind) is Annotated:
         kind = get_args(kind)[0]
     elif get_origin(kind) not in (Literal, Union, types.UnionType):
@@ -157,7 +157,7 @@ def _of_unit(unit: str) -> str:
 def checked(made: F) -> F:
     """As `named`, and refuses arguments that are not of the classes in their annotations.
 
-    Numbers, words and arrays are left to the function, which knows their bounds; so are tuples.
+    The function itself checks numbers, words, arrays and tuples, since it knows their bounds.
 
     Args:
         made: a function, or a class that does not `check_fields`.
@@ -192,7 +192,7 @@ def _parameters(made: Any) -> Mapping[str, inspect.Parameter]:
 
 @functools.cache
 def argument_kinds(made: Callable[..., Any]) -> dict[str, tuple[Any, ...]]:
-    """Classes that the arguments of a function must be of; no entry for one that it checks itself.
+    """Required classes of the arguments of a function; no entry for those it checks itself.
 
     Args:
         made: the function, or the class.
@@ -203,7 +203,7 @@ def argument_kinds(made: Callable[..., Any]) -> dict[str, tuple[Any, ...]]:
 
 
 def _classes(hint: Any) -> tuple[Any, ...]:
-    """The classes of a type; none if it takes what no class tells, as numbers and arrays."""
+    """The classes of a type; none if classes do not determine it, as for numbers and arrays."""
     members = get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
     kinds = tuple(get_origin(m) or m for m in members)
     kinds = tuple(WIDER.get(k, k) for k in kinds)
@@ -225,7 +225,7 @@ def _in_words(kind: Any) -> str:
 
 
 def function_name(function: Any) -> str:
-    """The name "package.module:name" by which others find a function; "" if they do not.
+    """The name "package.module:name" by which a function can be imported; "" for none.
 
     Args:
         function: the function.

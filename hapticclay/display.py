@@ -6,17 +6,17 @@ import html
 from collections.abc import Iterable
 
 TABLE_STYLE = "border-collapse:collapse;margin:0.3em 0;color:inherit;background:transparent"
-CELL_STYLE = (  # the grey is seen on white and on black
+CELL_STYLE = (  # this grey is visible on white and on black
     "padding:0.15em 0.8em 0.15em 0;border:0;border-top:1px solid rgba(128,128,128,0.4);"
     "text-align:left;vertical-align:top;color:inherit;background:transparent"
 )
 
 
 def one_line(text: object, most: int = 60) -> str:
-    """A text in one line, cut where it is longer than some characters.
+    """A text on one line, cut to a number of characters.
 
     Args:
-        text: the text; another object gives its str.
+        text: the text; other objects are converted by str.
         most: characters to keep.
     """
     line = " ".join(printable(text).split())
@@ -24,7 +24,7 @@ def one_line(text: object, most: int = 60) -> str:
 
 
 def printable(text: object) -> str:
-    """A text without what a terminal would take for a command; line ends stay.
+    """A text without terminal control characters, except line ends.
 
     Args:
         text: the text; another object gives its str.
@@ -36,8 +36,8 @@ def html_table(title: str, rows: Iterable[tuple[str, str]]) -> str:
     """A table of names and values in HTML, in the colours of the page around it, dark or light.
 
     Args:
-        title: its caption, plain text.
-        rows: name and value of each, plain text; line ends stay.
+        title: caption, plain text.
+        rows: name and value of each row, plain text; line ends are kept.
     """
     lines = [
         f'<tr><th style="{CELL_STYLE};font-weight:600">{html.escape(name)}</th>'

@@ -34,7 +34,7 @@ class ParameterError(ValueError):
     Args:
         field: name of the parameter.
         value: the value that was given.
-        bound: what would have been accepted, in words.
+        bound: accepted values, in words.
     """
 
     def __init__(self, field: str, value: object, bound: str):
@@ -46,7 +46,7 @@ class ParameterError(ValueError):
 
 
 class Warning(UserWarning):  # as in `hc.Warning`
-    """A scenario is run whose values are hardly meant, as clay out of reach."""
+    """A scenario has implausible values, such as clay out of reach."""
 
 
 def _short(value: object) -> str:
@@ -55,7 +55,7 @@ def _short(value: object) -> str:
 
 
 def quantity(field: str, text: str, unit: str = "") -> float | None:
-    """The number of a text like "5 cm", in the unit of a field; None if it is no such text.
+    """The number of a text like "5 cm", in the unit of a field; None for other texts.
 
     Args:
         field: name for the error.
@@ -63,7 +63,7 @@ def quantity(field: str, text: str, unit: str = "") -> float | None:
         unit: unit of the field, "" for none.
 
     Raises:
-        ParameterError: the unit is unknown, or of another kind than the field's.
+        ParameterError: the unit is unknown, or has another dimension than the field's.
     """
     try:
         return from_unit(text, unit)
@@ -148,7 +148,7 @@ def flag(field: str, value: object) -> bool:
         value: the value to check.
 
     Raises:
-        ParameterError: it is none.
+        ParameterError: it is not a bool.
     """
     if not isinstance(value, bool):
         raise ParameterError(field, value, "must be True or False")
@@ -177,7 +177,7 @@ def numbers_of(
         unit: unit of the numbers.
 
     Raises:
-        ParameterError: another count of numbers, or one of them was refused.
+        ParameterError: the count of numbers is wrong, or a number was refused.
     """
     if type(value) is tuple and len(value) == len(names):
         for x in value:
@@ -207,7 +207,7 @@ def table_of(
     above: bool = False,
     unit: str = "",
 ) -> tuple[tuple[float, ...], ...]:
-    """Returns value as rows of floats of one length, each checked as by `number`.
+    """Returns value as rows of floats of equal length, each checked by `number`.
 
     Args:
         field: name for the error.
@@ -218,7 +218,7 @@ def table_of(
         unit: unit of the numbers.
 
     Raises:
-        ParameterError: no such table, or one of the numbers was refused.
+        ParameterError: value is not such a table, or a number was refused.
     """
     import numpy as np
 
@@ -247,7 +247,7 @@ def table_of(
 
 
 def array_of(field: str, value: object, bound: str = "must be numbers") -> np.ndarray:
-    """Returns value as an array of floats of its own.
+    """Returns a copy of value as an array of floats.
 
     Args:
         field: name for the error.
@@ -255,7 +255,7 @@ def array_of(field: str, value: object, bound: str = "must be numbers") -> np.nd
         bound: what is accepted, for the error.
 
     Raises:
-        ParameterError: it is no such array.
+        ParameterError: value is not such an array.
     """
     import numpy as np
 
@@ -300,7 +300,7 @@ def choice(field: str, value: object, valid: Sequence[str]) -> str:
         valid: the names to choose from.
 
     Raises:
-        ParameterError: it is none of them; the error suggests the nearest one.
+        ParameterError: it is not a valid name; the error suggests the nearest one.
     """
     if isinstance(value, str) and value in valid:
         return value
@@ -328,7 +328,7 @@ class Bound:
     names: tuple[str, ...] = ("x", "y")
 
 
-Check = Callable[[str, Any, Any], Any]  # (name for the error, value, the part it is a field of)
+Check = Callable[[str, Any, Any], Any]  # (name for the error, value, part that has the field)
 
 
 def check_fields(part: Any, prefix: str = "") -> None:
@@ -356,7 +356,7 @@ def check_fields(part: Any, prefix: str = "") -> None:
 
 @functools.cache
 def field_types(kind: type) -> dict[str, tuple[Any, Bound | None]]:
-    """Type of each field of a dataclass without its annotations, and its bound.
+    """Type without annotations, and bound, of each field of a dataclass.
 
     Args:
         kind: the dataclass.
@@ -383,12 +383,12 @@ def _field_checks(kind: type, prefix: str) -> list[tuple[str, str, Check]]:
 
 @functools.cache
 def _checks_to_make(kind: type, prefix: str) -> list[tuple[str, str, Check, Any]]:
-    """As `_field_checks`, with the default where it is good as it is; else MISSING."""
+    """As `_field_checks`, with the default if it needs no check; else MISSING."""
     defaults = {f.name: f.default for f in dataclasses.fields(kind)}
     out = []
     for name, told, check in _field_checks(kind, prefix):
         bound, good = field_types(kind)[name][1], defaults[name]
-        try:  # not where the bound is another field
+        try:  # not if the bound is another field
             if (bound and isinstance(bound.low, str)) or check(told, good, None) is not good:
                 good = dataclasses.MISSING
         except ParameterError:
@@ -398,7 +398,7 @@ def _checks_to_make(kind: type, prefix: str) -> list[tuple[str, str, Check, Any]
 
 
 def _check_of(hint: Any, bound: Bound, optional: str = "") -> Check:
-    """The check of a value of this type."""
+    """The check for values of a type."""
     origin, args = get_origin(hint), get_args(hint)
     if origin in (Union, types.UnionType):
         return _check_union(args, bound)
@@ -440,7 +440,7 @@ def _bound_limits(bound: Bound, part: Any) -> dict[str, Any]:
 
 
 def _check_union(kinds: tuple[Any, ...], bound: Bound) -> Check:
-    """None, a word, or the one other type."""
+    """None, a word, or a value of the only other type."""
     nullable, words = type(None) in kinds, [k for k in kinds if get_origin(k) is Literal]
     others = [k for k in kinds if k is not type(None) and k not in words]
     pairs = [k for k in others if _is_pair(k)]
@@ -462,7 +462,7 @@ def _check_union(kinds: tuple[Any, ...], bound: Bound) -> Check:
 
 
 def _is_pair(hint: Any) -> bool:
-    """Whether a type is a pair of parts, one an axis."""
+    """Whether a type is a pair of parts, one per axis."""
     kinds = get_args(hint)
     two = get_origin(hint) is tuple and len(kinds) == 2 and kinds[1] is not ...
     return two and _part_of(kinds[0]) is not None
@@ -548,12 +548,12 @@ def _check_text(field: str, value: Any, part: Any) -> Any:
 
 @contextlib.contextmanager
 def needing(what: str, package: str, extra: str = "data") -> Iterator[None]:
-    """Says how to install a package where importing it fails.
+    """Explains how to install a package if its import fails.
 
     Args:
         what: what needs it, for the error.
         package: its name.
-        extra: of hapticclay, that brings it.
+        extra: extra of hapticclay that installs it.
 
     Raises:
         ParameterError: the package is not installed.

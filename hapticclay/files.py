@@ -35,7 +35,7 @@ def writable(folder: Path) -> None:
         folder: the folder; it is not made.
 
     Raises:
-        ParameterError: it cannot.
+        ParameterError: the folder cannot be made or written.
     """
     made = [p for p in (folder, *folder.parents) if not p.exists()]
     try:
@@ -59,7 +59,7 @@ _read_from: contextvars.ContextVar[frozenset[str]] = contextvars.ContextVar(
 
 @contextlib.contextmanager
 def sources_kept(paths: Iterable[Path]) -> Iterator[None]:
-    """Lets nothing replace the files that a command reads from.
+    """Protects the files that a command reads from being replaced.
 
     Args:
         paths: the files; of a folder, those in it.
@@ -73,7 +73,7 @@ def sources_kept(paths: Iterable[Path]) -> Iterator[None]:
 
 
 def _kind_of_file(path: str) -> str:
-    """What lies at a path in the way of a file; "" for a regular file, or nothing."""
+    """Kind of object at a path that prevents writing a file; "" for a regular file or nothing."""
     try:
         mode = os.stat(path).st_mode
     except OSError:  # nothing is there, or writing will say what is wrong
@@ -85,7 +85,7 @@ def _kind_of_file(path: str) -> str:
 class atomic:
     """Opens a file under a temporary name and renames it when it is complete.
 
-    A symbolic link stays, and the file that it leads to is replaced.
+    A symbolic link is kept; its target is replaced.
 
     Args:
         path: the file.

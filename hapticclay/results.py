@@ -1,4 +1,4 @@
-"""What results of theory and studies share: a line, a table, a frame, a figure, a file."""
+"""Base of results of theory and studies: a line, a table, a frame, a figure, a file."""
 
 from __future__ import annotations
 
@@ -32,27 +32,27 @@ ROOMS = (
     "simulation",
     "studies",
     "ports",
-)  # of classes that a file may name
-SHOWN_ROWS = 10  # of a table in a notebook
+)  # packages of classes that a file may name
+SHOWN_ROWS = 10  # rows of a table shown in a notebook
 Tables = Mapping[str, Mapping[str, Sequence[Any]]]
 
 
 class Result:
-    """What a question was answered with; a subclass is a frozen dataclass.
+    """Base class of results; a subclass is a frozen dataclass.
 
     Attributes:
-        drawn_by: module and function, "module:function", that draw it, looked up when a figure is
-            asked for.
+        drawn_by: "module:function" of the function that draws the result, imported when a figure is
+            requested.
     """
 
     drawn_by: ClassVar[str]
 
     def headline(self) -> str:
-        """What was found, in one line."""
+        """The result in one line."""
         raise NotImplementedError
 
     def tables(self) -> Tables:
-        """What was found, by table: columns headed with their units."""
+        """The result as tables by name; column headings include units."""
         raise NotImplementedError
 
     def __repr__(self) -> str:
@@ -64,7 +64,7 @@ class Result:
         return html_table(f"{type(self).__name__}: {self.headline()}; {name}", rows)
 
     def to_frame(self, table: str = "") -> DataFrame:
-        """One of its tables as a pandas DataFrame.
+        """One table as a pandas DataFrame.
 
         Args:
             table: name of the table; the first by default.
@@ -81,11 +81,11 @@ class Result:
         return out
 
     def plot(self) -> Figure:
-        """Draws it, as the command does."""
+        """Draws the result, as the command does."""
         return pkgutil.resolve_name(self.drawn_by)(self)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Writes the result with all bits, whole or not at all.
+        """Writes the result with exact values, whole or not at all.
 
         Args:
             path: the file, .json.
@@ -94,7 +94,8 @@ class Result:
             The file.
 
         Raises:
-            ParameterError: the file cannot be written, or holds what is no data, as a function.
+            ParameterError: the file cannot be written, or the result holds something
+                other than data, such as a function.
         """
         file = Path(path)
         if file.suffix.lower() != ".json":
@@ -106,7 +107,7 @@ class Result:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Reads what `save` wrote. Nothing is run, and no module but the package's is imported.
+        """Reads a file of `save`. No code is run, and only modules of this package are imported.
 
         Args:
             path: the file.
@@ -142,7 +143,7 @@ def _row(values: Sequence[Any]) -> str:
 
 
 def plain(value: Any) -> Any:
-    """A part or a result as plain data that tell it to the last bit.
+    """Converts a part or a result to plain data, exact to the last bit.
 
     Args:
         value: a number, a text, an array, a dataclass of this package, or tuples, lists and
@@ -182,13 +183,13 @@ def _array(value: np.ndarray) -> dict[str, Any]:
 
 
 def of_plain(data: Any) -> Any:
-    """What `plain` made plain data of.
+    """Restores the object from plain data of `plain`.
 
     Args:
         data: the data.
 
     Raises:
-        ValueError, KeyError, TypeError: they are no such data.
+        ValueError, KeyError, TypeError: the data do not come from `plain`.
     """
     if isinstance(data, list):
         return [of_plain(x) for x in data]
@@ -209,7 +210,7 @@ def of_plain(data: Any) -> Any:
 
 
 def _made(name: str, fields: Mapping[str, Any]) -> Any:
-    """A part of the package, of its fields."""
+    """Makes a part of the package from its fields."""
     module, _, kind = name.partition(":")
     found = getattr(importlib.import_module(module), kind) if _is_own(module) else None
     if found is None or not _is_part(found):
@@ -223,6 +224,6 @@ def _is_own(module: str) -> bool:
 
 
 def _is_part(kind: type) -> bool:
-    """Whether a class is a dataclass or a named tuple of the rooms that hold data."""
+    """Whether a class is a dataclass or a named tuple from the packages with data."""
     data = dataclasses.is_dataclass(kind) or hasattr(kind, "_fields")
     return isinstance(kind, type) and _is_own(kind.__module__) and data

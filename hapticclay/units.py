@@ -30,7 +30,7 @@ def parse_unit(text: str) -> tuple[Decimal, tuple[int, ...]] | None:
     """Size of a unit in SI units and its powers of m, kg, s and rad; None if it is unknown.
 
     Args:
-        text: the unit, as in "N.s/m" or "kg.m^2"; a stroke divides by the next factor alone.
+        text: the unit, as in "N.s/m" or "kg.m^2"; a slash divides by the next factor only.
     """
     for sign, plain in (("µ", "u"), ("μ", "u"), ("²", "^2"), ("³", "^3"), ("·", "."), ("*", ".")):
         text = text.replace(sign, plain)
@@ -39,7 +39,7 @@ def parse_unit(text: str) -> tuple[Decimal, tuple[int, ...]] | None:
         found = FACTOR.fullmatch(factor.strip())
         if not found:
             return None
-        if found[1] is None:  # the figure 1, as in 1/s
+        if found[1] is None:  # the digit 1, as in 1/s
             continue
         unit = _known_unit(found[1])
         if unit is None:
@@ -58,7 +58,7 @@ def _known_unit(name: str) -> tuple[Decimal, tuple[int, ...]] | None:
 
 
 def is_quantity(value: object) -> bool:
-    """Whether a value is a text of a number and a unit.
+    """Whether a value is a text with a number and a unit.
 
     Args:
         value: the value.
@@ -67,14 +67,14 @@ def is_quantity(value: object) -> bool:
 
 
 def from_unit(text: str, unit: str) -> float | None:
-    """The number of a text like "5 cm", in the unit of a field; None if it is no such text.
+    """The number of a text like "5 cm", in the unit of a field; None for other texts.
 
     Args:
         text: number and unit.
         unit: unit of the field, "" for none.
 
     Raises:
-        ValueError: the unit is unknown, or of another kind than the field's.
+        ValueError: the unit is unknown, or has another dimension than the field's.
     """
     found = QUANTITY.fullmatch(text)
     if not found:

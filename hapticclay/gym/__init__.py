@@ -1,4 +1,4 @@
-"""Environments of Gymnasium: hands and controllers that learn at the simulated arm.
+"""Gymnasium environments: hands and controllers that learn on the simulated arm.
 
     import gymnasium
     import hapticclay.gym

@@ -17,20 +17,20 @@ from .quantities import Quantity, either_way
 from .task import DT, Arrays, Command, Handles, Judged, Task, saturated, scene_of
 from .vector import TaskVectorEnv
 
-SAMPLES = 16  # that the controller sees
+SAMPLES = 16  # seen by the controller
 FIRST = 1.0  # K of x at the start [1/kg]
 LEAST, MOST = 0.1, 30.0  # K of x [1/kg]
 RATE = 0.25  # doublings of K at an action of 1
 GAIN_Y = 0.2  # K of y [1/kg], far below its limit
 WEIGHT = 1.0  # [N] deviation of force that costs half a point
-TONES = (0.4, 0.9, 1.7)  # [Hz] of the muscle; all repeat after 10 s
-CYCLE = 1000  # control periods in which they do
-RAMP = 20  # control periods in which the muscle begins
+TONES = (0.4, 0.9, 1.7)  # [Hz] of the muscle; common period 10 s
+CYCLE = 1000  # control periods in that period
+RAMP = 20  # control periods over which the muscle force rises
 
 
 @dataclass(frozen=True)
 class AdaptiveGainTask(Task):
-    """Setting the gain of the compensator along x, for a hand that moves through clay."""
+    """Task: set the compensator gain along x for a hand that moves through clay."""
 
     steps: ClassVar[int] = 28
     limit: ClassVar[int] = 500
@@ -109,7 +109,7 @@ class AdaptiveGain(TaskEnv):
     """A controller sets its gain under a hand that it does not see.
 
     Args:
-        ranges: ends (low, high) of what is drawn for an episode, by name; None for the task's own.
+        ranges: ends (low, high) of each number drawn for an episode, by name; None for the task's.
         engine: as in `Simulation`: "auto", "python" or "native".
         render_mode: "human", "rgb_array" or None.
     """

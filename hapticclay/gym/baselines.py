@@ -1,4 +1,4 @@
-"""Baselines that do not learn: a floor, a sensible controller, and the best that theory knows."""
+"""Baselines without learning: random actions, a simple controller, and the best by theory."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .follow import MOTION, SPEED
 from .registry import ENTRIES, NAMESPACE
 from .task import FORCE, Task
 
-MARGIN = 0.9  # share of the gain limit that the gains of theory keep
+MARGIN = 0.9  # theoretical gains are this share of the gain limit
 PD, PD_IN_GROOVE = (1.0, 0.1), (0.5, 0.3)  # [N/mm], [N/(cm/s)]
 PROBED = 150  # control periods after which the hand is identified
 Policy = Callable[[np.ndarray], np.ndarray]  # observations (n, m) -> actions (n, k)
@@ -29,12 +29,12 @@ Maker = Callable[[Any, list[Truth], int], Policy]
 
 
 class Scores(NamedTuple):
-    """What a policy has reached, an episode for each seed.
+    """Scores of a policy, one episode per seed.
 
     Attributes:
         total: sum of rewards, shape (n,).
-        length: control periods, shape (n,).
-        info: what the last step told, by name, shape (n,) each.
+        length: number of control periods, shape (n,).
+        info: info of the last step, by name, shape (n,) each.
     """
 
     total: np.ndarray
@@ -43,26 +43,26 @@ class Scores(NamedTuple):
 
 
 def at_random(task: Task, truths: list[Truth], seed: int) -> Policy:
-    """Even random actions.
+    """Uniformly distributed random actions.
 
     Args:
         task: the task.
-        truths: numbers drawn, of each copy.
-        seed: of the actions.
+        truths: numbers drawn for each copy.
+        seed: seed of the actions.
     """
     rng, shape = np.random.default_rng(seed), (len(truths), len(task.actions))
     return lambda observations: rng.uniform(-1.0, 1.0, shape)
 
 
 def pd_along_line(task: Any, truths: list[Truth], seed: int) -> Policy:
-    """A PD law across the line, and an integral law of the speed along it.
+    """PD control across the line, and integral control of the speed along it.
 
-    The last action, which is observed, is the integral.
+    The integral is the last action, which is part of the observation.
 
     Args:
-        task: of a line.
-        truths: numbers drawn, which it does not use.
-        seed: likewise.
+        task: a task with a line.
+        truths: numbers drawn; not used.
+        seed: not used.
     """
     names = [q.name for q in task.observations]
     first, last = names.index(MOTION[0].name), names.index(MOTION[4].name)
@@ -82,7 +82,7 @@ def pd_along_line(task: Any, truths: list[Truth], seed: int) -> Policy:
 
 
 def _towards(gains: np.ndarray) -> Policy:
-    """Brings the gain to a value and keeps it there."""
+    """Moves the gain to a value and keeps it there."""
 
     def act(x: np.ndarray) -> np.ndarray:
         octaves = (np.log10(gains) - x[:, -2]) / math.log10(2.0)
@@ -92,10 +92,10 @@ def _towards(gains: np.ndarray) -> Policy:
 
 
 def oracle_gain(b: float, hand: Operator) -> float:
-    """MARGIN of the gain limit of the loop of x with this hand, at most the task's largest [1/kg].
+    """MARGIN times the gain limit along x with this hand, at most the task's largest [1/kg].
 
     Args:
-        b: clay [N.s/m].
+        b: damping of the clay [N.s/m].
         hand: the hand.
     """
     return min(MARGIN * gain_limit("x", b, hand), adaptive_gain.MOST)
@@ -103,7 +103,7 @@ def oracle_gain(b: float, hand: Operator) -> float:
 
 @functools.cache
 def robust_gain(b: float) -> float:
-    """MARGIN of the least gain limit over the corners of the published hands [1/kg].
+    """MARGIN times the least gain limit over the corners of the published hands [1/kg].
 
     Args:
         b: clay [N.s/m].
@@ -113,11 +113,11 @@ def robust_gain(b: float) -> float:
 
 
 def oracle(task: Task, truths: list[Truth], seed: int) -> Policy:
-    """The gain of the hand that was drawn, which an agent does not see.
+    """The gain for the hand of the episode, which an agent does not observe.
 
     Args:
         task: the task.
-        truths: numbers drawn, of each copy.
+        truths: numbers drawn for each copy.
         seed: not used.
     """
     hands = (Operator(t["mass"], t["damper"], t["spring"]) for t in truths)
@@ -125,25 +125,25 @@ def oracle(task: Task, truths: list[Truth], seed: int) -> Policy:
 
 
 def robust(task: Task, truths: list[Truth], seed: int) -> Policy:
-    """The best fixed gain for all hands: that of the worst one.
+    """The best fixed gain for all hands: the gain for the worst one.
 
     Args:
         task: the task.
-        truths: numbers drawn, of which it knows the clay.
+        truths: numbers drawn; only the clay is used.
         seed: not used.
     """
     return _towards(np.array([robust_gain(t["b"]) for t in truths]))
 
 
 def passivity_observer(task: Task, truths: list[Truth], seed: int) -> Policy:
-    """Raises the gain slowly, and lowers it where the device returns more energy than it has taken.
+    """Raises the gain slowly, and lowers it when the device returns more energy than it received.
 
-    The energy is that at the port over the samples seen, less what the virtual mass 1/K stores.
+    The energy is that at the port over the samples, less the energy of the virtual mass 1/K.
 
     Args:
         task: the task.
-        truths: numbers drawn, which it does not use.
-        seed: likewise.
+        truths: numbers drawn; not used.
+        seed: not used.
     """
     n, dt = adaptive_gain.SAMPLES, task.period
 
@@ -157,14 +157,14 @@ def passivity_observer(task: Task, truths: list[Truth], seed: int) -> Policy:
 
 
 def identify_then_set(task: Task, truths: list[Truth], seed: int) -> Policy:
-    """Holds the robust gain, identifies the hand by least squares, then takes its gain.
+    """Holds the robust gain, identifies the hand by least squares, then uses its gain.
 
-    The hand's force is uh - Th p, its muscle's uh three tones of known frequency. The equation is
-    integrated once, so that no velocity is differentiated.
+    The force of the hand is uh - Th p. Its muscle force uh has three tones of known frequency. The
+    equation is integrated once, so that no velocity is differentiated.
 
     Args:
         task: the task.
-        truths: numbers drawn, of which it knows the clay.
+        truths: numbers drawn; only the clay is used.
         seed: not used.
     """
     gains = np.array([robust_gain(t["b"]) for t in truths])
@@ -184,12 +184,12 @@ def identify_then_set(task: Task, truths: list[Truth], seed: int) -> Policy:
 
 
 def hand_from(v: np.ndarray, fh: np.ndarray, dt: float) -> Operator:
-    """The hand that gave these forces, by least squares, within the published hands.
+    """Identifies the hand from its forces by least squares, within the published hands.
 
     Args:
         v: velocity [m/s], shape (n,), from rest.
         fh: force on the handle [N], shape (n,).
-        dt: between samples [s].
+        dt: time between samples [s].
     """
 
     def integral(y: np.ndarray) -> np.ndarray:
@@ -211,18 +211,18 @@ def hand_from(v: np.ndarray, fh: np.ndarray, dt: float) -> Operator:
 # ---- the clay --------------------------------------------------------------------------------
 
 
-SPEEDS = (4.0, 12.0, -12.0, -4.0)  # [cm/s] along x, one after the other
+SPEEDS = (4.0, 12.0, -12.0, -4.0)  # [cm/s] along x, in this order
 
 
 def least_squares(task: Task, truths: list[Truth], seed: int) -> Policy:
-    """Moves to and fro at two speeds, then fits Fy + b |v| to the force of the clay.
+    """Moves back and forth at two speeds, then fits Fy + b |v| to the force of the clay.
 
-    That force is the hand's less what the device takes, (a + 10 v)/K.
+    That force is the hand's force less the inertial and damping force of the device, (a + 10 v)/K.
 
     Args:
         task: the task.
-        truths: numbers drawn, which it does not use.
-        seed: likewise.
+        truths: numbers drawn; not used.
+        seed: not used.
     """
     seen: list[np.ndarray] = []
 
@@ -266,13 +266,13 @@ BASELINES: dict[str, dict[str, Maker]] = {
 
 
 def returns(id: str, make: Maker, seeds: Sequence[int], **options: Any) -> Scores:
-    """Returns of one episode for each seed.
+    """Runs a policy for one episode per seed.
 
     Args:
-        id: of the environment, as "CutLine-v0".
-        make: of the policy.
-        seeds: of the episodes.
-        **options: of the environment.
+        id: id of the environment, as "CutLine-v0".
+        make: makes the policy.
+        seeds: seeds of the episodes.
+        **options: options of the environment.
     """
     name = f"{NAMESPACE}/{choice('id', id, tuple(ENTRIES))}"
     env: Any = gymnasium.make_vec(name, num_envs=len(seeds), **options).unwrapped
@@ -295,9 +295,9 @@ def returns(id: str, make: Maker, seeds: Sequence[int], **options: Any) -> Score
 
 
 def mean_of(x: np.ndarray) -> tuple[float, float]:
-    """Mean, and half of its 95 % interval by the normal law.
+    """Mean, and half of its 95 % confidence interval by the normal distribution.
 
     Args:
-        x: one value an episode.
+        x: one value per episode.
     """
     return float(x.mean()), 1.96 * float(x.std(ddof=1)) / math.sqrt(len(x))

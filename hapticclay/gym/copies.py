@@ -1,4 +1,4 @@
-"""The runs behind an environment: one for each copy, advanced together by one call."""
+"""The simulations of an environment, one per copy, advanced together by one call."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from .task import Command, Handles
 
 
 class Copies:
-    """Runs that advance together by control periods.
+    """Simulations that advance together by control periods.
 
     Args:
         n: number of copies.
         engine: as in `SimulationBatch`.
-        strain: share of the torque limit from which on a run counts as unstable.
+        strain: share of the torque limit beyond which a run counts as unstable.
     """
 
     def __init__(self, n: int, engine: str, strain: float):
@@ -26,11 +26,11 @@ class Copies:
         self._runs: SimulationBatch | None = None
 
     def reset(self, which: Sequence[int], scenarios: Sequence[Scenario]) -> None:
-        """Begins runs anew; at first all of them.
+        """Restarts runs; the first call starts all of them.
 
         Args:
             which: numbers of the copies.
-            scenarios: of each.
+            scenarios: one scenario per copy.
         """
         if self._runs is None:
             given = dict(zip(which, scenarios, strict=True))
@@ -40,12 +40,12 @@ class Copies:
             self._runs.reset(list(which), list(scenarios))
 
     def advance(self, steps: int, command: Command, live: np.ndarray) -> None:
-        """Makes a control period.
+        """Advances by one control period.
 
         Args:
-            steps: engine steps in it.
-            command: what acts.
-            live: which copies go on, shape (n,).
+            steps: engine steps per period.
+            command: command during the period.
+            live: which copies advance, shape (n,).
         """
         if self._runs is None or not live.any():
             return
@@ -54,11 +54,12 @@ class Copies:
         self._runs.advance(steps, force=command.force, mask=live)
 
     def handles(self) -> Handles:
-        """The handles now.
+        """The present state of the handles.
 
-        A run diverges where it is over, as out of reach, or faster than 20 m/s, and where a motor
-        needs a torque that no stable run of the task does. The monitor of a run is not asked: under
-        a muscle that jumps with each action it takes growing swings for growth.
+        A run counts as diverged if it is over (for example out of reach), if it is faster than
+        20 m/s, or if a motor needs a torque that no stable run of the task needs. The stability
+        monitor of a run is not used: with a muscle force that jumps at each action, it would
+        mistake larger swings for growth.
         """
         r = self._runs
         if r is None:

@@ -1,4 +1,4 @@
-"""`hapticclay/CutLine-v0`: a hand guides the arm through clay along a line, at an even speed."""
+"""`hapticclay/CutLine-v0`: a hand guides the arm through clay along a line, at constant speed."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ GAIN_SHARE = Range(0.3, 1.0, "", 0.01, 2.0, False, "gain of the device, share of
 
 @dataclass(frozen=True)
 class CutLineTask(Follow):
-    """Cutting along a line through clay that damps.
+    """Task: cut along a line through viscous clay.
 
     Attributes:
-        shape: of the line: "straight", "arc" or "corner".
+        shape: shape of the line: "straight", "arc" or "corner".
     """
 
     shape: Literal["straight", "arc", "corner"] = "straight"
@@ -86,8 +86,8 @@ class CutLine(TaskEnv):
     """A hand guides the arm through clay along a line, at 5 cm/s.
 
     Args:
-        shape: of the line: "straight", "arc" or "corner".
-        ranges: ends (low, high) of what is drawn for an episode, by name; None for the task's own.
+        shape: shape of the line: "straight", "arc" or "corner".
+        ranges: ends (low, high) of each number drawn for an episode, by name; None for the task's.
         engine: as in `Simulation`: "auto", "python" or "native".
         render_mode: "human", "rgb_array" or None.
     """

@@ -1,4 +1,4 @@
-"""A data set of Minari: episodes of a baseline with noise on its actions."""
+"""Minari data sets: episodes of a baseline with noise on its actions."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from ..errors import choice, integer, needing, number
 from .baselines import BASELINES, at_random, mean_of, returns
 from .registry import NAMESPACE
 
-BASELINE = {  # whose actions are recorded
+BASELINE = {  # baseline whose actions are recorded
     "CutLine-v0": "PD along the line",
     "PareEdge-v0": "PD along the line",
     "AdaptiveGain-v0": "robust gain",
     "ProbeClay-v0": "least squares",
 }
-SCORED = 20  # episodes of the scores that are told with a data set
+SCORED = 20  # episodes behind the scores stored with a data set
 
 
 def record(
     id: str, name: str, episodes: int, noise: float = 0.1, seed: int = 0, engine: str = "auto"
 ) -> Any:
-    """Records episodes of the environment's baseline as a data set of Minari.
+    """Records episodes of the environment's baseline as a Minari data set.
 
     Args:
-        id: of the environment, as "CutLine-v0".
-        name: of the data set, as "hapticclay/cut-line/pd-v0".
-        episodes: how many, 1 to 100000; episode i has the seed `seed` + i.
+        id: id of the environment, as "CutLine-v0".
+        name: name of the data set, as "hapticclay/cut-line/pd-v0".
+        episodes: number of episodes, 1 to 100000; episode i has the seed `seed` + i.
         noise: standard deviation added to each action, 0 to 1.
-        seed: of the first episode.
+        seed: seed of the first episode.
         engine: as in `Simulation`.
 
     Returns:

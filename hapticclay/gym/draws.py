@@ -1,4 +1,4 @@
-"""What differs between episodes: ranges, draws from them, and values given in their place."""
+"""Random quantities of episodes: ranges, draws from them, and given values."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Truth = dict[str, float]
 
 
 class Range(NamedTuple):
-    """The range of a number that is drawn for each episode.
+    """Range of a number drawn for each episode.
 
     Attributes:
         low: smallest value drawn.
@@ -22,8 +22,8 @@ class Range(NamedTuple):
         unit: its unit; "" for none.
         least: smallest value allowed.
         most: largest value allowed.
-        log: whether its logarithm is drawn evenly, else the number itself.
-        what: what it is.
+        log: whether its logarithm is uniformly distributed; else the number itself is.
+        what: description.
     """
 
     low: float
@@ -44,7 +44,7 @@ HAND = {
 
 
 def with_ranges(ranges: Mapping[str, Range], given: Mapping[str, Any] | None) -> dict[str, Range]:
-    """Ranges with other ends.
+    """Copies ranges with other ends.
 
     Args:
         ranges: by name.
@@ -67,14 +67,14 @@ def with_ranges(ranges: Mapping[str, Range], given: Mapping[str, Any] | None) ->
 def draw(
     ranges: Mapping[str, Range], rng: np.random.Generator, given: Mapping[str, Any] | None
 ) -> Truth:
-    """Numbers of an episode.
+    """Draws the numbers of an episode.
 
-    All are drawn, so that those given change no other.
+    All numbers are drawn, so that a given value does not change the others.
 
     Args:
         ranges: by name.
         rng: generator.
-        given: values in place of those drawn, by name; None for none.
+        given: values to use instead of drawn ones, by name; None for none.
 
     Raises:
         ParameterError: a name is unknown, or a value out of its bounds.
@@ -95,7 +95,7 @@ def _spread(r: Range, u: float) -> float:
 
 
 def table_of(ranges: Mapping[str, Range]) -> str:
-    """A table of what is drawn, in Markdown.
+    """Markdown table of the drawn numbers.
 
     Args:
         ranges: by name.

@@ -1,4 +1,4 @@
-"""An environment of Gymnasium: one copy of a task."""
+"""A Gymnasium environment: one copy of a task."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     Args:
         render_mode: "human", "rgb_array" or None.
         engine: as in `Simulation`: "auto", "python" or "native".
-        ranges: ends (low, high) of what is drawn for an episode, by name; None for the task's own.
-        **options: of the task.
+        ranges: ends (low, high) of each number drawn for an episode, by name; None for the task's.
+        **options: options of the task.
 
     Raises:
         ParameterError: an argument is refused.
@@ -55,11 +55,11 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begins an episode.
+        """Starts an episode.
 
         Args:
-            seed: of the generator; None to go on with it.
-            options: values in place of those drawn, by name.
+            seed: seed of the generator; None to keep the present generator.
+            options: values to use instead of drawn ones, by name.
 
         Raises:
             ParameterError: a name is unknown, or a value out of its bounds.
@@ -73,14 +73,14 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Makes a control period.
+        """Advances by one control period.
 
         Args:
-            action: within the action space; beyond it counts as the nearest end.
+            action: action, clipped to the action space.
 
         Raises:
-            ParameterError: the action has another shape.
-            RuntimeError: there was no reset.
+            ParameterError: the action has the wrong shape.
+            RuntimeError: the environment was not reset.
         """
         if not self._live:
             raise RuntimeError("reset the environment before its first step")
@@ -94,7 +94,7 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return found.observations[0], float(found.rewards[0]), bool(found.ended[0]), False, info
 
     def render(self) -> Any:
-        """A picture of the scene seen from above, shape (h, w, 3), in mode "rgb_array"."""
+        """A picture of the scene from above, shape (h, w, 3), in mode "rgb_array"."""
         if self.render_mode is None:
             gymnasium.logger.warn("give render_mode to gymnasium.make to see pictures")
             return None
@@ -126,7 +126,7 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
 
 def numbers_of_copy(info: Arrays, i: int) -> dict[str, Any]:
-    """What is told of one copy, as Python numbers.
+    """Info of one copy, as Python numbers.
 
     Args:
         info: numbers by name, shape (n,) each.

@@ -13,7 +13,7 @@ from .task import Arrays, Task
 
 
 class Period(NamedTuple):
-    """A control period of all copies.
+    """Results of a control period of all copies.
 
     Attributes:
         observations: shape (n, m), float32.
@@ -52,12 +52,12 @@ class Episodes:
         generators: Sequence[np.random.Generator],
         options: Mapping[str, Any] | None,
     ) -> None:
-        """Begins episodes.
+        """Starts episodes.
 
         Args:
             which: numbers of the copies.
-            generators: of what is drawn, of each.
-            options: values in place of those drawn; None for none.
+            generators: random generator of each copy.
+            options: values to use instead of drawn ones; None for none.
         """
         drawn = [draw(self.task.ranges, rng, options) for rng in generators]
         self.copies.reset(which, [self.task.scenario(truth) for truth in drawn])
@@ -71,18 +71,18 @@ class Episodes:
             self.truth[name][i] = value
 
     def observe(self) -> np.ndarray:
-        """Observations now, within their bounds, shape (n, m), float32."""
+        """Present observations, clipped to their bounds, shape (n, m), float32."""
         found = self.task.observe(self.memory, self.handles)
         found = np.minimum(np.maximum(found, self._low), self._high).astype(np.float32)
         found[np.isnan(found)] = 0.0
         return found
 
     def step(self, actions: np.ndarray, live: np.ndarray) -> Period:
-        """Makes a control period.
+        """Advances by one control period.
 
         Args:
-            actions: shape (n, k); beyond -1 to 1 they count as the nearest end.
-            live: which copies go on, shape (n,); what is returned of the others has no meaning.
+            actions: actions, shape (n, k), clipped to -1 to 1.
+            live: which copies advance, shape (n,); results of the others are meaningless.
         """
         clipped = np.minimum(np.maximum(np.asarray(actions, np.float64), -1.0), 1.0)
         clipped[np.isnan(clipped)] = 0.0
@@ -93,7 +93,7 @@ class Episodes:
         return Period(self.observe(), rewards, ended, info)
 
     def truth_of(self, i: int) -> Truth:
-        """What was drawn for a copy, by name.
+        """The numbers drawn for a copy, by name.
 
         Args:
             i: number of the copy.
@@ -101,5 +101,5 @@ class Episodes:
         return {name: float(x[i]) for name, x in self.truth.items()}
 
     def info(self) -> Arrays:
-        """What was drawn, by name, shape (n,) each."""
+        """The numbers drawn, by name, shape (n,) each."""
         return {name: x.copy() for name, x in self.truth.items()}

@@ -1,4 +1,4 @@
-"""Following a line with the handle: what cutting a line and paring an edge share."""
+"""Following a line with the handle: the common base of CutLine and PareEdge."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from .task import FORCE, Arrays, Command, Handles, Judged, Task, saturated
 SPEED = 0.05  # [m/s] along the line
 AHEAD = 5e-3  # [m]
 END, LOST = 10.0, -50.0  # rewards
-SLOW = 4.0  # to which the cost of a wrong speed saturates, so that haste does not pay
-SETTLING = 25  # control periods that the success does not count
+SLOW = 4.0  # the cost of a wrong speed saturates here, so that haste does not pay
+SETTLING = 25  # first control periods, not counted for success
 
 PUSH = (
     either_way("muscle force along the line", 1.0),
@@ -37,12 +37,12 @@ MOTION = (
 
 @dataclass(frozen=True)
 class Follow(Task):
-    """Following a line at an even speed.
+    """Task: follow a line at constant speed.
 
     Attributes:
-        pieces: straight pieces of the line.
+        pieces: number of straight pieces of the line.
         far: distance from the line at which an episode ends [m].
-        most: force of the muscle at an action of 1 [N].
+        most: muscle force at an action of 1 [N].
     """
 
     actions: ClassVar[tuple[Quantity, ...]] = PUSH
@@ -66,8 +66,8 @@ class Follow(Task):
         """Deviation from the line, in tolerances, shape (n,).
 
         Args:
-            m: of the task.
-            at: the handles beside their lines.
+            m: memory of the task.
+            at: positions of the handles along their lines.
         """
         raise NotImplementedError
 
@@ -97,10 +97,10 @@ class Follow(Task):
         return Command(np.stack((t[:, 0] * a - t[:, 1] * b, t[:, 1] * a + t[:, 0] * b), axis=1))
 
     def beside(self, m: Arrays, h: Handles) -> lines.Place:
-        """The handles beside their lines, as `judge` has found them; anew after a reset.
+        """Positions of the handles along their lines, as found by `judge`; computed after a reset.
 
         Args:
-            m: of the task.
+            m: memory of the task.
             h: handles.
         """
         if m["at"] is None:
@@ -108,12 +108,12 @@ class Follow(Task):
         return m["at"]
 
     def motion(self, m: Arrays, h: Handles, at: lines.Place) -> list[np.ndarray]:
-        """The observations of MOTION.
+        """The observations listed in MOTION.
 
         Args:
-            m: of the task.
+            m: memory of the task.
             h: handles.
-            at: the same beside their lines.
+            at: positions of the handles along their lines.
         """
         v, w = lines.along_across(at.tangent, h.v)
         f, g = lines.along_across(at.tangent, h.fh)

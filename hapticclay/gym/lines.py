@@ -1,4 +1,4 @@
-"""Lines in the plane, as straight pieces one after the other, and places along them."""
+"""Lines in the plane, made of straight pieces, and positions along them."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-PIECES = 24  # of an arc
+PIECES = 24  # pieces of an arc
 
 
 class Place(NamedTuple):
-    """Where a handle is beside its line; arrays over copies.
+    """Position of a handle relative to its line; arrays over copies.
 
     Attributes:
-        s: length of the line up to its nearest point [m], shape (n,).
+        s: arc length of the nearest point of the line [m], shape (n,).
         across: distance from the line, positive to its left [m], shape (n,).
-        distance: from the nearest point [m], shape (n,).
+        distance: distance from the nearest point [m], shape (n,).
         tangent: direction of the line there, shape (n, 2).
-        ahead: its direction further on, shape (n, 2).
+        ahead: direction of the line further on, shape (n, 2).
     """
 
     s: np.ndarray
@@ -47,7 +47,7 @@ def corner(length: float) -> list[tuple[float, float]]:
 
 
 def arc(length: float) -> list[tuple[float, float]]:
-    """A quarter of a circle, from the direction of x to the left, as a polygon of that length.
+    """A quarter circle that starts along x and turns left, as a polygon of that length.
 
     Args:
         length: [m].
@@ -65,22 +65,22 @@ SHAPES = {"straight": straight, "arc": arc, "corner": corner}
 
 
 def turned(nodes: list[tuple[float, float]], angle: float) -> np.ndarray:
-    """A line turned about its begin, shape (number of nodes, 2) [m].
+    """A line rotated about its start, shape (number of nodes, 2) [m].
 
     Args:
-        nodes: of the line [m].
-        angle: counterclockwise [rad].
+        nodes: nodes of the line [m].
+        angle: angle, counterclockwise [rad].
     """
     c, s = math.cos(angle), math.sin(angle)
     return np.array([(c * x - s * y, s * x + c * y) for x, y in nodes])
 
 
 def empty(n: int, pieces: int) -> dict[str, np.ndarray]:
-    """Room for a line of each copy.
+    """Allocates a line for each copy.
 
     Args:
         n: number of copies.
-        pieces: of a line.
+        pieces: number of pieces of a line.
     """
     return {
         "nodes": np.zeros((n, pieces + 1, 2)), "tangents": np.zeros((n, pieces, 2)),
@@ -89,12 +89,12 @@ def empty(n: int, pieces: int) -> dict[str, np.ndarray]:
 
 
 def lay(m: dict[str, np.ndarray], i: int, nodes: np.ndarray) -> None:
-    """Lays the line of a copy.
+    """Sets the line of a copy.
 
     Args:
-        m: from `empty`.
+        m: memory from `empty`.
         i: number of the copy.
-        nodes: of the line [m], shape (pieces + 1, 2).
+        nodes: nodes of the line [m], shape (pieces + 1, 2).
     """
     d = np.diff(nodes, axis=0)
     lengths = np.sqrt(d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1])
@@ -104,12 +104,12 @@ def lay(m: dict[str, np.ndarray], i: int, nodes: np.ndarray) -> None:
 
 
 def place(m: dict[str, np.ndarray], p: np.ndarray, ahead: float) -> Place:
-    """Where handles are beside their lines.
+    """Positions of handles relative to their lines.
 
     Args:
-        m: from `empty`.
-        p: their positions [m], shape (n, 2).
-        ahead: how far on to look [m].
+        m: memory from `empty`.
+        p: positions of the handles [m], shape (n, 2).
+        ahead: look-ahead distance along the line [m].
     """
     tx, ty = m["tangents"][:, :, 0], m["tangents"][:, :, 1]
     dx = p[:, None, 0] - m["nodes"][:, :-1, 0]
@@ -127,10 +127,10 @@ def place(m: dict[str, np.ndarray], p: np.ndarray, ahead: float) -> Place:
 
 
 def along_across(tangent: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Parts of vectors along and across a line.
+    """Components of vectors along and across a line.
 
     Args:
-        tangent: of the line, shape (n, 2).
+        tangent: direction of the line, shape (n, 2).
         x: the vectors, shape (n, 2).
     """
     along = tangent[:, 0] * x[:, 0] + tangent[:, 1] * x[:, 1]

@@ -31,7 +31,7 @@ SHARE = 0.2  # of the target depth: tolerance
 
 @dataclass(frozen=True)
 class PareEdgeTask(Follow):
-    """Paring the edge of a block that stays cut."""
+    """Task: pare the edge of a block that stays cut."""
 
     drawn: ClassVar[dict[str, Range]] = {
         **HAND,
@@ -58,7 +58,7 @@ class PareEdgeTask(Follow):
         )
 
     def line(self, truth: Truth) -> np.ndarray:
-        """Nodes of the path of the tool's centre [m].
+        """Nodes of the path of the tool centre [m].
 
         Args:
             truth: numbers drawn.
@@ -78,11 +78,11 @@ class PareEdgeTask(Follow):
         return scene_of(truth, name="pare edge", clay=Clay.of_groove(groove), start=start)
 
     def depths(self, m: Arrays, at: lines.Place) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Depth of the tool's edge, its target, and the target further on [m], shape (n,) each.
+        """Depth of the tool edge, its target, and the target ahead [m], shape (n,) each.
 
         Args:
-            m: of the task.
-            at: the handles beside their lines.
+            m: memory of the task.
+            at: positions of the handles along their lines.
         """
         along = m["lengths"][:, 1]
         step = m["depth_at_end"] - m["depth"]
@@ -110,7 +110,7 @@ class PareEdge(TaskEnv):
     """A hand pares the edge of a block of clay to an even depth.
 
     Args:
-        ranges: ends (low, high) of what is drawn for an episode, by name; None for the task's own.
+        ranges: ends (low, high) of each number drawn for an episode, by name; None for the task's.
         engine: as in `Simulation`: "auto", "python" or "native".
         render_mode: "human", "rgb_array" or None.
     """

@@ -1,4 +1,4 @@
-"""What a picture of an episode shows."""
+"""Pictures of an episode."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .episodes import Episodes
 from .task import Task
 
 RADIUS = 0.005  # [m] of the tool where a task has none
-PATH = 2000  # points that are kept
+PATH = 2000  # points of the path to keep
 
 
 class Picture:
@@ -29,7 +29,7 @@ class Picture:
         self._path: list[tuple[float, float]] = []
 
     def begin(self) -> None:
-        """Begins a new path."""
+        """Starts a new path."""
         self._path = []
 
     def note(self, p: np.ndarray) -> None:
@@ -44,10 +44,10 @@ class Picture:
         del self._path[:-PATH]
 
     def drawn(self, episodes: Episodes, i: int = 0) -> np.ndarray | None:
-        """The picture now, shape (height, width, 3), uint8; None where a window shows it.
+        """The present picture, shape (height, width, 3), uint8; None if a window shows it.
 
         Args:
-            episodes: of the task.
+            episodes: episodes of the task.
             i: number of the copy.
         """
         p = episodes.handles.p[i]
@@ -75,8 +75,8 @@ def joints_at(s: Scenario, x: float, y: float) -> np.ndarray:
 
     Args:
         s: the scene.
-        x: of the handle [m].
-        y: the same [m].
+        x: x of the handle [m].
+        y: y of the handle [m].
     """
     ox, oy = s.origin
     q, _ = inverse_kinematics(ox + x, oy + y, s.arm.links)
@@ -85,7 +85,7 @@ def joints_at(s: Scenario, x: float, y: float) -> np.ndarray:
 
 
 def blocks_of(s: Scenario) -> list[tuple[float, float, float, float]]:
-    """Blocks of clay, (x, y, width, height) [m]; none for clay everywhere.
+    """Blocks of clay, (x, y, width, height) [m]; empty if clay is everywhere.
 
     Args:
         s: the scene.
@@ -95,10 +95,10 @@ def blocks_of(s: Scenario) -> list[tuple[float, float, float, float]]:
 
 
 def view_of(nodes: np.ndarray | None, p: np.ndarray) -> tuple[float, float, float]:
-    """Middle of the closer view and half its side [m].
+    """Centre of the close-up view and half its side [m].
 
     Args:
-        nodes: of the line [m]; None for none.
+        nodes: nodes of the line [m]; None for none.
         p: position of the handle [m], shape (2,).
     """
     if nodes is None:

@@ -24,7 +24,7 @@ LOST = -5.0  # an error of a factor e^5
 
 @dataclass(frozen=True)
 class ProbeClayTask(Task):
-    """Identifying clay that damps and yields by moving through it."""
+    """Task: identify damping and yield force of clay by moving through it."""
 
     limit: ClassVar[int] = 150
     actions: ClassVar[tuple[Quantity, ...]] = (
@@ -96,7 +96,7 @@ class ProbeClayTask(Task):
 
 
 def answer_of(b: float, Fy: float) -> tuple[float, float]:
-    """The part of an action that names a clay.
+    """The answer part of an action for a given clay.
 
     Args:
         b: damping [N.s/m].
@@ -110,7 +110,7 @@ def answer_of(b: float, Fy: float) -> tuple[float, float]:
 
 
 def _error(answer: np.ndarray, truth: np.ndarray, middle: float) -> np.ndarray:
-    """|ln| of answer over truth."""
+    """|ln(answer/truth)|."""
     pairs = zip(answer.tolist(), truth.tolist(), strict=True)
     return np.array([abs(DECADES * math.log(10.0) * a - math.log(x / middle)) for a, x in pairs])
 
@@ -119,7 +119,7 @@ class ProbeClay(TaskEnv):
     """A hand moves through unknown clay for 3 s, then names its b and Fy.
 
     Args:
-        ranges: ends (low, high) of what is drawn for an episode, by name; None for the task's own.
+        ranges: ends (low, high) of each number drawn for an episode, by name; None for the task's.
         engine: as in `Simulation`: "auto", "python" or "native".
         render_mode: "human", "rgb_array" or None.
     """

@@ -1,4 +1,4 @@
-"""Quantities of actions and observations: names, bounds and units, and the spaces made of them."""
+"""Quantities of actions and observations: names, bounds and units, and their spaces."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gymnasium.spaces import Box
 
 
 class Quantity(NamedTuple):
-    """A number of an action or of an observation.
+    """One number of an action or an observation.
 
     Attributes:
         name: what it is.
@@ -26,7 +26,7 @@ class Quantity(NamedTuple):
 
 
 def either_way(name: str, most: float, unit: str = "") -> Quantity:
-    """A quantity whose bounds are symmetric.
+    """A quantity with symmetric bounds.
 
     Args:
         name: what it is.
@@ -37,7 +37,7 @@ def either_way(name: str, most: float, unit: str = "") -> Quantity:
 
 
 def box_of(quantities: Sequence[Quantity]) -> Box:
-    """The space of some quantities, shape (n,), float32.
+    """The space of quantities, shape (n,), float32.
 
     Args:
         quantities: ordered.
@@ -48,7 +48,7 @@ def box_of(quantities: Sequence[Quantity]) -> Box:
 
 
 def table_of(quantities: Sequence[Quantity]) -> str:
-    """A table of some quantities in Markdown: number, name, bounds, unit.
+    """Markdown table of quantities: number, name, bounds, unit.
 
     Args:
         quantities: ordered.

@@ -13,9 +13,9 @@ class Entry(NamedTuple):
     """An environment.
 
     Attributes:
-        module: of this package that has it.
-        name: of its class; that of the many copies ends in Vector.
-        limit: control periods after which an episode is cut off; None where it ends by itself.
+        module: module of this package that contains it.
+        name: name of its class; the vector environment adds Vector.
+        limit: control periods after which an episode is truncated; None if it ends by itself.
     """
 
     module: str
@@ -33,7 +33,7 @@ IDS = tuple(f"{NAMESPACE}/{name}" for name in ENTRIES)
 
 
 def register_all() -> None:
-    """Registers the environments that are not registered yet."""
+    """Registers all environments that are not registered yet."""
     for id, entry in zip(IDS, ENTRIES.values(), strict=True):
         if id not in gymnasium.registry:
             place = f"{__package__}.{entry.module}:{entry.name}"

@@ -1,4 +1,4 @@
-"""A vector environment as Stable-Baselines3 takes it."""
+"""Adapter from vector environments to Stable-Baselines3."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ with needing("hapticclay.gym.stable_baselines", "stable_baselines3", "sb3"):
 class StableBaselinesVecEnv(VecEnv):
     """Many copies of a task for algorithms of Stable-Baselines3.
 
-    An episode that is over begins anew in the same step; its last observation is told as
-    `terminal_observation`, and whether it was cut off as `TimeLimit.truncated`.
+    When an episode ends, the next one starts in the same step. The infos then contain the last
+    observation as `terminal_observation` and truncation as `TimeLimit.truncated`.
 
     Args:
-        env: the vector environment, or the name of one, as "CutLine-v0".
-        num_envs: number of copies, where env is a name.
-        **options: of the environment, where env is a name.
+        env: the vector environment, or its name, as "CutLine-v0".
+        num_envs: number of copies, if env is a name.
+        **options: options of the environment, if env is a name.
 
     Raises:
-        ParameterError: env does not begin episodes anew in the same step.
+        ParameterError: env does not restart episodes in the same step.
     """
 
     def __init__(self, env: TaskVectorEnv | str, num_envs: int = 1, **options: Any):
@@ -46,7 +46,7 @@ class StableBaselinesVecEnv(VecEnv):
         self._actions = np.zeros(env.action_space.shape or (), np.float32)
 
     def reset(self) -> np.ndarray:
-        """Begins episodes, with the seeds and options that were set."""
+        """Starts episodes with the seeds and options that were set."""
         seeds = self._seeds if any(x is not None for x in self._seeds) else None
         options = self._options[0] if self._options else None
         observations, infos = self.env.reset(seed=seeds, options=options or None)
@@ -64,7 +64,7 @@ class StableBaselinesVecEnv(VecEnv):
         self._actions = actions
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Makes a control period."""
+        """Advances by one control period."""
         observations, rewards, ended, cut_off, infos = self.env.step(self._actions)
         over = ended | cut_off
         told = []
@@ -90,7 +90,7 @@ class StableBaselinesVecEnv(VecEnv):
         return list(self._get_indices(indices))
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute of the copies, which they share.
+        """An attribute, common to all copies.
 
         Args:
             attr_name: its name.
@@ -99,7 +99,7 @@ class StableBaselinesVecEnv(VecEnv):
         return [getattr(self.env, attr_name) for _ in self._indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Sets an attribute of all copies, which they share.
+        """Sets an attribute, common to all copies.
 
         Args:
             attr_name: its name.
@@ -113,13 +113,13 @@ class StableBaselinesVecEnv(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Refused: the copies are no environments of their own.
+        """Refused: the copies are not separate environments.
 
         Args:
             method_name: name of the method.
-            *method_args: for it.
+            *method_args: its arguments.
             indices: of the copies.
-            **method_kwargs: for it.
+            **method_kwargs: its keyword arguments.
 
         Raises:
             ParameterError: always.
@@ -127,7 +127,7 @@ class StableBaselinesVecEnv(VecEnv):
         raise ParameterError("method_name", method_name, "must be none: copies have no methods")
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Whether a wrapper is around the copies: none is.
+        """Whether the copies are wrapped: always False.
 
         Args:
             wrapper_class: class of the wrapper.
@@ -137,7 +137,7 @@ class StableBaselinesVecEnv(VecEnv):
 
 
 def _of_copy(infos: dict[str, Any], i: int) -> dict[str, Any]:
-    """What infos tell of a copy."""
+    """The infos of one copy."""
     return {
         name: x[i].item()
         for name, x in infos.items()

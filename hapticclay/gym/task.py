@@ -1,8 +1,8 @@
-"""What a task is: a scene to draw, actions, observations and rewards, for many copies at once.
+"""Tasks: random scenes, actions, observations and rewards, for many copies at once.
 
-The functions of a task work on arrays with a row for each copy. They use +, -, *, / and square
-roots alone, and `math` number by number for the rest, so that a row depends on its own copy to the
-last bit, however many copies there are.
+The functions of a task work on arrays with one row per copy. Array operations are limited to +, -,
+*, / and square roots; all others use `math`, number by number. So a row depends only on its own
+copy, bit for bit, for any number of copies.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from ..scene.scenario import Scenario
 from .draws import Range, Truth, with_ranges
 from .quantities import Quantity
 
-DT = 3.5714286e-4  # [s] 56 of them are 20 ms, and no step is longer than the paper's 0.36 ms
-FORCE = 30.0  # [N] of the muscle at an action of 1
-Arrays = dict[str, Any]  # a row for each copy
+DT = 3.5714286e-4  # [s] 56 steps are 20 ms, and a step is at most the paper's 0.36 ms
+FORCE = 30.0  # [N] muscle force at an action of 1
+Arrays = dict[str, Any]  # one row per copy
 
 
 class Handles(NamedTuple):
-    """The handles at the end of a control period, a row for each copy.
+    """State of the handles at the end of a control period, one row per copy.
 
     Attributes:
         p: position [m], shape (n, 2).
@@ -43,10 +43,10 @@ class Handles(NamedTuple):
 
 
 class Command(NamedTuple):
-    """What acts for a control period.
+    """Command for a control period.
 
     Attributes:
-        force: of the muscle on the handle [N], shape (n, 2).
+        force: muscle force on the handle [N], shape (n, 2).
         gain: K of the compensator [1/kg], shape (n, 2); None to keep it.
     """
 
@@ -55,10 +55,10 @@ class Command(NamedTuple):
 
 
 class Judged(NamedTuple):
-    """What a control period was worth.
+    """Reward of a control period.
 
     Attributes:
-        reward: shape (n,).
+        reward: reward, shape (n,).
         ended: whether the episode is over, shape (n,).
         info: numbers by name, shape (n,) each.
     """
@@ -70,18 +70,18 @@ class Judged(NamedTuple):
 
 @dataclass(frozen=True)
 class Task:
-    """A task: numbers and functions, without an engine.
+    """A task: its numbers and functions, independent of the engine.
 
     Attributes:
         given: ends (low, high) of ranges other than the task's own, by name; None for none.
         period: control period [s].
-        steps: engine steps in it.
-        limit: control periods after which an episode is cut off.
-        strain: share of the torque limit from which on a run counts as unstable.
+        steps: engine steps per control period.
+        limit: control periods after which an episode is truncated.
+        strain: share of the torque limit beyond which a run counts as unstable.
         actions: quantities of an action.
         observations: quantities of an observation.
-        drawn: ranges of what is drawn for each episode.
-        ranges: the same, with the ends that were given.
+        drawn: ranges of the numbers drawn for each episode.
+        ranges: these ranges with the given ends.
     """
 
     given: Mapping[str, Any] | None = None
@@ -114,7 +114,7 @@ class Task:
         raise NotImplementedError
 
     def memory(self, n: int) -> Arrays:
-        """What the task keeps of n copies, a row for each.
+        """State of the task for n copies, one row per copy.
 
         Args:
             n: number of copies.
@@ -122,22 +122,22 @@ class Task:
         raise NotImplementedError
 
     def begin(self, m: Arrays, i: int, truth: Truth, rng: np.random.Generator) -> None:
-        """Begins an episode of a copy.
+        """Starts an episode of one copy.
 
         Args:
-            m: of the task.
+            m: memory of the task.
             i: number of the copy.
             truth: numbers drawn, by name.
-            rng: for what else is drawn.
+            rng: generator for further random numbers.
         """
         raise NotImplementedError
 
     def command(self, m: Arrays, actions: np.ndarray) -> Command:
-        """What an action does for a control period.
+        """Command of an action for a control period.
 
         Args:
-            m: of the task.
-            actions: within -1 to 1, shape (n, number of actions).
+            m: memory of the task.
+            actions: actions within -1 to 1, shape (n, number of actions).
         """
         raise NotImplementedError
 
@@ -145,7 +145,7 @@ class Task:
         """Observations, shape (n, number of observations).
 
         Args:
-            m: of the task.
+            m: memory of the task.
             h: handles.
         """
         raise NotImplementedError
@@ -154,9 +154,9 @@ class Task:
         """Rewards of a control period.
 
         Args:
-            m: of the task, which is brought up to date.
-            h: handles at its end.
-            actions: in it.
+            m: memory of the task; it is updated.
+            h: handles at the end of the period.
+            actions: actions of the period.
         """
         raise NotImplementedError
 
@@ -171,7 +171,7 @@ def hand_of(truth: Truth) -> Operator:
 
 
 def scene_of(truth: Truth, **parts: Any) -> Scenario:
-    """The scene that all tasks share: a hand at the arm, without an end of its own.
+    """The scene common to all tasks: a hand at the arm, without an end condition.
 
     Args:
         truth: numbers drawn.
@@ -186,9 +186,9 @@ def scene_of(truth: Truth, **parts: Any) -> Scenario:
 
 
 def saturated(x: np.ndarray) -> np.ndarray:
-    """x/(1 + x): a cost that grows as x where x is small, and is less than 1 always.
+    """x/(1 + x): a cost that grows like x for small x and stays below 1.
 
     Args:
-        x: >= 0.
+        x: cost, >= 0.
     """
     return x / (1.0 + x)

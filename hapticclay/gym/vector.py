@@ -1,4 +1,4 @@
-"""A vector environment of Gymnasium: many copies of a task, advanced by one call."""
+"""A Gymnasium vector environment: many copies of a task, advanced by one call."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ MOST_COPIES = 100_000
 
 
 class TaskVectorEnv(VectorEnv):
-    """Many copies of a task. Copy i of seed s makes the same numbers as one environment of s + i.
+    """Many copies of a task. Copy i with seed s gives the same numbers as one with seed s + i.
 
     Args:
         num_envs: number of copies, 1 to 100000.
-        max_episode_steps: control periods after which an episode is cut off; None for the task's.
+        max_episode_steps: control periods after which an episode is truncated; None for the task's.
         autoreset_mode: "NEXT_STEP", "SAME_STEP" or "DISABLED", as a word or a member of
             `AutoresetMode`.
         render_mode: "rgb_array" or None.
         engine: as in `Simulation`: "auto", "python" or "native".
-        ranges: ends (low, high) of what is drawn for an episode, by name; None for the task's own.
-        **options: of the task.
+        ranges: ends (low, high) of each number drawn for an episode, by name; None for the task's.
+        **options: options of the task.
 
     Raises:
         ParameterError: an argument is refused.
@@ -92,11 +92,12 @@ class TaskVectorEnv(VectorEnv):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Begins episodes.
+        """Starts episodes.
 
         Args:
-            seed: of the first copy, the others count on; or one for each; None to go on.
-            options: values in place of those drawn, by name; and "reset_mask", which copies to
+            seed: seed of the first copy, counted up for the others; or one seed per copy; None to
+                keep the present generators.
+            options: values to use instead of drawn ones, by name; and "reset_mask", which copies to
                 reset, shape (n,), bool.
 
         Raises:
@@ -144,14 +145,14 @@ class TaskVectorEnv(VectorEnv):
     def step(
         self, actions: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Makes a control period of all copies.
+        """Advances all copies by one control period.
 
         Args:
             actions: shape (n, k).
 
         Raises:
-            ParameterError: the actions have another shape.
-            RuntimeError: there was no reset, or with autoreset "DISABLED" an episode is over.
+            ParameterError: the actions have the wrong shape.
+            RuntimeError: there was no reset, or an episode is over with autoreset "DISABLED".
         """
         actions = np.asarray(actions)
         if actions.shape != self.action_space.shape:
@@ -167,7 +168,7 @@ class TaskVectorEnv(VectorEnv):
         ended = found.ended & live
         cut_off = (self._count >= self._most) & live
         rewards = np.where(live, found.rewards, 0.0)
-        if not live.all():  # with NEXT_STEP: an episode was over before this step
+        if not live.all():  # with NEXT_STEP: the episode ended before this step
             self._begin(~live, None)
         self._over = ended | cut_off
         infos = self._infos(found.info, live)
@@ -181,7 +182,7 @@ class TaskVectorEnv(VectorEnv):
         return _masked(self._episodes.info(), everywhere) | _masked(info, live)
 
     def _next_episodes(self, last: np.ndarray, infos: dict[str, Any]) -> np.ndarray:
-        """Begins the next episodes where one is over; what was last goes into infos."""
+        """Starts the next episode where one is over; its final values go into infos."""
         over = self._over.copy()
         final = np.full(self.num_envs, None, object)
         for i in np.flatnonzero(over).tolist():
@@ -202,7 +203,7 @@ class TaskVectorEnv(VectorEnv):
         return self._episodes.observe()
 
     def render(self) -> tuple[Any, ...] | None:
-        """A picture of each copy seen from above, in mode "rgb_array"."""
+        """A picture of each copy from above, in mode "rgb_array"."""
         if self.render_mode is None:
             gymnasium.logger.warn("give render_mode to gymnasium.make_vec to see pictures")
             return None
@@ -217,7 +218,7 @@ class TaskVectorEnv(VectorEnv):
         return tuple(frames)
 
     def info_of(self, i: int) -> dict[str, Any]:
-        """What was drawn for a copy.
+        """The numbers drawn for a copy.
 
         Args:
             i: number of the copy.
@@ -233,7 +234,7 @@ class TaskVectorEnv(VectorEnv):
 
 
 def mode_of(given: str | AutoresetMode) -> AutoresetMode:
-    """A mode of autoreset, itself or by its name.
+    """An autoreset mode, given as a member or by name.
 
     Args:
         given: the mode.
@@ -247,7 +248,7 @@ def mode_of(given: str | AutoresetMode) -> AutoresetMode:
 
 
 def _masked(info: Arrays, mask: np.ndarray) -> dict[str, Any]:
-    """Numbers of copies as Gymnasium tells them: arrays, and of which copies they are."""
+    """Info in the form of Gymnasium: arrays, with masks of the copies that have a value."""
     found: dict[str, Any] = {}
     for name, x in info.items():
         found[name] = np.where(mask, x, np.zeros_like(x))

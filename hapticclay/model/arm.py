@@ -4,7 +4,7 @@ Joint angles: q1 of link 1 against world x, q2 of link 2 against link 1 (Eq. 14)
 the absolute angles theta1 = q1 and theta2 = q1 + q2, in which the inertia matrix is the constant
 diag(I1, I2), without Coriolis terms. Derivations: docs/equations.md.
 
-The formulas take an arm as plain numbers, `links`: l1, l2 [m], I1, I2 [kg.m^2], and the trace of
+The formulas use an arm as plain numbers, `links`: l1, l2 [m], I1, I2 [kg.m^2], and the trace of
 its mobility [1/kg]; see `Arm.links`.
 """
 
@@ -82,7 +82,7 @@ def jacobian(q1: float, q2: float, links: Links) -> Columns:
 
 
 def jacobians(q1: Any, q2: Any, links: Links) -> tuple[Any, ...]:
-    """As `jacobian`, over arrays.
+    """As `jacobian`, for arrays.
 
     Args:
         q1: angles of link 1 [rad], of any shape.
@@ -215,7 +215,7 @@ def inverse_kinematics(x: float, y: float, links: Links) -> tuple[float, float]:
     c = (x * x + y * y - l1 * l1 - l2 * l2) / (2.0 * l1 * l2)
     q2 = -math.acos(min(1.0, max(-1.0, c)))
     q1 = math.atan2(y, x) - math.atan2(l2 * math.sin(q2), l1 + l2 * math.cos(q2))
-    # the IEEE remainder by a turn, which compiled code has no function for: exact, by Sterbenz
+    # IEEE remainder by one turn, which compiled code lacks; exact by Sterbenz' lemma
     if q1 > math.pi:
         q1 -= 2.0 * math.pi
     elif q1 < -math.pi:

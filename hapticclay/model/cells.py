@@ -1,4 +1,4 @@
-"""Clay law of one axis: damping, growth, yielding and springs, constant in each region or cell."""
+"""Clay law of one axis: damping, growth, yielding and springs, constant per region or cell."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .traits import (
     Law,
 )
 
-OPTIONAL = ("growth", "Fy", "K", "n")  # of each region or cell, beside values
+OPTIONAL = ("growth", "Fy", "K", "n")  # further values of each region or cell
 
 
 class CellLaw:
-    """What the laws of one axis share: damping that is constant in each cell of a grid.
+    """Base of the laws of one axis: damping that is constant in each cell of a grid.
 
-    They have `borders`, `damping`, `rates` and `along`, as `Grid`.
+    Subclasses have `borders`, `damping`, `rates` and `along`, as `Grid`.
     """
 
     @property
@@ -46,11 +46,11 @@ class CellLaw:
 
     @property
     def yields(self: Any) -> bool:
-        """Whether it has a yield force or a consistency anywhere."""
+        """Whether any cell has a yield force or a consistency."""
         return bool(self.Fy or self.K)
 
     def at(self: Any, x: Any, y: Any) -> np.ndarray:
-        """Damping at some places, growth aside [N.s/m].
+        """Damping at given places, without growth [N.s/m].
 
         Args:
             x: coordinates [m].
@@ -59,7 +59,7 @@ class CellLaw:
         return self.damping[self.index(x, y)]
 
     def flows_at(self: Any, x: Any, y: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Yield force [N], consistency [N/(m/s)^n] and flow index at some places.
+        """Yield force [N], consistency [N/(m/s)^n] and flow index at given places.
 
         Args:
             x: coordinates [m].
@@ -70,7 +70,7 @@ class CellLaw:
         return Fy, K, n
 
     def index(self: Any, x: Any, y: Any) -> tuple[Any, Any]:
-        """Cells of some places; on a line between them, the one beyond it.
+        """Cells at given places; on a line between two cells, the one beyond it.
 
         Args:
             x: coordinates [m].
@@ -84,7 +84,7 @@ class CellLaw:
         return i, j
 
     def forces(self: Any, kinds: Iterable[Law], speed: float, dent: float) -> np.ndarray:
-        """Force of each cell on a tool, growth aside [N], shape (n, m).
+        """Force of each cell on a tool, without growth [N], shape (n, m).
 
         Args:
             kinds: laws of the clay.
@@ -97,7 +97,7 @@ class CellLaw:
     def forces_at(
         self: Any, kinds: Iterable[Law], x: Any, y: Any, speed: float, dent: float
     ) -> np.ndarray:
-        """As `forces`, at some places.
+        """As `forces`, at given places.
 
         Args:
             kinds: laws of the clay.
@@ -112,8 +112,8 @@ class CellLaw:
         """Damping of the cells in a box [N.s/m].
 
         Args:
-            low: its lowest corner [m].
-            high: its highest corner [m].
+            low: lowest corner of the box [m].
+            high: highest corner of the box [m].
         """
         (i, j), (k, m) = self.index(*low), self.index(*high)
         return self.damping[i : k + 1, j : m + 1].ravel().tolist()
@@ -157,7 +157,7 @@ class Profile(CellLaw):
         for name in ("values", *OPTIONAL):
             given = getattr(self, name)
             if len(given) != len(regions) and (given or name == "values"):
-                numbers_of(f"clay.{name}", given, [str(i) for i in regions])  # tells what is amiss
+                numbers_of(f"clay.{name}", given, [str(i) for i in regions])  # raises the error
         check_ascending("clay.edges", self.edges)
         _leave_out(self)
 
@@ -200,7 +200,7 @@ class Profile(CellLaw):
 class Grid(CellLaw):
     """Damping b of one axis on a grid of cells, constant in each.
 
-    A border between cells alike is none: no step ends on it, and no crossing is reported.
+    Equal neighbouring cells have no border: no step ends there, no crossing is reported.
 
     Attributes:
         x_edges: borders along x [m], ascending, shape (n,).
@@ -242,12 +242,12 @@ class Grid(CellLaw):
 
     @functools.cached_property
     def damping(self) -> np.ndarray:
-        """Damping on entry, a line of cells along y for each along x [N.s/m], shape (n, m)."""
+        """Damping on entry, one row of cells along y per cell along x [N.s/m], shape (n, m)."""
         return np.array(self.values)
 
     @functools.cached_property
     def rates(self) -> np.ndarray:
-        """Rates at which it grows [N.s/m per s], as damping."""
+        """Growth rates of the damping [N.s/m per s], as damping."""
         return np.array(self.growth) if self.growth else np.zeros(self.damping.shape)
 
     @functools.cached_property
@@ -273,7 +273,7 @@ class Grid(CellLaw):
         y_edges: Sequence[float],
         outside: float = 0.0,
     ) -> Grid:
-        """A grid with the values of a function at the centres of its cells.
+        """Makes a grid with the values of a function at the centres of its cells.
 
         Args:
             b: damping at a place (x, y) [m] [N.s/m].
@@ -282,8 +282,8 @@ class Grid(CellLaw):
             outside: b beyond the outline [N.s/m].
 
         Raises:
-            ParameterError: there are fewer borders than two, or the function has a value that is
-                out of bounds.
+            ParameterError: there are fewer than two borders, or a value of the function is out of
+                bounds.
         """
         names = ("clay.x_edges", x_edges), ("clay.y_edges", y_edges)
         x, y = (
@@ -306,19 +306,19 @@ class Grid(CellLaw):
         b: tuple[float, float],
         outside: float = 0.0,
     ) -> Grid:
-        """A grid with a cell for each pixel of an image; see also `gray_image`.
+        """Makes a grid with one cell per pixel of an image; see also `gray_image`.
 
         Args:
             image: brightness from 0 (black) to 1 (white), shape (rows, columns); the first row is
-                that of the largest y.
+                at the largest y.
             x: where the image begins and ends along x [m].
             y: the same along y.
             b: damping at black and at white [N.s/m].
             outside: b beyond the image [N.s/m].
 
         Raises:
-            ParameterError: the image is no table of numbers from 0 to 1, or another argument is out
-                of bounds.
+            ParameterError: the image is not a table of numbers from 0 to 1, or another argument
+                is out of bounds.
         """
         (x0, x1), (y0, y1) = outline(x, y)
         inner = pixels(image, b)
@@ -329,12 +329,12 @@ class Grid(CellLaw):
 
 
 def _flow_of(law: Profile | Grid) -> tuple[Any, tuple[float, float, float]]:
-    """Fy, K and n of a law as given, and what stands for those left out."""
+    """Fy, K and n of a law, with defaults for omitted values."""
     return (law.Fy, law.K, law.n), (0.0, 0.0, 1.0)
 
 
 def _leave_out(law: Profile | Grid) -> None:
-    """Empties what changes nothing, so that laws alike are equal; refuses n without any K."""
+    """Empties values without effect, so that equivalent laws compare equal; refuses n without K."""
     if not law.K and law.n and np.any(np.array(law.n) != 1.0):
         raise ParameterError("clay.n", law.n, "must be empty without K")
     for name in ("growth", "Fy", "K"):
@@ -348,15 +348,15 @@ def _leave_out(law: Profile | Grid) -> None:
 def outline(
     x: tuple[float, float], y: tuple[float, float], prefix: str = ""
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Begin and end along x and along y [m], checked.
+    """Checks and returns the outline along x and along y [m].
 
     Args:
         x: begin and end along x.
         y: the same along y.
-        prefix: of their names in errors.
+        prefix: prefix of their names in errors.
 
     Raises:
-        ParameterError: they are no two ascending numbers.
+        ParameterError: they are not two ascending numbers.
     """
     spans = pair(f"{prefix}x", x, unit="m"), pair(f"{prefix}y", y, unit="m")
     for field, span in zip(AXES, spans, strict=True):
@@ -365,14 +365,14 @@ def outline(
 
 
 def pixels(image: Any, b: tuple[float, float]) -> np.ndarray:
-    """Damping of the pixels of an image [N.s/m], from the lowest x and y on, along x first.
+    """Damping of the pixels of an image [N.s/m], starting at the lowest x and y, x first.
 
     Args:
         image: brightness from 0 (black) to 1 (white), shape (rows, columns).
         b: damping at black and at white [N.s/m].
 
     Raises:
-        ParameterError: the image is no table of numbers from 0 to 1, or b is out of bounds.
+        ParameterError: the image is not a table of numbers from 0 to 1, or b is out of bounds.
     """
     gray = np.array(table_of("image", image, 0.0, 1.0))
     black, white = pair("b", b, 0.0, B_MAX, unit="N.s/m")
@@ -382,20 +382,20 @@ def pixels(image: Any, b: tuple[float, float]) -> np.ndarray:
 
 
 def _framed(inner: Any, outside: float) -> Any:
-    """Values of cells, with those of the outer cells around them."""
+    """Values of cells, surrounded by the values of the outer cells."""
     value = number("outside", outside, 0.0, B_MAX, unit="N.s/m")
     return np.pad(np.asarray(inner), 1, constant_values=value)
 
 
 def check_ascending(field: str, edges: tuple[float, ...]) -> None:
-    """Refuses borders that do not ascend.
+    """Raises an error if borders do not ascend.
 
     Args:
         field: name for the error.
         edges: the borders [m].
 
     Raises:
-        ParameterError: they do not.
+        ParameterError: the borders do not ascend.
     """
     if any(b <= a for a, b in zip(edges, edges[1:], strict=False)):
         raise ParameterError(field, edges, "must be strictly ascending")

@@ -38,7 +38,7 @@ from .traits import (
 
 @checked
 def slab(resists: float | Flow, start: float | None = None, end: float | None = None) -> Clay:
-    """A slab across the x axis that resists motion along both axes alike (Sec. 4.1).
+    """A slab across the x axis with the same resistance along both axes (Sec. 4.1).
 
     Args:
         resists: damping [N.s/m], 0 to 1e9, or a flow, whose force is then opposite to the motion.
@@ -49,7 +49,7 @@ def slab(resists: float | Flow, start: float | None = None, end: float | None = 
         The clay.
 
     Raises:
-        ParameterError: a value is out of bounds, or one border alone is given.
+        ParameterError: a value is out of bounds, or only one border is given.
     """
     if (start is None) != (end is None):
         raise ParameterError("end", end, f"must be a border where start is one: start = {start}")
@@ -72,7 +72,7 @@ def slab(resists: float | Flow, start: float | None = None, end: float | None = 
 
 
 def extent(clay: Clay | None, i: int) -> list[tuple[float, float]]:
-    """Intervals of coordinate i that contain clay on the evidence of that coordinate alone.
+    """Intervals of coordinate i that contain clay, judged by that coordinate alone.
 
     Args:
         clay: the clay; None for none.
@@ -113,7 +113,7 @@ class Clay:
         x: law of motion along x, or along the clay's own first axis where they are rotated.
         y: law of motion along y, or along the clay's own second axis.
         angle: by which those axes are rotated from x and y, counterclockwise [rad], -pi to pi.
-        isotropic: whether Fy and K, alike on both axes, resist along the motion whatever its
+        isotropic: whether Fy and K, equal on both axes, resist along the motion in every
             direction, (Fy + K |v|^n) v/|v|; else each axis yields by itself.
         groove: a block of clay that stays cut, beside x and y, which then neither yield, grow nor
             spring back and are not smooth; None for none.
@@ -136,7 +136,7 @@ class Clay:
 
     @classmethod
     def of_groove(cls, groove: Groove) -> Clay:
-        """Clay that stays cut, and none beside it.
+        """Clay that stays cut, and no other clay.
 
         Args:
             groove: the block.
@@ -149,7 +149,7 @@ class Clay:
         return self.x, self.y
 
     def laws_on(self, i: int) -> tuple[Profile | Grid | Smooth, ...]:
-        """Laws that resist along an axis: both where the axes of the clay are rotated.
+        """Laws that resist along an axis: both laws if the axes of the clay are rotated.
 
         Args:
             i: axis, 0 for x, 1 for y.
@@ -174,46 +174,46 @@ class Clay:
 
     @property
     def largest(self) -> float:
-        """Largest damping, growth aside [N.s/m]."""
+        """Largest damping, without growth [N.s/m]."""
         most = float(max(law.damping.max() for law in self.laws))
         return most + self.groove.thickest if self.groove else most
 
     @property
     def fastest(self) -> float:
-        """Largest rate at which it grows [N.s/m per s]."""
+        """Largest growth rate of the damping [N.s/m per s]."""
         return float(max(law.rates.max() for law in self.laws))
 
     @property
     def grows(self) -> bool:
-        """Whether it grows anywhere."""
+        """Whether the damping grows anywhere."""
         return bool(self.x.growth or self.y.growth)
 
     @property
     def yields(self) -> bool:
-        """Whether it has a yield force or a consistency anywhere; a groove has."""
+        """Whether the clay has a yield force or a consistency anywhere; a groove does."""
         return self.x.yields or self.y.yields or self.groove is not None
 
     @property
     def springs(self) -> bool:
-        """Whether it springs back anywhere."""
+        """Whether the clay springs back anywhere."""
         return any(getattr(law, "springs", ()) for law in self.laws)
 
     def __getstate__(self) -> dict[str, Any]:
-        # its fields alone: `kinds` is kept in the instance and holds functions, which do not pickle
+        # fields only: the cached `kinds` holds functions, which cannot be pickled
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
     @functools.cached_property
     def kinds(self) -> tuple[Law, ...]:
-        """The laws of LAWS that it has."""
+        """The laws of LAWS that apply to this clay."""
         return tuple(present(self, LAWS))
 
     @property
     def viscous(self) -> bool:
-        """Whether its force is damping times velocity, so that linear theory holds."""
+        """Whether the force is damping times velocity, so that linear theory holds."""
         return all(x.viscous for x in self.kinds)
 
     def viscous_at(self, place: tuple[float, float]) -> bool:
-        """Whether its force at a place is damping times velocity.
+        """Whether the force at a place is damping times velocity.
 
         Args:
             place: (x, y) [m].
@@ -222,26 +222,26 @@ class Clay:
 
     @property
     def of_velocity(self) -> bool:
-        """Whether its force follows from the velocity alone."""
+        """Whether the force depends on the velocity alone."""
         return all(x.of_velocity for x in self.kinds)
 
     @property
     def seen_in_b(self) -> bool:
-        """Whether its damping tells its regions apart."""
+        """Whether damping distinguishes the regions of the clay."""
         return all(x.seen_in_b for x in self.kinds)
 
     @property
     def along_motion(self) -> bool:
-        """Whether it resists along the motion, whatever its direction."""
+        """Whether the force is opposite to the motion in every direction."""
         return self.isotropic or any(x.along_motion for x in self.kinds)
 
     @property
     def varies(self) -> set[str]:
-        """What the damping of a region varies over, "time", "place"; empty for one number each."""
+        """What damping within a region depends on, "time", "place"; empty if constant."""
         return {x.varies for x in self.kinds if x.varies}
 
     def resists_otherwise(self, i: int) -> bool:
-        """Whether anything but damping times velocity resists along one of its axes.
+        """Whether a force other than damping times velocity acts along an axis of the clay.
 
         Args:
             i: axis, 0 for x, 1 for y.
@@ -252,11 +252,11 @@ class Clay:
 
     @property
     def holding(self) -> bool:
-        """Whether it can hold a tool at rest somewhere."""
+        """Whether the clay can hold a tool at rest anywhere."""
         return any(x.holds for x in self.kinds)
 
     def hold(self, i: int) -> Hold:
-        """The strongest of what holds a tool at rest along an axis.
+        """The largest force that holds a tool at rest along an axis.
 
         Args:
             i: axis, 0 for x, 1 for y.
@@ -266,33 +266,33 @@ class Clay:
 
     @property
     def blocks(self) -> list[Block]:
-        """Rectangles of clay beside the laws of the axes."""
+        """Rectangles of clay in addition to the laws of the axes."""
         return [block for x in self.kinds for block in x.blocks(self)]
 
     @property
     def ground(self) -> Any:
-        """The cells that a tool cuts for good; None where it leaves the clay as it was."""
+        """Cells that a tool cuts permanently; None if the tool does not change the clay."""
         return next((x.ground(self) for x in self.kinds if x.ground), None)
 
     @property
     def soft(self) -> list[Soft]:
-        """What the steps of the fast method must resolve."""
+        """Clay whose damping the steps of the fast method must resolve."""
         found = (x.soft(self) for x in self.kinds if x.soft)
         return [x for x in found if x]
 
     def scaled(self, factor: float) -> Clay:
-        """Returns the same clay with a multiple of its damping, yield force and the like.
+        """Returns the same clay with its resistance (damping, yield force and so on) multiplied.
 
-        Clay that yields goes on to do so, however little: a run cannot turn into one of other clay.
+        Clay that yields keeps a small yield force: a run cannot switch to another kind of clay.
 
         Args:
-            factor: on all of them, within their bounds.
+            factor: factor on all resistances, limited to their bounds.
         """
         return functools.reduce(lambda clay, kind: kind.scaled(clay, factor), self.kinds, self)
 
     @property
     def columns(self) -> list[Column]:
-        """Quantities that tables show of a stretch beside its damping."""
+        """Quantities that tables of stretches show besides damping."""
         return list(dict.fromkeys(c for x in self.kinds for c in x.columns))
 
     def values_at(self, i: int, place: Any) -> dict[str, float]:
@@ -310,11 +310,11 @@ class Clay:
 
     @property
     def words(self) -> list[Told]:
-        """What it resists with over the whole scene."""
+        """Resistance of the clay over the whole scene."""
         return [x for kind in self.kinds for x in kind.words(self)] or [Told("b = {}", (0.0,))]
 
     def here(self, place: tuple[float, float], b: Any = None) -> list[Told]:
-        """What it resists with at a place; empty where nothing resists.
+        """Resistance at a place; empty where there is none.
 
         Args:
             place: (x, y) [m].
@@ -324,11 +324,11 @@ class Clay:
         return [*told, *told_pair("b = {}", self.at(*place).tolist() if b is None else b, "N.s/m")]
 
     def at(self, x: Any, y: Any) -> np.ndarray:
-        """Damping of both axes at some places, growth aside.
+        """Damping of both axes at given places, without growth.
 
         Args:
             x: coordinates [m], any shape.
-            y: coordinates [m], any shape that goes with it.
+            y: coordinates [m], any shape that broadcasts with x.
 
         Returns:
             [N.s/m], shape (2, ...).

@@ -14,11 +14,11 @@ from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields
 from .constants import C_DEN, C_NUM
 
-ORDER = 4  # highest of a compensator
+ORDER = 4  # highest order of a compensator
 # floats of an axis: A, B, C, D of a realisation, each as for the highest order; and of a kick, see
 # `form_kick`: C Phi, what the force of the kick adds, Phi, Gamma
 FORM, KICK = 25, 25
-FEED = 4  # place of the second of the latter
+FEED = 4  # where the second axis of the latter begins
 # working space of `exponential`: two results, then a term of a series, its sum, and a matrix
 WORK, TERM, SUM, NEXT = 64, 40, 44, 48
 CANCELLED = 1e-12  # of a sum, relative to that of the magnitudes
@@ -28,10 +28,10 @@ TERMS = 16  # of a series for exp(x) at |x| <= 1/2: the next is below 1e-19
 @named
 @dataclass(frozen=True)
 class Compensator:
-    """Shape of the compensator: C = K num(s)/den(s), proper, of order 4 at most.
+    """Shape of the compensator: C = K num(s)/den(s), proper, at most of order 4.
 
-    Coefficients are in descending powers of s, as in SciPy and python-control; they are divided
-    by the first one of den.
+    Coefficients are in descending powers of s, as in SciPy and python-control. They are normalised
+    to a leading coefficient of den of 1.
 
     Attributes:
         num: numerator, at most as long as den; (1,) as printed.
@@ -83,7 +83,7 @@ class Compensator:
                 or a pair of coefficients (num, den).
 
         Raises:
-            ParameterError: it is none of these, or has no proper transfer function.
+            ParameterError: the system is none of these, or its transfer function is not proper.
         """
         if isinstance(system, Compensator):
             return system
@@ -140,8 +140,8 @@ class Compensator:
     def state_space(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
         """A realisation of C/K: z' = A z + B f, delta = C z + D f.
 
-        Controllable form, in units of time in which the fastest pole is 1 rad/s: which keeps the
-        digits of fast poles, and of slow ones beside them. As printed, see `lag`, in seconds.
+        Controllable form. Time is scaled so that the fastest pole is 1 rad/s, which preserves the
+        digits of fast and slow poles. For the printed compensator, see `lag`, time is in seconds.
 
         Returns:
             A, shape (order, order), B and C, shape (order,), and D.
@@ -182,9 +182,9 @@ def _from_roots(name: str, given: Iterable[complex]) -> tuple[float, ...]:
 def _from_state_space(A: Any, B: Any, C: Any, D: Any) -> tuple[Any, Any]:
     """Coefficients by way of the impulse response: D, C B, C A B, ...
 
-    What is zero there but for rounding is zero, so that no zero far away is left in num. If all of
-    it but D is, the system is a gain: it has no states, or none that the input moves and the output
-    shows.
+    Values that are zero up to rounding are set to zero, so that num has no spurious distant zeros.
+    If all but D are zero, the system is a gain: it has no state that is both controllable and
+    observable.
     """
     v, row = np.ravel(B), np.ravel(C)
     A = np.reshape(A, (len(v), len(v)))
@@ -203,7 +203,7 @@ PRINTED = Compensator()
 
 
 def form_numbers(compensator: Compensator) -> list[float]:
-    """A realisation of C/K as plain numbers, filled up with zeros to the highest order.
+    """A realisation of C/K as plain numbers, padded with zeros to the highest order.
 
     Args:
         compensator: the shape.
@@ -219,7 +219,7 @@ def form_numbers(compensator: Compensator) -> list[float]:
 
 
 def moving_states(compensator: Compensator, v: float) -> list[float]:
-    """States of a compensator whose output has long moved evenly, and is 0 now.
+    """States of a compensator whose output moves at constant rate and is 0 now.
 
     Args:
         compensator: the shape.
@@ -229,7 +229,7 @@ def moving_states(compensator: Compensator, v: float) -> list[float]:
         ORDER numbers.
 
     Raises:
-        ParameterError: v is not 0, and without an integrator C cannot hold that rate.
+        ParameterError: v is not 0 and C has no integrator, so that it cannot hold that rate.
     """
     n = compensator.order
     out = [0.0] * ORDER
@@ -241,7 +241,7 @@ def moving_states(compensator: Compensator, v: float) -> list[float]:
     m[:n, n : 2 * n], m[n : 2 * n, :n], m[n : 2 * n, n : 2 * n] = A, A, -np.eye(n)
     m[n : 2 * n, 2 * n], m[2 * n, n : 2 * n] = B, C
     m[2 * n + 1, :n], m[2 * n + 1, 2 * n] = C, D
-    right[2 * n] = 1.0  # v as it is scales the states: a tiny one has no digits to spare
+    right[2 * n] = 1.0  # the states scale with v itself; a tiny v must keep its digits
     z = np.linalg.lstsq(m, right, rcond=None)[0]
     if not np.allclose(m @ z, right, rtol=0.0, atol=1e-9):
         bound = "must be 0 with a compensator without an integrator"
@@ -251,7 +251,7 @@ def moving_states(compensator: Compensator, v: float) -> list[float]:
 
 
 def exponential(form, n, i, h, e, at):
-    """State of one axis after a time in which the force is held, z+ = Phi z + Gamma f.
+    """State of one axis after a time under a held force, z+ = Phi z + Gamma f.
 
     The series of exp(A h), scaled and squared (Moler, Van Loan, SIAM Review 45, 2003, method 3).
 
@@ -260,8 +260,8 @@ def exponential(form, n, i, h, e, at):
         n: highest order of the two.
         i: axis, 0 for x, 1 for y.
         h: time [s], >= 0.
-        e: shape (WORK,): gets Phi, row by row, and Gamma; its end is working space.
-        at: where they begin.
+        e: shape (WORK,); receives Phi, row by row, and Gamma; its end is working space.
+        at: index at which they begin.
     """
     a, b, gamma = FORM * i, FORM * i + 16, at + 16
     size, halvings = 0.0, 0
@@ -298,8 +298,8 @@ def double_time(n, e, at):
 
     Args:
         n: highest order of the two axes.
-        e: as of `exponential`.
-        at: where Phi begins in it, and Gamma after it.
+        e: as in `exponential`.
+        at: index at which Phi begins in e, followed by Gamma.
     """
     gamma = at + 16
     for c in range(n + 1):
@@ -315,13 +315,13 @@ def double_time(n, e, at):
 
 
 def form_kick(form, n, i, before, after, e, out):
-    """Numbers of one axis for a kick, of which delta is wanted at the sample.
+    """Numbers of one axis for a kick that evaluates delta at the sample.
 
-    Exact, however fast the poles: delta = row z + feed f at the sample, and z+ = Phi z + Gamma f
-    over the kick. Between equal steps the force is held. Between others, at a border, a start or an
-    end, it is one impulse at the sample, as it is for the handle: a step gives half of its force to
-    either end, so that held over an uneven kick it would come late or early by first order. delta
-    then counts it by the share of the kick behind the sample.
+    Exact for arbitrarily fast poles: delta = row z + feed f at the sample, and z+ = Phi z + Gamma f
+    over the kick. Between equal steps the force is held. Between unequal ones (at a border, a start
+    or an end) it is one impulse at the sample, as for the handle. A step gives half of its force to
+    each end, so a force held over an uneven kick would have a timing error of first order. delta
+    then counts the impulse by the share of the kick after the sample.
 
     Args:
         form: `form_numbers` of both axes.
@@ -330,7 +330,7 @@ def form_kick(form, n, i, before, after, e, out):
         before: length of the step before the sample [s].
         after: length of the step after the sample [s].
         e: working space, shape (WORK,).
-        out: gets row (4), feed, Phi (16) and Gamma (4) of each axis, shape (2 KICK,).
+        out: receives row (4), feed, Phi (16) and Gamma (4) of each axis, shape (2 KICK,).
     """
     exponential(form, n, i, 0.5 * before, e, 0)
     exponential(form, n, i, 0.5 * after, e, 20)

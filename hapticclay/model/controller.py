@@ -50,7 +50,7 @@ SERVO = (Servo(G[0], S[0]), Servo(G[1], S[1]))  # as printed, of x and y
 
 
 def feedback_law(servo, delta, y, yd, p, v, c):
-    """Servo acceleration of one axis at an instant, without forces; `feedback_vector` as a law.
+    """Servo acceleration of one axis at an instant, without forces; see `feedback_vector`.
 
     Args:
         servo: numbers of the axis, see `Servo.numbers`.
@@ -69,7 +69,7 @@ def feedback_law(servo, delta, y, yd, p, v, c):
 
 
 def velocity_per_force(n, W, d):
-    """Velocity after a kick that each unit of a further force takes, (n + W d)^-1 W.
+    """Velocity lost in a kick per unit of additional force, (n + W d)^-1 W.
 
     Args:
         n: weight of u in the servo's law, (x, y) [1/s].
@@ -94,7 +94,7 @@ def along_axes(c, s, x, y):
     """Components of a vector along rotated axes.
 
     Args:
-        c: cosine of the angle by which they are rotated.
+        c: cosine of the angle of rotation.
         s: sine of that angle.
         x: component along x.
         y: component along y.
@@ -109,7 +109,7 @@ def feedback_vector(servo: Servo) -> np.ndarray:
     """Servo acceleration of the law above, without forces, as a row over the state of one axis.
 
     Args:
-        servo: of the axis.
+        servo: servo of the axis.
 
     Returns:
         Shape (6,): p'' = feedback @ (p, p', delta, delta', y, y').
@@ -146,7 +146,7 @@ def controller_matrices(
 def held_compensator(
     servo: Servo, compensator: Compensator, K: Any, T: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compensator and reference model over a sample in which the net force is held: z+ = A z + B f.
+    """Compensator and reference model over a sample under held net force: z+ = A z + B f.
 
     Exact, by a matrix exponential (Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed.).
 

@@ -1,4 +1,4 @@
-"""Damping of clay as steps take it: split over a kick, on rotated axes, growing with time."""
+"""Damping of clay in time steps: split over a kick, on rotated axes, growing with time."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from .constants import B_MAX
 
 
 def halved_damping(b0, b1, L, R):
-    """Damping in a kick of clay that a step cannot overshoot: half of a step's on either side.
+    """Damping in a kick of clay soft enough not to overshoot: half of each step's damping.
 
     Args:
         b0: damping before the sample, (x, y) [N.s/m].
@@ -21,11 +21,11 @@ def halved_damping(b0, b1, L, R):
 
 
 def split_damping(b0, b1, H, L, R, W, damperx, dampery):
-    """Splits the clay's damping in one kick between the velocities before and after it.
+    """Splits the damping of the clay in one kick between the velocities before and after it.
 
-    A step gives half of its clay to the kick before it and half to the kick after it:
-    Crank-Nicolson, second order. Where the half that acts on the velocity before the kick would
-    overshoot, b h W > 2, it is reduced to the value that just stops the handle, and the kick before
+    A step gives half of its damping to the kick before it and half to the kick after it:
+    Crank-Nicolson, second order. If the half that acts on the velocity before the kick would
+    overshoot, b h W > 2, it is reduced to the value that just stops the handle. The kick before
     the step takes the rest. The two parts sum to b h, so the impulse of a step is exactly b times
     its distance. `slow_force` corrects the effect of the uneven split on slow motion.
 
@@ -36,7 +36,7 @@ def split_damping(b0, b1, H, L, R, W, damperx, dampery):
         L: share of the kick before the sample.
         R: share of the kick after the sample.
         W: largest acceleration per unit of force over all directions [1/kg].
-        damperx: of the operator's arm, which acts beside the clay, x [N.s/m].
+        damperx: damping of the operator's arm, in addition to the clay, x [N.s/m].
         dampery: the same, y [N.s/m].
 
     Returns:
@@ -63,13 +63,13 @@ def split_damping(b0, b1, H, L, R, W, damperx, dampery):
 
 
 def slow_force(g, W, share, f):
-    """Force of stiff clay on a handle in slow motion that nothing else supports.
+    """Force of stiff clay on a handle in slow motion, when only the clay supports it.
 
     Args:
         g: acceleration of the handle without clay, (x, y) [m/s^2].
         W: acceleration per unit of force, (xx, xy, yy) [1/kg].
         share: from `split_damping`, (x, y); nonzero where the clay is stiff.
-        f: clay force where the clay is not stiff, (x, y) [N].
+        f: force of the clay where it is not stiff, (x, y) [N].
 
     Returns:
         (x, y) [N].

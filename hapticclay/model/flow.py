@@ -1,4 +1,4 @@
-"""Clay that yields: beside a damper, the law of Herschel and Bulkley."""
+"""Clay that yields: a damper plus the law of Herschel and Bulkley."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from ..errors import Bound, check_fields
 from .constants import B_MAX
 from .traits import LEAST, LEFT_OUT, Column, Hold, Law, Told, multiplied, told_pair, told_values
 
-KICK_PARTS = 6  # of a kick, at most; two stops and what lies between and around, and one to spare
-AXIS_ROUNDS = 60  # from axis to axis until both forces agree
-CLOSE = 1e-15  # agreement of them
+KICK_PARTS = 6  # most parts of a kick: two stops, the parts around them, and one spare
+AXIS_ROUNDS = 60  # iterations between the axes until both forces agree
+CLOSE = 1e-15  # tolerance of that agreement
 
 FY_MAX = 1e6  # [N]
 CONSISTENCY_MAX = 1e6  # [N/(m/s)^n]
@@ -29,9 +29,9 @@ FlowIndex = Bound(N_MIN, N_MAX)
 @named
 @dataclass(frozen=True)
 class Flow:
-    """How clay resists a tool that moves through it at v: f = (Fy + K |v|^n) v/|v| + b v.
+    """Resistance of clay to a tool that moves at v: f = (Fy + K |v|^n) v/|v| + b v.
 
-    A tool at rest is held by any force up to Fy. With Fy and K of 0 this is the paper's clay.
+    Clay holds a tool at rest against any force up to Fy. With Fy = K = 0 it is the paper's clay.
 
     Attributes:
         Fy: yield force [N], 0 to 1e6.
@@ -52,7 +52,7 @@ class Flow:
     def kind(self) -> str:
         """Usual name: viscous, Coulomb, Bingham, power law or Herschel-Bulkley.
 
-        With n = 1 K is damping.
+        With n = 1, K is damping.
         """
         if not self.K or self.n == 1.0:
             return ("Bingham" if self.b or self.K else "Coulomb") if self.Fy else "viscous"
@@ -60,12 +60,12 @@ class Flow:
 
     @property
     def words(self) -> list[Told]:
-        """What it resists with."""
+        """Its resistance, in words."""
         b = told_values("b = {}", [self.b], "N.s/m")
         return [*_told_flow([self.Fy], [self.K], [self.n]), *b]
 
     def force(self, v: Any) -> np.ndarray:
-        """Resisting force of a tool that moves; 0 at rest, where any force up to Fy may act.
+        """Resisting force on a moving tool; 0 at rest, where any force up to Fy may act.
 
         Args:
             v: velocity [m/s], of either sign, any shape.
@@ -78,19 +78,19 @@ class Flow:
 
 
 def moving_force(Fy, K, n, speed):
-    """Force of clay that yields on a tool that moves, beside its damping, Fy + K v^n [N].
+    """Force of yielding clay on a moving tool, without its damping, Fy + K v^n [N].
 
     Args:
         Fy: yield force [N].
         K: consistency [N/(m/s)^n].
         n: flow index.
-        speed: of the tool, >= 0 [m/s].
+        speed: speed of the tool, >= 0 [m/s].
     """
     return Fy + K * speed**n if K > 0.0 else Fy
 
 
 def motion_force(law, along, vx, vy):
-    """Force of clay that yields on a tool in motion; none at rest, where any up to Fy may act.
+    """Force of yielding clay on a moving tool; 0 at rest, where any up to Fy may act.
 
     Args:
         law: Fy, K, n of x, then of y.
@@ -115,8 +115,8 @@ def motion_force(law, along, vx, vy):
 def thinned(q, k, n):
     """Solves m + k m^n = q for m >= 0, to rounding, by Newton's method.
 
-    It begins where the tangent does not lead beyond the root: below it where m^n is concave, above
-    it where it is convex.
+    The start is chosen so that the tangent does not overshoot the root: below the root where m^n is
+    concave, above it where m^n is convex.
 
     Args:
         q: >= 0.
@@ -140,18 +140,18 @@ def thinned(q, k, n):
 
 
 def implicit_share(z):
-    """Share of the velocity at the end of a step in that at which a force is taken.
+    """Weight of the velocity at the end of a step in the velocity at which a force is evaluated.
 
     One half, second order, unless the force would overshoot: as in `damping.split_damping`.
 
     Args:
-        z: velocity that the force takes by the end, per unit of velocity.
+        z: velocity lost to the force by the end, per unit of velocity.
     """
     return 0.5 if z <= 2.0 else 1.0 - 1.0 / z
 
 
 def sliding_force(a, end, slope, Fy, K, n):
-    """Force of clay that yields on one axis that slides, mean over a part of a kick.
+    """Mean force of yielding clay on one sliding axis over a part of a kick.
 
     Args:
         a: velocity at the begin [m/s].
@@ -162,8 +162,8 @@ def sliding_force(a, end, slope, Fy, K, n):
         n: flow index.
 
     Returns:
-        [N], positive for motion towards a, or towards end where that is 0. Where it brings the axis
-        to rest before the end, the force is that at half the speed of the begin.
+        [N], positive for motion in the direction of a, or of end if a is 0. If the force stops the
+        axis before the end, it is the force at half the initial speed.
     """
     sign = -1.0 if a < 0.0 or (a == 0.0 and end < 0.0) else 1.0
     if K <= 0.0:
@@ -182,10 +182,10 @@ def sliding_force(a, end, slope, Fy, K, n):
 
 
 def resist_axes(B, v, end, law, sample):
-    """Clay that yields in one kick, each axis by itself: the flow of v' = d - B f from v on.
+    """Yielding clay in one kick, each axis by itself: the solution of v' = d - B f from v on.
 
-    Other forces count as constant in the kick. It falls into parts where an axis comes to rest; at
-    rest an axis stays while no more than its yield force is needed to hold it.
+    Other forces count as constant in the kick. The kick is divided where an axis comes to rest. An
+    axis stays at rest while no more than its yield force is needed to hold it.
 
     Args:
         B: velocity lost in the kick per unit of force, (xx, xy, yx, yy) [m/(N.s)].
@@ -237,13 +237,13 @@ def resist_axes(B, v, end, law, sample):
 
 
 def forces_on_axes(B, v, d, left, law):
-    """Mean forces over a part of a kick, each axis by itself, worked out until they agree.
+    """Mean forces over a part of a kick, each axis by itself, iterated until they agree.
 
     Args:
         B: velocity lost in a kick per unit of force, (xx, xy, yx, yy) [m/(N.s)].
         v: velocity at the begin, (x, y) [m/s].
         d: velocity gained in a kick without this force, (x, y) [m/s].
-        left: share of the kick that is left.
+        left: remaining share of the kick.
         law: Fy, K, n of x, then of y.
 
     Returns:
@@ -330,21 +330,21 @@ def resist_along(B, v, end, law, sample):
 
 
 def force_along(B, v, d, hold, left, Fy, K, n):
-    """Mean force along the motion over a part of a kick on a tool that slides.
+    """Mean force along the motion on a sliding tool over a part of a kick.
 
     Args:
         B: velocity lost in a kick per unit of force, (xx, xy, yx, yy) [m/(N.s)].
         v: velocity at the begin, (x, y) [m/s].
         d: velocity gained in a kick without this force, (x, y) [m/s].
-        hold: force that would take all of d, (x, y) [N].
-        left: share of the kick that is left.
+        hold: force that would cancel all of d, (x, y) [N].
+        left: remaining share of the kick.
         Fy: yield force [N].
         K: consistency [N/(m/s)^n].
         n: flow index.
 
     Returns:
-        Force (x, y) [N]; share of the kick for which it acts: less than left where the tool then
-        comes to rest.
+        Force (x, y) [N]; share of the kick for which it acts, less than left if the tool then comes
+        to rest.
     """
     qx, qy = v[0] + left * d[0], v[1] + left * d[1]
     endx, endy = slowed(B, qx, qy, left, Fy, K, n)
@@ -361,7 +361,7 @@ def force_along(B, v, d, hold, left, Fy, K, n):
         m = math.sqrt(mx * mx + my * my)
         stops = m == 0.0 or (mx - keep * v[0]) * v[0] + (my - keep * v[1]) * v[1] < 0.0
     if stops:
-        # a force of this size, or less where it turns, takes the whole velocity within some time
+        # a force of this size, or less if it turns, cancels the whole velocity within some time
         f = 0.5 * math.sqrt(v[0] * v[0] + v[1] * v[1])
         f = moving_force(Fy, K, n, f)
         det = B[0] * B[3] - B[1] * B[2]
@@ -476,7 +476,7 @@ def _holds(clay: Any, i: int) -> Hold:
 
 
 def _scaled(clay: Any, factor: float) -> Any:
-    """The clay with its yield force and consistency multiplied; it goes on to yield."""
+    """The clay with its yield force and consistency multiplied; it still yields."""
 
     def of(law: Any) -> Any:
         if not law.yields:

@@ -1,4 +1,4 @@
-"""Clay that stays cut: what is left of a block of it, on a grid, and what holds a tool in it."""
+"""Clay that stays cut: the remainder of a block on a grid, and its force on a tool."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from .materials import SMALL_TOOL, material
 from .tool import Tool
 from .traits import LEAST, LEFT_OUT, Block, Hold, Law, Refusal, Soft, Told
 
-CELLS = 20  # in the width of the tool, where none are asked for
-COARSEST = 8  # cells in it, at least
+CELLS = 20  # default number of cells in the width of the tool
+COARSEST = 8  # fewest cells in that width
 MOST_CELLS = 4_000_000
-TOUCHING = 1e-6  # share of a cell: a gap as small lets go of the clay
-SOFT = 2.0  # cells to either side of the tool's edge of which it takes a share
-STRIDE = 0.5  # cells, at most, that the tool moves between two cuts
+TOUCHING = 1e-6  # share of a cell: a gap this small ends the contact
+SOFT = 2.0  # cells on each side of the tool's edge that are cut in part
+STRIDE = 0.5  # largest motion between two cuts, in cells
 # the front of the tool in sectors: by the share of |y| in |x| + |y| of their normals, in each
 # quadrant; half of the angle of each [rad]
 SECTORS = 16
@@ -30,13 +30,13 @@ HALF = tuple(
     0.5 * (math.atan2(k + 1.0, SECTORS - k - 1.0) - math.atan2(k, SECTORS - k))
     for k in range(SECTORS)
 )
-RIM = 4 * 4 * SECTORS  # numbers of the rim: four a sector, see `cut`
+RIM = 4 * 4 * SECTORS  # numbers of the rim: four per sector, see `cut`
 
 
 def outside(u):
-    """Share of a cell that the tool leaves standing: 0 within it, 1 outside.
+    """Share of a cell that the tool leaves: 0 inside the tool, 1 outside.
 
-    Its slope is the cubic B-spline over the cells, whose sum over a row of them is always 1.
+    Its slope is the cubic B-spline over the cells, which sums to 1 over any row of cells.
 
     Args:
         u: distance of the cell's centre from the edge of the tool, in cells, positive outside.
@@ -58,18 +58,18 @@ def outside(u):
 
 
 def cut(grid, left, relief, x, y, whole, rim, removed):
-    """Cuts what lies under the tool, and takes down the clay that touches it.
+    """Removes the clay under the tool, and records the clay that touches it.
 
     Args:
         grid: Groove.numbers.
         left: remaining share of each cell, shape (n, m).
         relief: height of each cell before the first cut [m], shape (n, m).
-        x: place of the tool, x [m].
-        y: the same, y [m].
-        whole: 1 to cut the whole disc; 0 for its edge, where it has moved by a part of a cell.
-        rim: gets the clay that touches it, four numbers a sector: sum of area x normal, x and y;
+        x: x of the tool [m].
+        y: y of the tool [m].
+        whole: 1 to cut the whole disc; 0 for its edge only, after a motion of less than a cell.
+        rim: receives the clay in contact, four numbers per sector: sum of area x normal, x and y;
             area [m^2]; area x pressure [N].
-        removed: volume removed so far, and what rounding left of it [m^3].
+        removed: volume removed so far, and its rounding error [m^3].
     """
     x0, y0, wx, wy, nx, ny, r, cell, pressure, gradient = grid
     for j in range(RIM):
@@ -115,11 +115,11 @@ def cut(grid, left, relief, x, y, whole, rim, removed):
 
 
 def add(removed, volume):
-    """Adds to a sum, with what rounding leaves of it (Neumaier).
+    """Adds to a compensated sum (Neumaier).
 
     Args:
-        removed: the sum, and that.
-        volume: what to add, >= 0.
+        removed: the sum, and its rounding error.
+        volume: volume to add, >= 0.
     """
     total = removed[0] + volume
     if removed[0] >= volume:
@@ -133,8 +133,8 @@ def sector(x, y):
     """Number of the sector in which a direction lies.
 
     Args:
-        x: its x, not 0 where y is.
-        y: its y.
+        x: x of the direction, not 0 if y is 0.
+        y: y of the direction.
     """
     ax, ay = abs(x), abs(y)
     k = min(int(SECTORS * ay / (ax + ay)), SECTORS - 1)
@@ -142,7 +142,7 @@ def sector(x, y):
 
 
 def resistance(rim, x, y):
-    """What a motion meets: the clay in front of the tool, by its projection on the direction.
+    """Resistance to a motion: the clay in front of the tool, projected on the direction.
 
     Args:
         rim: from `cut`.
@@ -161,7 +161,7 @@ def resistance(rim, x, y):
             if whole > 0.0:
                 part = rim[4 * k] * x + rim[4 * k + 1] * y
                 some = HALF[k % SECTORS] * whole
-                if part < some:  # a part of the sector faces away
+                if part < some:  # part of the sector faces away
                     part = (part + some) * (part + some) / (4.0 * some) if part > -some else 0.0
                 area += part
                 force += part * rim[4 * k + 3] / whole
@@ -171,12 +171,12 @@ def resistance(rim, x, y):
 @named
 @dataclass(frozen=True)
 class Groove:
-    """A block of clay that stays cut: a tool at the handle removes the clay that it passes over.
+    """A block of clay that stays cut: a tool at the handle removes the clay under it.
 
-    The tool is a disc that cuts down to a floor. The block is a grid of cells; the share of each
-    under the tool is removed, and the edge of the tool is spread over two cells to either side. The
-    clay in front of the tool resists with its pressure times its cross-section, along the motion,
-    and holds a tool at rest: in fresh clay with (pressure + gradient depth/2) width depth.
+    The tool is a disc that cuts down to a floor. The block is a grid of cells. The share of each
+    cell under the tool is removed; the edge of the tool is spread over two cells on each side. The
+    clay in front of the tool resists along the motion with its pressure times its cross-section.
+    It also holds a tool at rest: in fresh clay with (pressure + gradient depth/2) width depth.
 
     Attributes:
         x: where the block begins and ends along x [m], ascending.
@@ -263,7 +263,7 @@ class Groove:
 
     @functools.cached_property
     def shares(self) -> np.ndarray:
-        """Share of each cell that is left, shape (n, m)."""
+        """Remaining share of each cell, shape (n, m)."""
         return np.array(self.left) if self.left else np.ones(self.shape)
 
     @property
@@ -273,7 +273,7 @@ class Groove:
 
     @property
     def hardest(self) -> float:
-        """Force on the tool where its whole width is engaged in the highest clay [N]."""
+        """Force on the tool when its whole width is engaged in the highest clay [N]."""
         mean = self.pressure + 0.5 * self.gradient * self.highest
         return mean * self.tool.width * self.highest
 
@@ -284,7 +284,7 @@ class Groove:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """What `cut` takes: begin of the block (x, y) [m], sizes of a cell [m], numbers of cells,
+        """Arguments of `cut`: start of the block (x, y) [m], sizes of a cell [m], numbers of cells,
         radius of the tool and the larger size of a cell [m], pressure [Pa], gradient [Pa/m].
         """
         (wx, wy), (n, m) = self.sizes, self.shape
@@ -297,7 +297,7 @@ class Groove:
     def of_material(
         cls, name: str, x: tuple[float, float], y: tuple[float, float], tool: Tool = SMALL_TOOL
     ) -> Groove:
-        """A block of a material, of even pressure: that on the tool's whole face, Fy/(w d).
+        """A block of a material with uniform pressure: that on the tool's face, Fy/(w d).
 
         Args:
             name: as for `material`.
@@ -306,8 +306,8 @@ class Groove:
             tool: the tool.
 
         Raises:
-            ParameterError: there is no such material, or its force is no pressure, as it depends on
-                a power of the speed.
+            ParameterError: there is no such material, or its force is not a pressure, because it
+                depends on a power of the speed.
         """
         flow, face = material(name, tool), tool.width * tool.depth
         if flow.K:
@@ -318,21 +318,21 @@ class Groove:
         """Volume of the block, to rounding [m^3].
 
         Args:
-            ground: height of what is left of each cell, as Record.ground [m], shape (n, m); None
-                for the block as given.
+            ground: remaining height of each cell, as Record.ground [m], shape (n, m); None
+                for the initial block.
         """
         heights = self.relief * self.shares if ground is None else np.asarray(ground, float)
         wx, wy = self.sizes
         return math.fsum((heights * (wx * wy)).ravel().tolist())
 
     def after(self, ground: Any) -> Groove:
-        """The block as a run has left it.
+        """The block after a run.
 
         Args:
-            ground: height of what is left of each cell, as Record.ground [m], shape (n, m).
+            ground: remaining height of each cell, as Record.ground [m], shape (n, m).
 
         Raises:
-            ParameterError: it has another shape, or is higher than the block.
+            ParameterError: the shape is wrong, or a cell is higher than the block.
         """
         relief, ground = self.relief, np.asarray(ground, dtype=float)
         if ground.shape != relief.shape:
@@ -355,7 +355,7 @@ def _words(clay: Any) -> tuple[Told, ...]:
 
 
 def _here(clay: Any, place: tuple[float, float]) -> tuple[Told, ...]:
-    """Its force, where the tool touches it."""
+    """Its force where the tool touches it."""
     touched = _block(clay.groove).holds(*place, 0.5 * clay.groove.tool.width)
     return (Told("holds with up to {}", (clay.groove.hardest,), "N"),) * bool(touched)
 
@@ -365,7 +365,7 @@ def _block(groove: Groove) -> Block:
 
 
 def _scaled(clay: Any, factor: float) -> Any:
-    """The clay with its pressure and damping multiplied; it goes on to resist."""
+    """The clay with its pressure and damping multiplied; it still resists."""
     groove = clay.groove
     most = min(FY_MAX / (groove.hardest or FY_MAX), B_MAX / (groove.thickest or B_MAX))
     k = min(max(factor, LEAST), most)

@@ -1,4 +1,4 @@
-"""The hardware between computer and arm (Fig. 3): its parts as frozen records, and their laws."""
+"""The hardware between computer and arm (Fig. 3): parts as frozen dataclasses, and their laws."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..errors import Bound, ParameterError, check_fields
 from . import flow
 from .traits import LEFT_OUT, YES, Refusal, Told, Trait, present, told_values
 
-STIFF = 1e12  # [N/m, N.s/m] no coupling is stiffer
+STIFF = 1e12  # [N/m, N.s/m] upper bound of a coupling
 JOINTS = ("shoulder", "elbow")
 
 
@@ -99,11 +99,11 @@ class Hardware:
 
 
 SLIDES = (0.0, 1.0, -1.0)
-NOISE_BLOCK = 1024  # samples whose chances are drawn at once
+NOISE_BLOCK = 1024  # samples drawn at once
 
 
 def round_to_even(x, step):
-    """The multiple of step nearest to x; the even one of two equally near.
+    """The multiple of step nearest to x; of two equally near, the even one.
 
     Args:
         x: value, in any unit.
@@ -116,7 +116,7 @@ def round_to_even(x, step):
 
 
 def quantize(x, bits, span):
-    """Output of a converter: 2^bits levels from -span to span, the middle one zero.
+    """Output of a converter: 2^bits levels from -span to span, with zero in the middle.
 
     Args:
         x: input, in any unit.
@@ -130,7 +130,7 @@ def quantize(x, bits, span):
         return x
     half = 1 << (bits - 1)
     y = x * half / span
-    # the bounds keep what is rounded within the integers of a compiled run
+    # the bounds keep rounded values within the integers of a compiled run
     level = half if y > half else -half if y < -half else round(y)
     return min(level, half - 1) * span / half
 
@@ -149,11 +149,11 @@ def encode(q, counts):
 
 
 def velocity_difference(then, old, k, q, Ts):
-    """Mean rates of two joints since an earlier sample.
+    """Mean rates of both joints since an earlier sample.
 
     Args:
         then: index of the earlier sample.
-        old: joint angles of it [rad].
+        old: joint angles of the earlier sample [rad].
         k: index of the present sample.
         q: joint angles of the present sample [rad].
         Ts: control sample [s].
@@ -192,7 +192,7 @@ def butterworth(cutoff: float, order: int, Ts: float) -> tuple[float, ...]:
         Ts: hold of the input [s].
 
     Returns:
-        (A00, A01, A10, A11, B0, B1); of order 1, A00 and B0 alone are not zero.
+        (A00, A01, A10, A11, B0, B1); for order 1, only A00 and B0 are not zero.
     """
     from scipy.linalg import expm
 
@@ -213,8 +213,8 @@ def filter_step(f, x0, x1, u):
 
     Args:
         f: from `butterworth`.
-        x0: state before: the output.
-        x1: state before, the rest of it.
+        x0: first state before the sample, which is the output.
+        x1: second state before the sample.
         u: input.
 
     Returns:
@@ -226,7 +226,7 @@ def filter_step(f, x0, x1, u):
 def coulomb_friction(w, a11, a12, a22, limit):
     """Coulomb friction of two joints in one kick, implicit.
 
-    Each joint either rests after the kick, under a torque within its limit, or slides against the
+    After the kick, each joint either rests under a torque within its limit or slides against the
     limit. The rates after the kick are w + a phi; with a positive definite, one of the nine cases
     fits (a linear complementarity problem; Stewart, Trinkle, Int. J. Numerical Methods in
     Engineering 39, 1996).
@@ -243,7 +243,7 @@ def coulomb_friction(w, a11, a12, a22, limit):
     """
     best1, best2, least = 0.0, 0.0, inf
     for case in range(9):
-        # which way each joint slides, 0 for a joint at rest
+        # sliding direction of each joint, 0 at rest
         s1, s2 = SLIDES[case // 3], SLIDES[case % 3]
         if s1 and s2:
             f1, f2 = -s1 * limit[0], -s2 * limit[1]
@@ -257,7 +257,7 @@ def coulomb_friction(w, a11, a12, a22, limit):
             det = a11 * a22 - a12 * a12
             f1, f2 = (a12 * w[1] - a22 * w[0]) / det, (a12 * w[0] - a11 * w[1]) / det
         v1, v2 = w[0] + a11 * f1 + a12 * f2, w[1] + a12 * f1 + a22 * f2
-        # distance of the case from a fit: a resting joint beyond its limit, a sliding one reversed
+        # violation of the case: a resting joint beyond its limit, a sliding one reversed
         wrong = max(
             -s1 * v1 / a11 if s1 else abs(f1) - limit[0],
             -s2 * v2 / a22 if s2 else abs(f2) - limit[1],
@@ -270,18 +270,18 @@ def coulomb_friction(w, a11, a12, a22, limit):
 
 
 def passivity_controller(energy, f, v, Ts, W):
-    """Passivity controller of one axis: a resisting force, changed where the clay would be active.
+    """Passivity controller of one axis: changes the resisting force if the clay would be active.
 
-    Hannaford, Ryu (IEEE Trans. Robotics and Automation 18, 2002), with the motion that the held
-    force itself causes: over a sample the clay takes Ts f (v - Ts W f/2). The controller recovers a
-    lack of energy; as Ts W goes to zero by their damping, -energy/(Ts v^2). A force that gives
-    energy because the hold overshoots is replaced by the force that takes most, v/(Ts W), which
-    stops the handle; so is a force that cannot recover the lack within a sample. Energy taken
-    earlier is not spent: clay gives nothing back.
+    Hannaford, Ryu (IEEE Trans. Robotics and Automation 18, 2002), including the motion that the
+    held force causes: over a sample the clay takes Ts f (v - Ts W f/2). The controller recovers a
+    deficit of energy. As Ts W goes to zero, it does so by their damping, -energy/(Ts v^2). If the
+    hold overshoots and a force returns energy, it is replaced by the force that takes the most
+    energy, v/(Ts W), which stops the handle. So is a force that cannot recover the deficit within a
+    sample. Energy taken earlier is not returned: clay stores none.
 
     Args:
         energy: energy that the clay has taken [J].
-        f: force asked for [N].
+        f: requested force [N].
         v: handle velocity [m/s].
         Ts: hold [s].
         W: mobility of the handle [1/kg].
@@ -301,7 +301,7 @@ def passivity_controller(energy, f, v, Ts, W):
 
 
 def virtual_coupling(tool, p, v, b, coupling, Ts):
-    """Spring and damper between the handle and a massless tool in clay, implicit over a sample.
+    """Spring and damper between handle and massless tool in clay, implicit over a sample.
 
     b v_t = spring (p - tool+) + damper (v - v_t), tool+ = tool + Ts v_t (Colgate, Stanley, Brown,
     IROS 1995).
@@ -324,7 +324,7 @@ def virtual_coupling(tool, p, v, b, coupling, Ts):
 
 
 def tool_that_yields(tool, p, v, b, law, along, coupling, Ts):
-    """As `virtual_coupling`, both axes, in clay that yields: the tool rests below the yield force.
+    """As `virtual_coupling`, for both axes in yielding clay: below the yield force the tool rests.
 
     (b + damper + spring Ts) v_t + (Fy + K |v_t|^n) v_t/|v_t| = spring (p - tool) + damper v.
 
@@ -358,7 +358,7 @@ def tool_that_yields(tool, p, v, b, law, along, coupling, Ts):
 
 
 class SampleNoise:
-    """Random effects on each sample, reproducible by seed and index; one random stream a part.
+    """Random effects on each sample, reproducible by seed and index; one stream per part.
 
     Args:
         parts: the hardware, with its seed.
@@ -371,14 +371,14 @@ class SampleNoise:
 
     @property
     def first(self) -> int:
-        """Index of the first sample that is not forgotten."""
+        """Index of the first sample that is still kept."""
         return self._first
 
     def forget(self, first: int) -> None:
-        """Forgets the samples before one.
+        """Drops the samples before a given one.
 
         Args:
-            first: its index.
+            first: index of the first sample to keep.
         """
         self._rows, self._first = self._rows[first - self._first :], first
 
@@ -386,12 +386,12 @@ class SampleNoise:
         """Random effects on n samples; the first sample of a run is on time and never lost.
 
         Args:
-            first: index of the first of them; none of them is forgotten.
+            first: index of the first of these samples; it must still be kept.
             n: number of samples.
 
         Returns:
-            A row a sample: offset of the sampling instant [s], whether the sample is lost (1 or 0),
-            noise on the force (x, y) [N].
+            One row per sample: offset of the sampling instant [s], whether the sample is lost (1 or
+            0), noise on the force (x, y) [N].
         """
         blocks, at = [self._rows], first - self._first
         missing = at + n - len(self._rows)
@@ -429,7 +429,7 @@ def _told_converters(x: Hardware) -> list[Told]:
     return [Told(f"{name} {{}}", (float(n),), "bits") for name, n in bits.items() if n]
 
 
-PARTS = (  # name, whether hardware has it, what linear theory makes of it, what refuses it, words
+PARTS = (  # name, whether hardware has it, how linear theory treats it, what refuses it, words
     ("jitter", lambda x: x.jitter > 0.0, LEFT_OUT, {},
      lambda x: told_values("jitter {}", (x.jitter,), "s rms")),
     ("dropouts", lambda x: x.dropout_probability > 0.0, LEFT_OUT, {},
@@ -470,10 +470,10 @@ def _trait(name: str, of: Any, theory: str, refuses: dict[str, Refusal], words: 
 
 
 def hardware_words(scenario: Any) -> str:
-    """What the hardware of a scenario adds, with units; "ideal" where it adds nothing.
+    """The parts of the hardware of a scenario, with units; "ideal" if there are none.
 
     Args:
-        scenario: has hardware.
+        scenario: scenario with hardware.
     """
     found = [told.text() for x in present(scenario, TRAITS[1:]) for told in x.words(scenario)]
     return ", ".join(found) or "ideal"

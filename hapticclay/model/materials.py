@@ -1,4 +1,4 @@
-"""Materials by name, and the flow of a tool in them; docs/materials.md has the sources in full."""
+"""Materials by name, and the flow of a tool in them; docs/materials.md lists all sources."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BEARING_LOW, BEARING_HIGH = 2.0 + math.pi, 9.0  # strip at the surface (Prandtl)
 SMALL_TOOL = Tool(0.010, 0.005)
 
 TERZAGHI = "Terzaghi, Peck & Mesri 1996: half of the unconfined compressive strength"
-# Unconfined compressive strength q [kPa]; "hard", above 400, has no upper limit and is left out
+# Unconfined compressive strength q [kPa]; "hard", above 400, is omitted: it has no upper limit
 CONSISTENCY = {
     "very soft clay": (0.0, 25.0),
     "soft clay": (25.0, 50.0),
@@ -34,10 +34,10 @@ PASTE_VISCOSITY = (828.0, 202.4, 40.4)  # apparent [Pa.s]
 
 
 def bearing_factor(tool: Tool) -> float:
-    """Mean pressure on the tool's face over the shear strength of the clay (Skempton 1951).
+    """Ratio of mean pressure on the tool's face to shear strength of the clay (Skempton 1951).
 
-    The face, width by depth, is taken for a rectangular foundation turned on its side, B the
-    shorter side and L the longer, and as far below the surface, D, as its lower edge:
+    The face, width by depth, is modelled as a rectangular foundation turned on its side. B is the
+    shorter side, L the longer side, and D the depth of the lower edge below the surface:
     Nc = 5 (1 + 0.2 B/L) (1 + 0.2 D/B), D/B at most 2.5.
 
     Args:
@@ -47,7 +47,7 @@ def bearing_factor(tool: Tool) -> float:
         Nc, 6 to 8.1.
 
     Raises:
-        ParameterError: it is no Tool.
+        ParameterError: the tool is not a Tool.
     """
     _check_tool(tool)
     short, long = sorted((tool.width, tool.depth))
@@ -62,12 +62,12 @@ def _check_tool(tool: Tool) -> None:
 def power_law(rpm: Sequence[float], viscosity: Sequence[float]) -> tuple[float, float]:
     """Shear stress K rate^n from readings of a rotating viscometer.
 
-    The spindle is taken for a long cylinder in a wide vessel. There the shear stress at its wall is
-    viscosity x 2 w, and the shear rate 2 w/n (Krieger & Maron 1952), w being its speed in rad/s. n
-    is the slope of the straight line through log stress over log w by least squares.
+    The spindle is modelled as a long cylinder in a wide vessel. The shear stress at its wall is
+    viscosity x 2 w, and the shear rate 2 w/n (Krieger & Maron 1952); w is its speed in rad/s. n
+    is the slope of a least-squares line through log stress over log w.
 
     Args:
-        rpm: speeds [rev/min], two different ones at least.
+        rpm: speeds [rev/min], at least two different ones.
         viscosity: apparent viscosity at each [Pa.s], as the instrument shows it.
 
     Returns:
@@ -88,7 +88,7 @@ def _speed(rpm: float) -> float:
 @named
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """What a clay withstands: the shear stress strength + K rate^n, or plain damping.
+    """Resistance of a clay: the shear stress strength + K rate^n, or plain damping.
 
     Attributes:
         source: where the numbers come from.
@@ -142,7 +142,7 @@ class Material:
             tool: as for `flow`.
 
         Returns:
-            The two; None where no rate was measured, and the flow depends on none.
+            Both speeds; None if no rate was measured, because the flow does not depend on it.
         """
         if self.rates is None:
             return None
@@ -177,7 +177,7 @@ MATERIALS = {
 def material(name: str, tool: Tool = SMALL_TOOL) -> Flow:
     """Flow of a tool in a material: its yield force, consistency, flow index and damping.
 
-    MATERIALS[name] has the numbers behind it, their sources and their range.
+    MATERIALS[name] holds the underlying numbers, their sources and their range.
 
     Args:
         name: "very soft clay", "soft clay", "medium clay", "stiff clay", "very stiff clay",
@@ -188,6 +188,6 @@ def material(name: str, tool: Tool = SMALL_TOOL) -> Flow:
         The flow.
 
     Raises:
-        ParameterError: there is no such material, or the tool is no Tool.
+        ParameterError: there is no such material, or the tool is not a Tool.
     """
     return MATERIALS[choice("material", name, tuple(MATERIALS))].flow(tool)

@@ -12,11 +12,11 @@ from .traits import Trait
 
 
 def mobility_with(trace, mass):
-    """Largest acceleration of handle and hand per unit of force. Numbers, or arrays.
+    """Largest acceleration of handle and hand per unit of force, for numbers or arrays.
 
     Args:
-        trace: of the mobility of the arm [1/kg], see `arm.Arm.links`.
-        mass: of the hand, the lesser of both axes [kg].
+        trace: trace of the mobility of the arm [1/kg], see `arm.Arm.links`.
+        mass: mass of the hand, the lesser of both axes [kg].
 
     Returns:
         [1/kg].

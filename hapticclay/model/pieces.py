@@ -1,9 +1,10 @@
-"""Signals as numbers that a loop reads: rows of cosines, and rows of cubics in time.
+"""Signals as tables of numbers for a loop: rows of cosines, and rows of cubics in time.
 
 A piece is a row of PIECE numbers: its start [s], and for x, then y, the coefficients of 1, u, u^2
-and u^3, with u the time since that start [s]. It holds up to the start of the next; the first holds
-before its start as well, the last for ever. A table is what the loops get: a row (number of lines,
-slack [s]), the lines of multisines (omega [rad/s], phases x, y [rad], amplitudes x, y), the pieces.
+and u^3, with u the time since that start [s]. A piece is valid up to the start of the next one; the
+first is also valid before its start, the last has no end. Loops read a table: a row (number of
+lines, slack [s]), the lines of multisines (omega [rad/s], phases x, y [rad], amplitudes x, y), and
+the pieces.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ NODES = np.array([0.0, 0.5 - 0.5 / math.sqrt(5.0), 0.5 + 0.5 / math.sqrt(5.0), 1
 TO_CUBIC = np.linalg.inv(np.vander(NODES, increasing=True))
 TO_CUBIC[0] = 1.0, 0.0, 0.0, 0.0  # to the last bit
 GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(10)  # nodes and weights on [-1, 1]
-PANELS = 2**17  # panels of a quadrature that are worked out at once
+PANELS = 2**17  # panels of a quadrature evaluated at once
 
 
 def mean_of_lines(table, t, h):
@@ -56,7 +57,7 @@ def has_pieces(table):
 
 
 def piece_at(table, t):
-    """Row of the piece that holds at a time.
+    """Row of the piece that is valid at a time.
 
     Args:
         table: see above, with pieces.
@@ -93,12 +94,12 @@ def mean_of_piece(table, j, t, h):
 
 
 def value_of_pieces(table, t, near):
-    """Value of the pieces of a table at a time, from one side of it where they jump.
+    """Value of the pieces of a table at a time; at a jump, the limit from one side.
 
     Args:
         table: see above, with pieces.
         t: the time [s].
-        near: a time beside it; the piece that holds there counts [s].
+        near: a time on the wanted side; the piece valid there is used [s].
 
     Returns:
         (x, y).
@@ -155,12 +156,12 @@ def mean_of_table(table, t, h):
 
 
 def value_of_table(table, t, near):
-    """Value of a signal at a time, from one side of it where it jumps.
+    """Value of a signal at a time; at a jump, the limit from one side.
 
     Args:
         table: see above.
         t: the time [s].
-        near: a time beside it [s].
+        near: a time on the wanted side [s].
 
     Returns:
         (x, y).
@@ -179,7 +180,7 @@ def loop_table(lines: np.ndarray, pieces: np.ndarray, slack: float) -> np.ndarra
     Args:
         lines: of its multisines, shape (m, 5).
         pieces: shape (n, PIECE).
-        slack: a jump so soon after a time counts as being at it [s].
+        slack: a jump within this time after an instant counts as being at that instant [s].
     """
     table = np.zeros((1 + len(lines) + len(pieces), PIECE))
     table[0, :2] = len(lines), slack
@@ -211,7 +212,7 @@ def pieces_value(pieces: np.ndarray, t: np.ndarray, near: np.ndarray) -> np.ndar
     Args:
         pieces: shape (m, PIECE), m > 0.
         t: times [s], shape (n,).
-        near: times beside them [s], shape (n,).
+        near: times on the wanted sides [s], shape (n,).
 
     Returns:
         Shape (n, 2).
@@ -255,7 +256,7 @@ def added_pieces(parts: Sequence[np.ndarray], factors: Sequence[float]) -> np.nd
 
     Args:
         parts: pieces of each of its parts, shape (m, PIECE) each.
-        factors: on each of them.
+        factors: factor on each part.
 
     Returns:
         Shape (n, PIECE).
@@ -279,11 +280,11 @@ def added_pieces(parts: Sequence[np.ndarray], factors: Sequence[float]) -> np.nd
 
 
 def straight_pieces(start: Any, values: Any, slopes: Any = None) -> np.ndarray:
-    """Pieces that are constant or straight.
+    """Constant or straight pieces.
 
     Args:
-        start: of each [s], shape (n,).
-        values: at its start, shape (n, 2).
+        start: start of each piece [s], shape (n,).
+        values: value at its start, shape (n, 2).
         slopes: per second, shape (n, 2); None for constant pieces.
 
     Returns:
@@ -298,11 +299,11 @@ def straight_pieces(start: Any, values: Any, slopes: Any = None) -> np.ndarray:
 
 
 def cell_edges(begin: float, end: float, cell: float) -> np.ndarray:
-    """Edges of cells that cover an interval: whole multiples of their length, cut at the end.
+    """Edges of cells that cover an interval: multiples of their length, cut at the end.
 
     Args:
-        begin: of the interval [s].
-        end: of the interval [s].
+        begin: start of the interval [s].
+        end: end of the interval [s].
         cell: length of a cell [s].
 
     Returns:
@@ -317,7 +318,7 @@ def cell_edges(begin: float, end: float, cell: float) -> np.ndarray:
 
 
 def interpolate(f: Callable[[np.ndarray], np.ndarray], edges: np.ndarray) -> np.ndarray:
-    """Pieces that are cubics through values at the Lobatto nodes of each cell.
+    """Cubic pieces through values at the Lobatto nodes of each cell.
 
     Args:
         f: value at times [s] of shape (n,), as shape (n, 2).
@@ -338,13 +339,13 @@ def interpolate(f: Callable[[np.ndarray], np.ndarray], edges: np.ndarray) -> np.
 def integrals(
     f: Callable[[np.ndarray], np.ndarray], begin: np.ndarray, end: np.ndarray, panels: np.ndarray
 ) -> np.ndarray:
-    """Integrals by Gauss's rule of ten nodes a panel.
+    """Integrals by Gauss quadrature with ten nodes per panel.
 
     Args:
         f: value at times [s] of shape (m,), as shape (m, 2).
-        begin: of each interval [s], shape (n,).
-        end: of each interval [s], shape (n,).
-        panels: into how many equal parts each is divided, shape (n,).
+        begin: start of each interval [s], shape (n,).
+        end: end of each interval [s], shape (n,).
+        panels: number of equal parts of each interval, shape (n,).
 
     Returns:
         Shape (n, 2).

@@ -1,4 +1,4 @@
-"""The clay as a table of cells: the one place where a run looks up what resists it, and where."""
+"""The clay as a table of cells, in which a run looks up resistance by place."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def region_table(clay: Clay | None, length: float | None) -> np.ndarray:
 
 
 class _Columns:
-    """Columns one behind the other, and before them where each begins; the end comes first."""
+    """Columns in sequence, preceded by the index at which each begins; the end comes first."""
 
     def __init__(self, end: float):
         self._head: list[float] = [end]
@@ -73,21 +73,21 @@ class _Columns:
         self._size += len(values)
 
     def lack(self) -> None:
-        """Notes that there is no such column."""
+        """Marks a column as absent."""
         self._head.append(0.0)
 
     def repeat(self) -> None:
-        """Notes that the next column is the one before."""
+        """Marks the next column as equal to the previous one."""
         self._head.append(self._head[-1])
 
     def table(self) -> np.ndarray:
-        """All of them."""
+        """The whole table."""
         rest = [0.0] * (HEAD - len(self._head))
         return np.concatenate((self._head + rest, *self._columns))
 
 
 def _put_smooth(out: _Columns, given: Sequence[Any]) -> None:
-    """Puts the numbers of smooth clay of x and of y."""
+    """Adds the numbers of smooth clay of x and of y."""
     for i, law in enumerate(given):
         if not isinstance(law, Smooth):
             out.lack()
@@ -98,7 +98,7 @@ def _put_smooth(out: _Columns, given: Sequence[Any]) -> None:
 
 
 def _put_cells(out: _Columns, clay: Clay | None, laws: Sequence[Any]) -> None:
-    """Puts what each cell holds, for each of the laws."""
+    """Adds the values of each cell, for each law."""
     yields, springs = bool(clay and clay.yields), bool(clay and clay.springs)
     for what in ["damping", "rates", "entered", *["flows"] * yields, *["elastic"] * springs]:
         if what == "elastic" and not yields:
@@ -111,7 +111,7 @@ def _put_cells(out: _Columns, clay: Clay | None, laws: Sequence[Any]) -> None:
 
 
 def _of_cells(what: str, law: Any) -> np.ndarray:
-    """One thing that the cells of a law hold, cell by cell."""
+    """One quantity of the cells of a law, cell by cell."""
     if what == "entered":
         return np.full(law.damping.size, math.nan)
     if what == "flows":
@@ -123,7 +123,7 @@ def _of_cells(what: str, law: Any) -> np.ndarray:
 
 
 def region_of(table, p):
-    """Indices along x and along y of the region in which a place lies; on a border, of that beyond.
+    """Indices along x and y of the region that contains a place; on a border, of that beyond.
 
     Args:
         table: from `region_table`.
@@ -136,7 +136,7 @@ def region_of(table, p):
 
 
 def _region_along(table, i, at):
-    """Index of the region along one axis: the last border at or before the place."""
+    """Index of the region along one axis, from the last border at or before the place."""
     begin, high = int(table[EDGES + i]), int(table[EDGES + i + 1])
     low = begin + 1
     while low < high:
@@ -149,11 +149,11 @@ def _region_along(table, i, at):
 
 
 def keep_entries(table: np.ndarray, before: np.ndarray) -> None:
-    """Takes over when the handle first entered each cell, from clay of the same borders.
+    """Copies the times of first entry into each cell from clay with the same borders.
 
     Args:
-        table: from `region_table`; gets the times.
-        before: the table up to now.
+        table: from `region_table`; receives the times.
+        before: the previous table.
     """
     begin = int(table[ENTERED])
     end = int(table[FLOWS]) or int(table[SPRINGS]) or len(table)
@@ -164,7 +164,7 @@ def enter_region(table, ix, iy, t):
     """The region that the handle enters.
 
     Args:
-        table: from `region_table`; notes the time of first entry where the clay grows.
+        table: from `region_table`; records the time of first entry where the clay grows.
         ix: index of the region along x.
         iy: index of the region along y.
         t: time of entry [s].
@@ -179,7 +179,7 @@ def enter_region(table, ix, iy, t):
 
 
 def enter_flow(table, axis, ix, iy):
-    """How the clay of an axis yields in a region; of clay that yields somewhere.
+    """Yield law of an axis in a region, for clay that yields somewhere.
 
     Args:
         table: from `region_table`.
@@ -195,7 +195,7 @@ def enter_flow(table, axis, ix, iy):
 
 
 def spring_place(table, axis, ix, iy):
-    """Where the table holds the spring of a region; of clay that springs back somewhere.
+    """Index of the spring of a region in the table, for clay that springs back somewhere.
 
     Args:
         table: from `region_table`.
@@ -207,14 +207,14 @@ def spring_place(table, axis, ix, iy):
 
 
 def smooth_clay(table, which, x, y, bx, by):
-    """Clay at a place, where it is smooth.
+    """Damping at a place in smooth clay.
 
     Args:
         table: from `region_table`.
         which: axes with such clay, see `Clay.smooth`.
         x: the place, x [m].
         y: the place, y [m].
-        bx: damping of x where it has other clay [N.s/m].
+        bx: damping of x if its clay is not smooth [N.s/m].
         by: the same, y [N.s/m].
 
     Returns:
@@ -229,7 +229,7 @@ def smooth_clay(table, which, x, y, bx, by):
 
 
 def is_alike(table, ix, iy, i, up):
-    """Whether both sides of a border have the same clay, so that no step has to end on it.
+    """Whether both sides of a border have the same clay, so that no step need end on it.
 
     Args:
         table: from `region_table`.
@@ -247,7 +247,7 @@ def is_alike(table, ix, iy, i, up):
         if table[values + a] != table[values + b] or table[rates + a] or table[rates + b]:
             return False
         springs = int(table[SPRINGS + axis])
-        if springs and a != b:  # each has a rest of its own
+        if springs and a != b:  # each spring has its own rest position
             for cell in (a, b):
                 at = springs + SPRING * cell
                 if table[at] > 0.0 or table[at + 2] > 0.0:
@@ -261,7 +261,7 @@ def is_alike(table, ix, iy, i, up):
 
 
 def _cell(table, axis, ix, iy):
-    """Number of the cell that belongs to a region, in the clay of an axis."""
+    """Number of the cell of a region in the clay of an axis."""
     x, y = int(table[OWN + 2 * axis]), int(table[OWN + 2 * axis + 1])
     return int(table[x + ix] + table[y + iy])
 

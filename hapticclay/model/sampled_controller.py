@@ -1,4 +1,4 @@
-"""A sampled controller of the user's own: a function from what is measured to the torques."""
+"""A user-defined sampled controller: a function from measurements to torques."""
 
 from __future__ import annotations
 
@@ -28,23 +28,23 @@ Law = Callable[
 @named
 @dataclass(frozen=True, eq=False)
 class Controller:
-    """A controller that takes the place of compensator and servo in a sampled loop.
+    """A controller that replaces compensator and servo in a sampled loop.
 
     The function is called once a control sample as law(t, q, qd, fh, state, params) and returns
-    (torques, state): t [s]; q [rad] and qd [rad/s] of shoulder and elbow as they are measured; fh
-    [N] (x, y), force of the hand on the handle as it is measured; state and params tuples of
-    floats. The torques (shoulder, elbow) [N.m] are held for a sample, within the torque limits and
-    behind converter and delay of the hardware. The state is handed to the next call. Rendering
-    the clay is up to the law, unless the scenario's `render` is "physical", where it is physical.
+    (torques, state): t [s]; q [rad] and qd [rad/s], measured at shoulder and elbow; fh [N] (x, y),
+    measured force of the hand on the handle; state and params, tuples of floats. The torques
+    (shoulder, elbow) [N.m] are held for a sample, within the torque limits and after converter and
+    delay of the hardware. The next call receives the state. The law must render the clay itself,
+    unless the scenario's `render` is "physical".
 
-    Runs compile the function with numba where they are compiled themselves and it can be; Python
-    runs it otherwise, to the same numbers, and a line says so. Variables outside of the function
-    are constants to machine code: what changes from call to call belongs in the state.
+    Compiled runs compile the function with numba if possible. Otherwise Python runs it, with
+    bit-identical results, and a line says so. Captured variables are frozen when the function is
+    compiled: values that change from call to call belong in the state.
 
     Attributes:
-        law: the function, or "package.module:name" of it, which is imported when a run starts.
-        state: at the first sample.
-        params: what else the function needs.
+        law: the function, or its name "package.module:name", imported when a run starts.
+        state: state at the first sample.
+        params: parameters of the function.
     """
 
     law: Any
@@ -67,12 +67,12 @@ class Controller:
 
     @property
     def _key(self) -> tuple[Any, ...]:
-        """A function equals its name, for that is what files hold of it."""
+        """A function compares equal to its name, because files store the name."""
         name = self.law if isinstance(self.law, str) else function_name(self.law)
         return name or self.law, self.state, self.params
 
     def function(self) -> Law:
-        """The law itself; a name is imported now, which runs its module.
+        """The function; a name is imported now, which executes its module.
 
         Raises:
             ParameterError: there is no such function.
@@ -81,7 +81,7 @@ class Controller:
         if isinstance(law, str):
             try:
                 law = pkgutil.resolve_name(law)
-            except (Exception, SystemExit) as error:  # of any kind: it is the user's module
+            except (Exception, SystemExit) as error:  # any exception: it is the user's module
                 why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
                 bound = f"must name a function as package.module:name ({one_line(why, 200)})"
                 raise self._refusal(bound) from None
@@ -94,19 +94,19 @@ class Controller:
 
 
 class LawFailed(RuntimeError):
-    """The function of a `Controller` raised an exception, its cause, or returned something else."""
+    """The function of a `Controller` raised an exception (the cause) or returned a wrong value."""
 
 
 class LawCaller:
-    """Calls a law between the loop's reading of the buffer and its taking the torques.
+    """Calls a law between the write of measurements and the read of torques in the buffer.
 
     Args:
-        controller: whose law.
+        controller: controller that holds the law.
         buffer: the shared floats, shape (n,).
 
     Attributes:
         law: the function.
-        error: exception of a call that failed, after which the torques are not finite.
+        error: exception of a failed call, after which the torques are not finite.
         pointer: what machine code calls, where Python runs the law; else None.
         called: what machine code calls, once it does.
     """
@@ -121,7 +121,7 @@ class LawCaller:
         self._ends = BUFFER + len(controller.state), BUFFER + 2 * len(controller.state)
 
     def __call__(self, _desk: object = None) -> None:
-        try:  # machine code drops what is raised here: it ends the run, and `check` raises it
+        try:  # machine code drops exceptions raised here: the run ends, and `check` raises them
             if self.error is None:
                 self._answer()
         except BaseException as error:
@@ -147,20 +147,20 @@ class LawCaller:
         self.buffer[TORQUE], self.buffer[TORQUE + 1] = t1, t2
 
     def finite(self) -> bool:
-        """Whether the torques are."""
+        """Whether the torques are finite."""
         return all(map(math.isfinite, self.buffer[TORQUE : TORQUE + 2].tolist()))
 
     def check(self) -> None:
-        """Raises LawFailed if a call has failed; machine code of it leaves torques not finite.
+        """Raises LawFailed if a call has failed; a compiled law then leaves torques not finite.
 
-        What is no error, as Ctrl-C, is raised as it is. Torques that are not finite end a run, but
-        for those of its first sample, which is none.
+        Exceptions that are not errors, such as Ctrl-C, are raised unchanged. Torques that are not
+        finite end a run; at the first sample they raise LawFailed.
         """
         if self.error is None and not self.finite():
             if self.pointer is None:
-                self()  # in Python, which says why
+                self()  # called in Python, which shows the cause
             elif all(map(math.isfinite, self._returned)):
-                self.error = KeyboardInterrupt()  # it came before the call could keep it
+                self.error = KeyboardInterrupt()  # raised before the call could store it
             torques = tuple(self.buffer[TORQUE : TORQUE + 2].tolist())
             if self.error is None and self.buffer[0] <= 0.0:
                 self.error = ValueError(f"torques must be finite, not {torques}")

@@ -1,4 +1,4 @@
-"""Signals that are measured, or computed by a function of the user's."""
+"""Signals from measurements, or from a user's function."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ CSV_COLUMNS = ("t", "fx", "fy")
 @named
 @dataclass(frozen=True)
 class Samples(Signal):
-    """Samples (t, values), in between straight lines or held.
+    """Samples (t, values), interpolated linearly or held.
 
     Attributes:
         t: times [s], ascending, at least one.
@@ -70,19 +70,19 @@ class Samples(Signal):
         between: Between = "linear",
         outside: Outside = "hold",
     ) -> Samples:
-        """Reads samples from a file of comma-separated values.
+        """Reads samples from a CSV file.
 
         The first line names the columns.
 
         Args:
             path: the file.
-            columns: names of those with time [s], x and y.
+            columns: names of the columns with time [s], x and y.
             between: as the attribute.
             outside: as the attribute.
 
         Raises:
-            ParameterError: a column is missing, a cell is no number, or the samples are refused;
-                or the file is no text in UTF-8.
+            ParameterError: a column is missing, a cell is not a number, the samples are refused,
+                or the file is not UTF-8 text.
             OSError: the file cannot be read.
         """
         if isinstance(columns, str) or len(columns) != 3:
@@ -112,7 +112,7 @@ class Samples(Signal):
 
     @cached_property
     def _rows(self) -> np.ndarray:
-        """All pieces; the first is the one before the first sample."""
+        """All pieces; the first one precedes the first sample."""
         t, values = np.array(self.t), np.array(self.values)
         slopes = np.zeros_like(values)
         if self.between == "linear" and len(t) > 1:
@@ -152,10 +152,10 @@ def _csv_number(text: str, column: str, line: int, path: Any) -> float:
 @named
 @dataclass(frozen=True)
 class Function(Signal):
-    """Any smooth function of time; where it is not smooth, a run loses order.
+    """Any smooth function of time; where it is not smooth, the order of accuracy drops.
 
-    A run evaluates it at the ends of each half step and twice in between, and uses the cubic
-    through the four values. `mean` of the function itself uses ten values.
+    A run evaluates the function at the ends of each half step and twice in between, and uses the
+    cubic through these four values. `mean` uses ten values of the function itself.
 
     Attributes:
         f: returns (x, y) at a time [s]. It may accept an array of times and return arrays; else it
@@ -186,7 +186,7 @@ class Function(Signal):
         return x, y
 
     def _together(self, t: np.ndarray) -> np.ndarray | None:
-        """Values at many times by one call; None where the function cannot do that."""
+        """Values at many times by one call; None if the function does not support arrays."""
         try:
             x, y = self.f(t)
             out = np.column_stack([np.broadcast_to(np.asarray(v, float), t.shape) for v in (x, y)])
@@ -196,11 +196,11 @@ class Function(Signal):
 
     @cached_property
     def _takes_arrays(self) -> list[bool]:
-        """Whether one call may ask for many times; empty until it is known."""
+        """Whether one call may pass many times; empty until known."""
         return []
 
     def _agrees(self, t: np.ndarray, values: np.ndarray) -> bool:
-        """Whether three of the values are those of the function asked time by time."""
+        """Whether three of the values agree with single calls of the function."""
         ask, size = (0, len(t) // 2, len(t) - 1), np.abs(values).max()
         return all(np.allclose(values[i], self._at(float(t[i])), 1e-6, 1e-6 * size) for i in ask)
 
@@ -225,7 +225,7 @@ class Function(Signal):
         return pieces.interpolate(self._values, pieces.cell_edges(begin, end, 0.5 * step))
 
     def breaks(self, begin: float, end: float) -> np.ndarray:
-        """None that are known.
+        """No known breaks.
 
         Args:
             begin: as Signal.breaks.

@@ -15,13 +15,13 @@ from .signals import Signal
 
 Size = Annotated[tuple[float, float], Bound(-1e6, 1e6)]
 Moment = Annotated[float, Bound(0.0, 1e5, "s")]
-BEFORE = 1.0  # [s] by which the piece before the first break begins early; any number would do
+BEFORE = 1.0  # [s] lead of the piece before the first break; any number works
 
 
 @named
 @dataclass(frozen=True)
 class Constant(Signal):
-    """The same at all times.
+    """A constant signal.
 
     Attributes:
         value: on each axis, -1e6 to 1e6.
@@ -83,7 +83,7 @@ class Ramp(Signal):
     Attributes:
         rate: on each axis, a second, -1e6 to 1e6.
         start: when it begins to grow [s], 0 to 1e5.
-        end: when it ceases to [s], > start, at most 1e5; None for never.
+        end: when it stops growing [s], > start, at most 1e5; None for never.
     """
 
     rate: Size
@@ -153,7 +153,7 @@ class Pulse(Signal):
     def _means(self, t: np.ndarray, h: np.ndarray) -> np.ndarray:
         if self.period is None:
             return super()._means(t, h)
-        # a train has too many pieces for long intervals: whole periods are counted
+        # a train has too many pieces over long intervals: whole periods are counted
         begin, span = t - h - self.start, 2.0 * h
         late = np.maximum(-begin, 0.0)  # part of the interval before the first pulse
         begin, span = np.maximum(begin, 0.0), np.maximum(span - late, 0.0)

@@ -96,14 +96,14 @@ class Signal(ABC):
         return self._means(t.ravel(), h.ravel()).reshape(*t.shape, 2)
 
     def _means(self, t: np.ndarray, h: np.ndarray) -> np.ndarray:
-        """As `mean`, for arrays of one shape (n,)."""
+        """As `mean`, for arrays of the same shape (n,)."""
         if not len(t):
             return np.zeros((0, 2))
         low, high = float((t - h).min()), float((t + h).max())
         return pieces.pieces_mean(self.pieces(low, high, math.inf), t, h)
 
     def mean_of_multisines(self, t: Any, h: Any) -> Any:
-        """As `mean`, of its multisines alone; 0 if there are none.
+        """As `mean`, for the multisines alone; 0 if there are none.
 
         Args:
             t: centre of the interval [s], a number or shape (n,).
@@ -145,11 +145,11 @@ class Signal(ABC):
 @named
 @dataclass(frozen=True)
 class Sum(Signal):
-    """Signals added up: `a + b - 2 * c`.
+    """Sum of signals: `a + b - 2 * c`.
 
     Attributes:
-        parts: the signals; sums among them are taken apart.
-        factors: on each part, -1e6 to 1e6; None for 1.
+        parts: the signals; nested sums are flattened.
+        factors: factor on each part, -1e6 to 1e6; None for 1.
     """
 
     parts: tuple[Signal, ...]
@@ -180,7 +180,7 @@ class Sum(Signal):
 
     @property
     def cosines(self) -> np.ndarray:
-        """Those of all parts, shape (n, 5)."""
+        """Lines of all parts, shape (n, 5)."""
         return np.concatenate([x.cosines * (1.0, 1.0, 1.0, k, k) for x, k in self._terms()])
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
@@ -222,7 +222,7 @@ class Sum(Signal):
 
 
 def _scaled_parts(part: Signal, factor: float) -> list[tuple[Signal, float]]:
-    """Parts of a multiple of a signal, with their factors."""
+    """Parts of a scaled signal, with their factors."""
     if isinstance(part, Sum):
         return [(x, k * factor) for x, k in part._terms()]
     return [(part, factor)]
@@ -233,7 +233,7 @@ def _scaled_parts(part: Signal, factor: float) -> list[tuple[Signal, float]]:
 class Multisine(Signal):
     """A periodic signal: cosines of random phases at multiples of 1/period between low and high.
 
-    All lines have one amplitude; the phases follow from the seed (Pintelon, Schoukens, System
+    All lines have the same amplitude; the seed determines the phases (Pintelon, Schoukens, System
     Identification, 2012, sec. 2.3).
 
     Attributes:

@@ -1,4 +1,4 @@
-"""Damping that changes smoothly with the place, by a cubic B-spline."""
+"""Damping that varies smoothly in space, by a cubic B-spline."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from .constants import AXES, B_MAX
 def smooth_damping(table, at, x, y):
     """Damping at a place by a cubic B-spline in each coordinate; its tangents are continuous.
 
-    Never below the least of its control points nor above the largest.
+    The value stays between the least and the largest control point.
 
     Args:
-        table: from `regions.region_table`; at `at` it holds `Smooth.numbers`.
-        at: where in it.
+        table: from `regions.region_table`; holds `Smooth.numbers` at index `at`.
+        at: that index.
         x: place, x [m].
         y: place, y [m].
 
@@ -32,7 +32,7 @@ def smooth_damping(table, at, x, y):
     most, rows = table[at + 2], table[at + 5]
     u = (x - table[at]) * table[at + 1]
     v = (y - table[at + 3]) * table[at + 4]
-    # beyond, all four control points are alike; NaN is put there too
+    # beyond, all four control points are equal; NaN also ends up here
     u = 0.0 if not u > 0.0 else most if u > most else u
     v = 0.0 if not v > 0.0 else rows if v > rows else v
     i, j = int(u), int(v)
@@ -61,11 +61,11 @@ def smooth_damping(table, at, x, y):
 @named
 @dataclass(frozen=True)
 class Smooth(CellLaw):
-    """Damping b of one axis that changes smoothly with the place, by a cubic B-spline.
+    """Damping b of one axis that varies smoothly in space, by a cubic B-spline.
 
-    The values are control points at the nodes of an even grid: b is a mean of the sixteen around a
-    place, never below the least of them nor above the largest, twice continuously differentiable,
-    and constant from one spacing beyond the outline on. It has no borders: no step ends in it.
+    The values are control points at the nodes of an even grid. At any place b is a weighted mean
+    of the sixteen control points around it. So b stays within their range, is twice continuously
+    differentiable, and is constant from one spacing beyond the outline on. There are no borders.
 
     Attributes:
         x: first and last node along x [m], ascending.
@@ -89,7 +89,7 @@ class Smooth(CellLaw):
 
     @functools.cached_property
     def damping(self) -> np.ndarray:
-        """The control points, a line along y for each along x [N.s/m], shape (n, m)."""
+        """The control points, one row along y per node along x [N.s/m], shape (n, m)."""
         return np.array(self.values)
 
     @property
@@ -120,10 +120,10 @@ class Smooth(CellLaw):
 
     @functools.cached_property
     def numbers(self) -> np.ndarray:
-        """What `smooth_damping` takes.
+        """Arguments of `smooth_damping`.
 
-        Along x, then along y: begin [m], nodes per length [1/m], intervals; control points, with
-        those of the outline beyond it: two lines before the first node, three behind the last.
+        Along x, then along y: start [m], nodes per length [1/m], intervals; then control points,
+        extended beyond the outline: two rows before the first node, three after the last.
         """
         head = []
         for (low, high), n in zip((self.x, self.y), self.damping.shape, strict=True):
@@ -151,7 +151,7 @@ class Smooth(CellLaw):
         return windows.max(axis=(2, 3)) > 0.0
 
     def at(self, x: Any, y: Any) -> np.ndarray:
-        """Damping at some places [N.s/m].
+        """Damping at given places [N.s/m].
 
         Args:
             x: coordinates [m].
@@ -162,7 +162,7 @@ class Smooth(CellLaw):
         return np.vectorize(lambda x, y: smooth_damping(table, 0, x, y), otypes=[float])(x, y)
 
     def forces_at(self, kinds: Any, x: Any, y: Any, speed: float, dent: float) -> np.ndarray:
-        """As `Grid.forces_at`: it is damping alone.
+        """As `Grid.forces_at`, for damping alone.
 
         Args:
             kinds: has no effect.
@@ -177,8 +177,8 @@ class Smooth(CellLaw):
         """Control points of the damping in a box [N.s/m].
 
         Args:
-            low: its lowest corner [m].
-            high: its highest corner [m].
+            low: lowest corner of the box [m].
+            high: highest corner of the box [m].
         """
         (i, j), (k, m) = self.index(*low), self.index(*high)
         last = np.array(self.damping.shape) - 1
@@ -199,7 +199,7 @@ class Smooth(CellLaw):
             b: damping at a place (x, y) [m] [N.s/m].
             x: first and last node along x [m].
             y: the same along y.
-            nodes: how many there are along x and along y, one or more.
+            nodes: number of nodes along x and along y, one or more.
 
         Raises:
             ParameterError: an argument, or a value of the function, is out of bounds.
@@ -224,14 +224,14 @@ class Smooth(CellLaw):
 
         Args:
             image: brightness from 0 (black) to 1 (white), shape (rows, columns); the first row is
-                that of the largest y.
+                at the largest y.
             x: where the image begins and ends along x [m].
             y: the same along y.
             b: damping at black and at white [N.s/m].
 
         Raises:
-            ParameterError: the image is no table of numbers from 0 to 1, or another argument is out
-                of bounds.
+            ParameterError: the image is not a table of numbers from 0 to 1, or another argument
+                is out of bounds.
         """
         spans, values = outline(x, y), pixels(image, b)
         ends = []

@@ -14,7 +14,7 @@ from ..errors import Bound, ParameterError, check_fields
 from .traits import LEFT_OUT, Law, Refusal, Told, told_pair, told_values
 
 STIFFNESS_MAX = 1e9  # [N/m]
-RESOLVED = 0.2  # [rad] longest step times the highest frequency of the springs in the loop
+RESOLVED = 0.2  # [rad] limit of step times highest frequency of the springs in the loop
 
 
 @named
@@ -59,14 +59,14 @@ class Spring:
 
 
 def spring_step(k, limit, way, rest, p):
-    """A spring that gives way, after the handle has moved.
+    """Advances a spring that gives way, after a motion of the handle.
 
     Args:
         k: stiffness [N/m].
         limit: force at which it gives way [N].
-        way: direction in which it is pushed, 1.0 or -1.0, where it is a surface; 0.0 elsewhere.
-        rest: place without force before [m].
-        p: place of the handle [m].
+        way: direction of the push on a surface, 1.0 or -1.0; 0.0 if it is no surface.
+        rest: rest position before [m].
+        p: position of the handle [m].
 
     Returns:
         (rest [m], force [N], energy stored, energy lost since [J]).
@@ -86,7 +86,7 @@ def spring_step(k, limit, way, rest, p):
 
 
 def relaxing_step(k, tau, way, z, dp, h):
-    """A spring in line with a damper, Maxwell's, after an even motion: exact.
+    """Advances a spring in series with a damper (Maxwell) over a uniform motion: exact.
 
     Args:
         k: stiffness [N/m].
@@ -94,7 +94,7 @@ def relaxing_step(k, tau, way, z, dp, h):
         way: as in `spring_step`.
         z: elongation before [m].
         dp: motion of the handle [m].
-        h: its time [s].
+        h: duration of the motion [s].
 
     Returns:
         (elongation [m], force [N], energy stored, energy lost since [J]).
@@ -141,7 +141,7 @@ def _told(*quantities: Sequence[Told]) -> list[Told]:
 
 
 def _finite(values: Any) -> list[float]:
-    """The values, 0 for a limit that is none."""
+    """The values, with 0 for an infinite limit."""
     return np.where(np.isfinite(values), values, 0.0).tolist()
 
 

@@ -1,4 +1,4 @@
-"""What can be combined: one table of parts and methods, of what each part says of itself."""
+"""Supported combinations: one table of parts and methods, from the traits of each part."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def refusal(a: str, b: str) -> Refusal | None:
     """Why two parts cannot be combined; None if they can.
 
     Args:
-        a: name of one.
-        b: name of the other.
+        a: name of one part.
+        b: name of the other part.
     """
     return TRAITS[a].refuses.get(b) or TRAITS[b].refuses.get(a)
 
@@ -50,7 +50,7 @@ def check_scene(s: Any) -> None:
         s: the scenario.
 
     Raises:
-        ParameterError: there are two such.
+        ParameterError: two of its parts cannot be combined.
     """
     own = [] if s.clay is None else present(s.clay, LAWS)
     check_traits([*present(s, METHODS), *own, *present(s, PARTS)], s)
@@ -74,7 +74,7 @@ part.
 
 
 def page() -> str:
-    """The page of the documents, in Markdown."""
+    """The documentation page, in Markdown."""
     names = [x.name for x in METHODS]
     rows = [[x.name, *(_cell(x.name, m) for m in names), x.theory] for x in (*LAWS, *PARTS)]
     table = [["", *names, "linear theory"], ["---"] * (len(names) + 2), *rows]

@@ -14,7 +14,7 @@ WIDTH_MIN = 4e-3  # [m] two of the largest cells of a picture's map (studies/rem
 @named
 @dataclass(frozen=True)
 class Tool:
-    """The cutter at the handle.
+    """The cutting tool at the handle.
 
     Attributes:
         width: of its round footprint, across the motion [m], 0.004 to 0.1.

@@ -1,4 +1,4 @@
-"""What a part says of itself: its name, which scenes have it, and what refuses it."""
+"""Traits of parts: name, scenes with the part, and parts that cannot be combined with it."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any, NamedTuple, TypeVar
 from ..errors import ParameterError
 
 T = TypeVar("T", bound="Trait")
-LEAST = 1e-9  # [N], [N/(m/s)^n] of clay that is scaled down and goes on to resist
-YES, LEFT_OUT, NO = "yes", "left out", "no"  # what linear theory makes of a part
+LEAST = 1e-9  # [N], [N/(m/s)^n] least resistance of clay that is scaled down
+YES, LEFT_OUT, NO = "yes", "left out", "no"  # how linear theory treats a part
 
 
 def _none(*_: Any) -> tuple[Any, ...]:
@@ -23,8 +23,8 @@ class Refusal:
     """Why two parts cannot be combined.
 
     Attributes:
-        field: dotted name of the field that the error is about.
-        bound: what that field must be.
+        field: dotted name of the field in the error.
+        bound: required value of that field.
     """
 
     field: str
@@ -33,16 +33,16 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Trait:
-    """A part of a scene, or a way to step it.
+    """A part of a scene, or a method to step it.
 
     Attributes:
         name: in words.
         group: "method", "clay" or "part".
-        has: whether a scene has it; that of clay is asked of the clay.
-        theory: whether linear theory knows it: "yes"; "left out", so that a gain limit is that of
+        has: whether a scene has it; for a clay trait, the argument is the clay.
+        theory: whether linear theory covers it: "yes"; "left out", so that a gain limit is that of
             the scene without it; or "no", so that the scene is refused.
-        refuses: what it cannot be combined with, by name of the other.
-        words: of what `has` is asked of, its quantities.
+        refuses: parts that it cannot be combined with, by name.
+        words: quantities of the part, from the argument of `has`.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Told(NamedTuple):
 
     Attributes:
         form: words, with {} in place of the values.
-        values: they, as different places or axes have them; empty for words alone.
+        values: values at different places or axes; empty for words alone.
         unit: of the values; "" for none.
     """
 
@@ -67,10 +67,10 @@ class Told(NamedTuple):
     unit: str = ""
 
     def text(self, most: int = 1) -> str:
-        """Words, values and unit; no value stands twice.
+        """Words, values and unit, without repeated values.
 
         Args:
-            most: how many values are listed; of more, the least and the largest are shown.
+            most: number of values to list; if there are more, the least and the largest are shown.
         """
         some = sorted(set(self.values))
         shown = ", ".join(f"{v:.4g}" for v in some)
@@ -83,8 +83,8 @@ class Column(NamedTuple):
     """A column of a table of stretches.
 
     Attributes:
-        name: of the quantity, as in `Record.regions`.
-        unit: of it; "" for none.
+        name: name of the quantity, as in `Record.regions`.
+        unit: its unit; "" for none.
     """
 
     name: str
@@ -92,11 +92,11 @@ class Column(NamedTuple):
 
 
 class Hold(NamedTuple):
-    """What holds a tool at rest.
+    """A force that holds a tool at rest.
 
     Attributes:
-        force: up to which it holds [N].
-        field: what makes it, as a scenario names it.
+        force: largest holding force [N].
+        field: its cause, as named in a scenario.
         together: whether the pushes along both axes act on it together.
     """
 
@@ -106,14 +106,14 @@ class Hold(NamedTuple):
 
 
 class Block(NamedTuple):
-    """A rectangle of clay beside the laws of the axes.
+    """A rectangle of clay in addition to the laws of the axes.
 
     Attributes:
         x: where it begins and ends along x [m].
         y: the same along y.
-        force: of a tool that cuts it slowly [N].
-        damping: force per speed, beside it [N.s/m].
-        tool: that cuts it; None for any.
+        force: force on a tool that cuts it slowly [N].
+        damping: additional force per speed [N.s/m].
+        tool: tool that cuts it; None for any.
     """
 
     x: tuple[float, float]
@@ -123,7 +123,7 @@ class Block(NamedTuple):
     tool: Any = None
 
     def at_speed(self, speed: float) -> float:
-        """Force of a tool that cuts it [N].
+        """Force on a tool that cuts it [N].
 
         Args:
             speed: of the tool [m/s].
@@ -131,24 +131,24 @@ class Block(NamedTuple):
         return self.force + speed * self.damping
 
     def holds(self, x: Any, y: Any, margin: float = 0.0) -> Any:
-        """Whether places lie in it.
+        """Whether places lie in the block.
 
         Args:
             x: coordinates [m].
             y: the same along y.
-            margin: around it, which counts as in it [m].
+            margin: margin around the block that counts as inside [m].
         """
         (x0, x1), (y0, y1), m = self.x, self.y, margin
         return (x >= x0 - m) & (x <= x1 + m) & (y >= y0 - m) & (y <= y1 + m)
 
 
 class Soft(NamedTuple):
-    """Clay whose damping the steps of the fast method must resolve, as no kick may be split in it.
+    """Clay whose damping the steps of the fast method must resolve, because no kick can be split.
 
     Attributes:
-        damping: the largest [N.s/m].
-        where: in words.
-        instead: what resolves it but a shorter step, in words.
+        damping: largest damping [N.s/m].
+        where: place, in words.
+        instead: alternative to a shorter step, in words.
     """
 
     damping: float
@@ -162,26 +162,26 @@ def _as_it_is(clay: Any, _: float) -> Any:
 
 @dataclass(frozen=True)
 class Law(Trait):
-    """A law of clay: what tables, figures, texts and theory show or assume of it.
+    """A law of clay, as seen by tables, figures, texts and theory.
 
     Attributes:
         viscous: whether its force is damping times velocity, so that linear theory holds.
-        of_velocity: whether its force follows from the velocity alone, by the damping and by Fy, K
-            and n of `Grid.flows_at`, so that theory knows the speed under a constant push.
-        seen_in_b: whether the damping tells its regions apart.
-        along_motion: whether its force has the direction of the motion; else each axis has its own.
-        varies: what the damping of a region varies over, "time" or "place"; "" for one number.
-        columns: quantities of a stretch beside its damping, which `at` returns.
-        at: of the law of one axis and a place (x, y) [m], values of `columns`.
-        here: of clay and a place (x, y) [m], quantities of both axes there.
-        force: of the law of one axis, a speed [m/s] and an indentation [m], force of each cell at
-            them [N]; None where it has none beside those of others.
-        holds: of clay and an axis, 0 or 1, what holds a tool at rest; None where nothing does.
-        blocks: of clay, its rectangles.
-        ground: of clay, the cells that a tool cuts for good, as `Groove` has them (`shape`,
-            `edges`, `relief`, `shares`, `highest`); None where a tool leaves clay as it was.
-        soft: of clay, what steps must resolve of it; None for nothing.
-        scaled: of clay and a factor, the clay with what resists multiplied by it, within bounds.
+        of_velocity: whether its force depends on the velocity alone, through the damping and Fy, K
+            and n of `Grid.flows_at`, so that theory gives the speed under a constant push.
+        seen_in_b: whether the damping distinguishes its regions.
+        along_motion: whether its force acts along the motion; else each axis resists by itself.
+        varies: what the damping within a region depends on, "time" or "place"; "" if constant.
+        columns: quantities of a stretch besides damping, returned by `at`.
+        at: function of the law of one axis and a place (x, y) [m]: values of `columns`.
+        here: function of clay and a place (x, y) [m]: quantities of both axes there.
+        force: function of the law of one axis, a speed [m/s] and an indentation [m]: force of each
+            cell [N]; None if the law adds no force.
+        holds: function of clay and an axis, 0 or 1: what holds a tool at rest; None for nothing.
+        blocks: function of clay: its rectangles.
+        ground: function of clay: cells that a tool cuts permanently, as in `Groove` (`shape`,
+            `edges`, `relief`, `shares`, `highest`); None if a tool does not change the clay.
+        soft: function of clay: clay that steps must resolve; None for nothing.
+        scaled: function of clay and a factor: clay with its resistance multiplied, within bounds.
     """
 
     viscous: bool = True
@@ -201,13 +201,13 @@ class Law(Trait):
 
 
 def multiplied(values: Any, factor: float, most: float, least: float = 0.0) -> Any:
-    """Numbers, or rows of them, multiplied within bounds; those that are 0 stay so.
+    """Numbers, or rows of them, multiplied and clipped to bounds; zeros stay zero.
 
     Args:
-        values: they, or tuples of them.
-        factor: on each.
+        values: the numbers, or tuples of them.
+        factor: factor on each number.
         most: upper bound.
-        least: lower bound of those that are not 0.
+        least: lower bound of numbers other than 0.
     """
     if isinstance(values, tuple):
         return tuple(multiplied(x, factor, most, least) for x in values)
@@ -215,24 +215,24 @@ def multiplied(values: Any, factor: float, most: float, least: float = 0.0) -> A
 
 
 def told_values(form: str, values: Iterable[float], unit: str = "") -> tuple[Told, ...]:
-    """A quantity over a scene, or nothing where all its values are 0.
+    """A quantity over a scene, or nothing if all its values are 0.
 
     Args:
         form: as `Told.form`.
-        values: they.
-        unit: of them.
+        values: values of the quantity.
+        unit: unit of the values.
     """
     some = tuple(v for v in dict.fromkeys(values) if v)
     return (Told(form, some, unit),) * bool(some)
 
 
 def told_pair(form: str, values: Sequence[float], unit: str = "") -> tuple[Told, ...]:
-    """A quantity of both axes at a place, one number where they agree, nothing where both are 0.
+    """A quantity of both axes at a place: one number if they agree, nothing if both are 0.
 
     Args:
         form: as `Told.form`.
-        values: along x and along y.
-        unit: of them.
+        values: values along x and along y.
+        unit: unit of the values.
     """
     x, y = map(float, values)
     if not (x or y):
@@ -246,8 +246,8 @@ def present(scene: Any, traits: Iterable[T]) -> list[T]:
     """The traits that a scene has.
 
     Args:
-        scene: a scenario; or clay, for those of clay.
-        traits: to be looked for.
+        scene: a scenario; clay for traits of clay.
+        traits: traits to look for.
     """
     return [x for x in traits if x.has(scene)]
 
@@ -256,12 +256,12 @@ def check_traits(found: Sequence[Trait], scene: Any, prefix: str = "") -> None:
     """Refuses traits that cannot be combined.
 
     Args:
-        found: the traits that there are.
+        found: traits of the scene.
         scene: a scenario, or clay.
-        prefix: of the dotted names of the fields of `scene`.
+        prefix: prefix of the dotted names of the fields of `scene`.
 
     Raises:
-        ParameterError: two of them cannot.
+        ParameterError: two traits cannot be combined.
     """
     names = {x.name for x in found}
     for trait in found:

@@ -1,1 +1,1 @@
-"""The paper, claim by claim, beside what the simulator gives."""
+"""The paper, claim by claim, compared with the simulator."""

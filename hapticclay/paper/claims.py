@@ -1,7 +1,7 @@
-"""The ledger: numbers that the paper prints or implies beside those of the simulator, row by row.
+"""The ledger: numbers printed or implied in the paper, compared with the simulator row by row.
 
-Every figure in a row, and in its reason, comes from a run or from the linear loop; the only numbers
-typed here are the printed ones of model/constants.py, by name.
+Every number in a row, and in its reason, comes from a run or from the linear loop. The printed
+numbers are taken by name from model/constants.py; none is typed here.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ def machine(runs: Runs) -> Iterator[Row]:
 
 
 def _lambda_x(x: float, y: float) -> float:
-    """Inertia of the arm along x with its handle at world (x, y) [kg]."""
+    """Inertia of the arm along x, with the handle at world (x, y) [kg]."""
     links = Arm().links
     q1, q2 = arm.inverse_kinematics(x, y, links)
     xx, xy, yy = arm.mobility(arm.jacobian(q1, q2, links), links)

@@ -12,7 +12,7 @@ from ..studies.comparison import COMPARED_HANDS, PUSHED, Comparison, differing_f
 from ..views.compare_plots import compare_figures
 from .report import template_environment
 
-SVG_COLORS = {  # of a figure, and the variable of the page that takes its place, light or dark
+SVG_COLORS = {  # colours of a figure, and the page variables that replace them, light or dark
     "#000000": "--ink",
     "#222222": "--ink",
     "#262626": "--ink",
@@ -40,7 +40,7 @@ NOTES = {
 
 
 def comparison_page(found: Comparison) -> str:
-    """Renders a comparison as one HTML page that needs no other file.
+    """Renders a comparison as a self-contained HTML page.
 
     Args:
         found: from `compare_files`.
@@ -66,7 +66,7 @@ def comparison_page(found: Comparison) -> str:
 
 
 def number_rows(found: Comparison) -> dict[str, list[str]]:
-    """Key numbers as text, a row a number, a cell a file; without those that no file has.
+    """Key numbers as text, one row per number, one cell per file; omits numbers that no file has.
 
     Args:
         found: from `compare_files`.
@@ -77,11 +77,11 @@ def number_rows(found: Comparison) -> dict[str, list[str]]:
 
 
 def inline_svg(text: str, name: str) -> str:
-    """An SVG file made fit to stand in a page: no head, names of its own, colours of the page.
+    """Prepares an SVG file for embedding in a page: no header, unique ids, colours of the page.
 
     Args:
-        text: of the file.
-        name: put before its ids.
+        text: text of the file.
+        name: prefix of its ids.
     """
     text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.S)
     text = re.sub(r'\b(id="|href="#|url\(#)', rf"\g<1>{name}-", text)

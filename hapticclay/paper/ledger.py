@@ -1,4 +1,4 @@
-"""A row of the ledger, and the runs that its claims are checked against."""
+"""Rows of the ledger, and the runs that check its claims."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class Row:
     Attributes:
         what: the quantity.
         where: its place in the paper.
-        printed: as the paper has it.
-        unit: of expected and ours.
+        printed: text as printed in the paper.
+        unit: unit of expected and ours.
         expected: value by our reading of the paper; None if there is nothing to compare.
         ours: value found by the simulator; None if there is nothing to find.
         tolerance: relative to expected (absolute where that is 0); None if the row need not agree.
@@ -70,14 +70,14 @@ class Row:
 
 
 class Runs:
-    """The runs behind rows and figures, each made once, on first use.
+    """The runs behind rows and figures, each run once, on first use.
 
     Attributes:
-        progress: called with the name of each run before it is made.
+        progress: called with the name of each run before it starts.
     """
 
     def __init__(self, progress: Callable[[str], None] | None = None):
-        """Keep no runs yet.
+        """Starts without runs.
 
         Args:
             progress: called with the name of each run before it is made.
@@ -148,16 +148,16 @@ def _keywords(kw: dict) -> str:
 
 
 def steady(r: Record, axis: str, k: int, name: str) -> float:
-    """A steady figure of one region of the path.
+    """A steady-state quantity of one region of the path.
 
     Args:
         r: the record.
         axis: "x" or "y".
         k: index of the region along the path.
-        name: of the figure, as in `Record.regions`.
+        name: name of the quantity, as in `Record.regions`.
 
     Returns:
-        The figure, its mean if it is a statistic; NaN where the speed never settled.
+        The quantity, or its mean for a statistic; NaN if the speed did not settle.
     """
     value = r.regions(axis)[k][axis][name]
     value = value["mean"] if isinstance(value, dict) else value
@@ -165,12 +165,12 @@ def steady(r: Record, axis: str, k: int, name: str) -> float:
 
 
 def rightmost(axis: str, K: float, b: float, th: Operator | None) -> complex:
-    """The rightmost pole of the loop at the nominal pose [1/s], of a pair the one above the axis.
+    """Rightmost pole of the loop at the nominal pose [1/s]; of a pair, the one above the real axis.
 
     Args:
         axis: "x" or "y".
         K: compensator gain.
-        b: clay [N.s/m].
+        b: damping of the clay [N.s/m].
         th: Th; None for Th = 0.
     """
     poles = loops.closed_loop_poles(axis, K, b, th)
@@ -186,7 +186,7 @@ def row(
     status: str,
     reason: str = "",
 ) -> Row:
-    """One row of the table.
+    """Makes one row of the ledger.
 
     Args:
         cells: "quantity | place in the paper | as printed | unit".

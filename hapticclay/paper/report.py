@@ -1,4 +1,4 @@
-"""The report of `hapticclay reproduce`: every figure and number of the paper and ours."""
+"""The report of `hapticclay reproduce`: all figures and numbers of the paper, with ours."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ THE_PAPER = {
     "Scheme in Virtual Reality, Journal of Intelligent and Robotic Systems 35 (2002) 247-264",
     "notes": (),
 }
-WIDE = 7.0  # [inch] wider figures have panels side by side, and take both columns of the page
+WIDE = 7.0  # [inch] wider figures have panels side by side and span both columns of the page
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,12 @@ class Picture:
     """A figure of the report.
 
     Attributes:
-        name: of the file.
-        title: over the figure.
-        caption: under the figure.
+        name: name of the file.
+        title: title above the figure.
+        caption: caption below the figure.
         draw: draws the figure from the runs of the ledger.
-        paper: what of the paper's own figure stands beside ours; its curves are not reproduced.
-        quick: whether the quick report has it.
+        paper: data of the paper's figure to compare with ours; its curves are not reproduced.
+        quick: whether the quick report includes it.
     """
 
     name: str
@@ -224,18 +224,18 @@ def typeset(unit: str) -> str:
     """Typesets a unit: N·s/m, 1/s²; nothing for "1".
 
     Args:
-        unit: as a Row has it, N.s/m, 1/s^2.
+        unit: unit as in a Row, N.s/m, 1/s^2.
     """
     return "" if unit == "1" else unit.replace("N.", "N·").replace("^2", "²")
 
 
 def aligned(x: float | None) -> Any:
-    """Formats a value so that the decimal points of a column of HTML stand in one line.
+    """Formats a value so that the decimal points of an HTML column align.
 
     Args:
         x: the value.
     """
-    import markupsafe  # jinja2 needs it anyway
+    import markupsafe  # a dependency of jinja2
 
     whole, point, rest = format_number(x).partition(".")
     cell = '<span><span class="i">{}</span><span class="f">{}</span></span>'
@@ -243,7 +243,7 @@ def aligned(x: float | None) -> Any:
 
 
 def format_error(row: Row) -> str:
-    """Formats the error of a row in percent, or in the row's unit where 0 is expected.
+    """Formats the error of a row in percent, or in the row's unit if 0 is expected.
 
     Args:
         row: of the ledger.
@@ -266,7 +266,7 @@ def format_verdict(row: Row) -> str:
 
 
 def template_environment() -> Any:
-    """The templates of this room, with filters for numbers and verdicts."""
+    """The templates of this package, with filters for numbers and verdicts."""
     import jinja2
 
     env = jinja2.Environment(
@@ -320,10 +320,10 @@ def reproduce(
 
     Args:
         out: folder.
-        quick: whether to leave out the map over the workspace.
-        progress: called with the title of each step before it begins.
+        quick: whether to omit the map of the workspace.
+        progress: called with the title of each step before it starts.
         save: writes figures by name to a folder; None for the SVG files of the report alone.
-        runs: runs to use again; None to make them.
+        runs: runs to reuse; None for new runs.
 
     Returns:
         The rows of the ledger.
@@ -377,7 +377,7 @@ def _drawn(
     out: Path,
     save: Callable[[dict[str, Figure], Path], object] | None,
 ) -> dict[str, Any]:
-    """Writes a figure of a report; returns what the templates need of it."""
+    """Writes a figure of a report; returns the values that the templates need."""
     svg = figure.svg()
     with atomic(out / "figures" / f"{picture.name}.svg") as f:
         f.write(svg.encode())

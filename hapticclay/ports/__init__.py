@@ -1,4 +1,4 @@
-"""Ports: other programs at the arm, as they are at a real device."""
+"""Ports: the simulated arm as a haptic device for other programs."""
 
 import lazy_loader
 

@@ -20,8 +20,8 @@ class ButtonScript:
     """Which buttons are pressed over time.
 
     Attributes:
-        t: times at which they change [s], ascending.
-        pressed: names of those pressed from each time on.
+        t: times at which the buttons change [s], ascending.
+        pressed: names of the buttons that are pressed from each time on.
     """
 
     t: Annotated[tuple[float, ...], Bound(unit="s")] = ()
@@ -51,7 +51,7 @@ class ButtonScript:
 
     @classmethod
     def of_file(cls, path: str | os.PathLike[str]) -> ButtonScript:
-        """The script of a CSV file with the columns t [s], a, b, c, home (0 or 1).
+        """Reads a script from a CSV file with the columns t [s], a, b, c, home (0 or 1).
 
         Args:
             path: the file.

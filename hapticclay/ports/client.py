@@ -1,7 +1,7 @@
 """A client of the Inverse service: reads a device, real or simulated, and sends it forces.
 
-A force is shortened to a limit, grows from nothing over a ramp, and is nothing after a sample that
-did not come in time: never is the last force left on the device.
+Each force is limited in length and rises from zero over a ramp. When a sample is late, the client
+sends zero force, so the device never holds an outdated one.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ from . import inverse
 from .client_log import ClientLog, Exchanged
 from .commands import NOTHING, Vector
 
-FIRST_FRAME = 5.0  # [s] that a service may take for its inventory
-PATIENCE = 0.05  # [s] after which a sample is lost
-MOST_MISSED = 40  # samples one after the other, after which the device is lost
+FIRST_FRAME = 5.0  # [s] timeout for the inventory of a service
+PATIENCE = 0.05  # [s] after which a sample counts as lost
+MOST_MISSED = 40  # consecutive lost samples after which the device counts as lost
 
 
 @named
 @dataclass(frozen=True)
 class Limits:
-    """What a client may do to the hand that holds the device.
+    """Limits that protect the hand that holds the device.
 
     Attributes:
         largest_force: longer forces are shortened to this length [N], > 0, at most 100.
-        ramp: time over which forces grow from nothing, at the start and after a lost sample [s],
+        ramp: time over which forces rise from zero, at the start and after a lost sample [s],
             0 to 60.
-        rate: exchanges in a second [Hz], 1 to 1e4: faster devices wait.
-        patience: time after which a sample is lost [s], 1e-3 to 1.
-        period: time that each exchange counts for, of a device whose clock is its messages [s],
-            1e-5 to 1; None for the computer's clock.
+        rate: exchanges per second [Hz], 1 to 1e4; a faster device waits.
+        patience: time after which a sample counts as lost [s], 1e-3 to 1.
+        period: time per exchange, for a device whose clock advances with its messages [s],
+            1e-5 to 1; None to use the computer's clock.
     """
 
     largest_force: Annotated[float, Bound(0.0, 100.0, "N", above=True)] = 3.0
@@ -61,10 +61,10 @@ class DeviceSample(NamedTuple):
     """What a device measured.
 
     Attributes:
-        t: when the answer came, since the first one [s].
-        position: of the cursor, x, y, z of the device [m].
-        velocity: of the cursor [m/s].
-        buttons: names of those pressed, of "a", "b", "c", "home".
+        t: time of arrival, counted from the first answer [s].
+        position: position of the cursor, x, y, z of the device [m].
+        velocity: velocity of the cursor [m/s].
+        buttons: names of the pressed buttons, from "a", "b", "c", "home".
     """
 
     t: float
@@ -79,11 +79,11 @@ class DeviceClient:
 
     Attributes:
         url: of the service.
-        limits: of force and time.
-        device_id: of the Inverse3 that is read.
-        first: what the device measured before any force.
-        log: what was exchanged.
-        lost: why no more samples come; "" while they do.
+        limits: limits of force and time.
+        device_id: id of the Inverse3 that the client reads.
+        first: the measurement before any force was sent.
+        log: the exchanges.
+        lost: why the samples stopped; "" while they arrive.
     """
 
     def __init__(self, url: str, limits: Limits = PLAIN):
@@ -116,8 +116,8 @@ class DeviceClient:
         self.device_id = frame.device_id
         self._begin = self._due = time.perf_counter()
         self._waiting = self._count = 0
-        self._full_at = limits.ramp  # [s] when forces are whole
-        self._missed = 0  # samples, one after the other
+        self._full_at = limits.ramp  # [s] when the ramp is complete
+        self._missed = 0  # consecutive samples
         self.log = ClientLog()
         self.first = self._sample(frame, 0.0)
 
@@ -128,7 +128,7 @@ class DeviceClient:
         self.close()
 
     def close(self) -> None:
-        """Takes the force away and disconnects."""
+        """Sends zero force and disconnects."""
         with suppress(*self._broken):
             if not self.lost:
                 self._send(NOTHING)
@@ -136,18 +136,18 @@ class DeviceClient:
         self.lost = self.lost or "closed"
 
     def restart_ramp(self) -> None:
-        """Lets forces grow from nothing again, from now on."""
+        """Restarts the ramp: forces rise from zero again."""
         self._full_at = self._time(time.perf_counter()) + self.limits.ramp
 
     def exchange(self, force: tuple[float, float, float] = NOTHING) -> DeviceSample | None:
-        """Sends a force and waits for the state, at the rate of the limits.
+        """Sends a force and waits for the answer, at the rate set in the limits.
 
         Args:
-            force: on the cursor, x, y, z of the device [N]: shortened, and on its ramp.
+            force: force on the cursor, x, y, z of the device [N], before limit and ramp.
 
         Returns:
-            What the device measured; None if no answer came in time. Then the next force is
-            nothing, whatever is asked, and later ones grow again.
+            The measurement; None if no answer came in time. In that case the next force is
+            zero, whatever the request, and the ramp restarts.
         """
         if self.lost:
             return None
@@ -163,7 +163,7 @@ class DeviceClient:
             self.lost = str(error) or type(error).__name__
             return None
         received = time.perf_counter()
-        if frame is None:  # an answer without the device
+        if frame is None:  # the answer does not contain the device
             return self._miss()
         self._count += 1
         if self._missed:
@@ -173,13 +173,13 @@ class DeviceClient:
         return sample
 
     def _miss(self) -> None:
-        """Notes a sample that is lost."""
+        """Records a lost sample."""
         self._missed += 1
         self.log.missed += 1
         if self._missed >= MOST_MISSED:
             self.lost = f"{MOST_MISSED} samples were lost, one after the other"
 
-    # ---- what is sent
+    # ---- sending
 
     def _wait(self) -> None:
         """Waits until the next exchange is due."""
@@ -195,7 +195,7 @@ class DeviceClient:
         return now - self._begin if period is None else self._count * period
 
     def _allowed(self, force: Vector) -> Vector:
-        """A force within the limits; nothing for one that is not finite."""
+        """The force within the limits; zero if it is not finite."""
         grown = 1.0
         if self.limits.ramp and (left := self._full_at - self._time(time.perf_counter())) > 0.0:
             grown = max(0.0, 1.0 - left / self.limits.ramp)
@@ -206,13 +206,13 @@ class DeviceClient:
         self._socket.send(inverse.message_text(asked))
         self._waiting += 1
 
-    # ---- what comes
+    # ---- receiving
 
     def _newest(self) -> inverse.Frame | None:
-        """The answer to the last message, those to earlier ones passed over.
+        """The answer to the last message; answers to earlier messages are skipped.
 
         Raises:
-            TimeoutError: it does not come in time.
+            TimeoutError: the answer does not arrive in time.
         """
         end, frame = time.perf_counter() + self.limits.patience, None
         while self._waiting:
@@ -226,15 +226,15 @@ class DeviceClient:
 
 
 def allowed(force: Vector, largest: float, grown: float) -> Vector:
-    """A force as the limits let it pass.
+    """Applies the limits to a force.
 
     Args:
-        force: what is asked [N].
+        force: requested force [N].
         largest: longer forces are shortened to this length [N].
         grown: share of the ramp that has passed, 0 to 1.
 
     Returns:
-        The force [N]; nothing for one that is not finite.
+        The force [N]; zero if the request is not finite.
     """
     size = math.hypot(*force)
     if not math.isfinite(size) or not size:
@@ -257,7 +257,7 @@ def connect(url: str, limits: Limits = PLAIN) -> Iterator[DeviceClient]:
         limits: of force and time.
 
     Yields:
-        The client; its force is taken away at the end.
+        The client; at the end it sends zero force.
 
     Raises:
         ParameterError: there is no service, or no Inverse3, or websockets is not installed.

@@ -1,4 +1,4 @@
-"""What a client exchanged with a device: how fast, how late, and columns for identification."""
+"""Exchanges of a client with a device: rate, latency, and columns for identification."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..files import atomic
 from .commands import AXES, Vector
 from .rows import MOST_ROWS, Rows
 
-FILE = "device.csv"  # beside the record of a session
+FILE = "device.csv"  # stored with the record of a session
 FEWEST = 2
 
 
@@ -25,12 +25,12 @@ class Exchanged(NamedTuple):
     """A force that was sent, and the answer.
 
     Attributes:
-        sent: when the force went, on the computer's clock [s].
+        sent: when the force was sent, on the computer's clock [s].
         received: when the answer came [s].
-        t: time of the answer, as it counts [s].
-        position: of the cursor [m].
-        velocity: of the cursor [m/s].
-        force: that was sent [N].
+        t: time assigned to the answer [s].
+        position: position of the cursor [m].
+        velocity: velocity of the cursor [m/s].
+        force: force that was sent [N].
     """
 
     sent: float
@@ -45,8 +45,8 @@ class Timing(NamedTuple):
     """How regular the exchanges were.
 
     Attributes:
-        exchanges: that were answered.
-        missed: that were not, in time.
+        exchanges: number of exchanges answered in time.
+        missed: number of exchanges not answered in time.
         rate: mean rate [Hz].
         interval: median and 99th percentile of the time between two answers [s].
         latency: median and 99th percentile of the time from a force to the answer [s].
@@ -61,7 +61,7 @@ class Timing(NamedTuple):
     jitter: float
 
     def summary(self) -> dict[str, Any]:
-        """The figures with their units, for the notes of a record."""
+        """The values with their units, for the notes of a record."""
         return {
             "exchanges": self.exchanges,
             "missed": self.missed,
@@ -81,13 +81,17 @@ class ClientLog:
     """
 
     def __init__(self, most: int = MOST_ROWS):
-        """Begins empty.
+        """Makes an empty log.
 
-        Args:
-            most: rows to keep, the newest, 1 to 10^9.
+                Args:
+        <<<<<<< HEAD
+                    most: rows to keep, the newest, 1 to 10^9.
 
-        Raises:
-            ParameterError: most is out of its bounds.
+                Raises:
+                    ParameterError: most is out of its bounds.
+        =======
+                    most: number of newest rows to keep.
+        >>>>>>> doc1
         """
         self.missed = 0
         self._rows = Rows(12, integer("most", most, 1, 10**9))  # numbers of an Exchanged
@@ -97,7 +101,7 @@ class ClientLog:
 
     @property
     def rows(self) -> list[Exchanged]:
-        """What is kept, in order."""
+        """The rows that are kept, in order."""
         out = []
         for x in self._rows.table().tolist():
             place, rate, force = ((a, b, c) for a, b, c in (x[3:6], x[6:9], x[9:12]))
@@ -113,7 +117,7 @@ class ClientLog:
         self._rows.add((*row[:3], *row.position, *row.velocity, *row.force))
 
     def timing(self) -> Timing:
-        """How regular the exchanges were; NaN where there are fewer than two."""
+        """Timing of the exchanges; NaN if there are fewer than two."""
         rows = self.rows
         if len(rows) < FEWEST:
             none = math.nan, math.nan
@@ -132,8 +136,8 @@ class ClientLog:
     def columns(self) -> dict[str, np.ndarray]:
         """Evenly sampled columns: t_s, x_m, y_m, z_m and the force on the handle fx_N, fy_N, fz_N.
 
-        The step is the median time between two answers. Places are those at these times, between
-        two answers on a straight line; a force is the one that the device held from then on.
+        The step is the median time between two answers. Positions are interpolated linearly between
+        answers. Each force is the one that the device held from that time on.
 
         Raises:
             ParameterError: there are fewer than two exchanges.
@@ -146,7 +150,7 @@ class ClientLog:
         even = t[0] + step * np.arange(int((t[-1] - t[0]) / step + 1e-6) + 1)
         place = np.array([r.position for r in rows])
         force = np.array([r.force for r in rows])
-        # the force of the next exchange follows an answer: it is held until the answer after it
+        # the force sent after an answer acts until the next answer
         held = np.minimum(np.searchsorted(t, even + 1e-9 * step, side="right"), len(rows) - 1)
         out = {"t_s": even}
         out |= {f"{a}_m": np.interp(even, t, place[:, i]) for i, a in enumerate(AXES)}

@@ -1,4 +1,4 @@
-"""What a client asks of a device, whatever protocol it speaks."""
+"""Commands of a client to a device, independent of the protocol."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ AXES = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Command:
-    """What a message asks of a device; None for what it does not mention.
+    """The command in a message; None for what the message does not contain.
 
     Attributes:
-        force: on the cursor, along x, y, z of the device [N].
-        target: where the cursor is to be held, x, y, z [m].
-        torques: of the joints of the arm, shoulder and elbow [N.m].
+        force: force on the cursor, along x, y, z of the device [N].
+        target: position at which to hold the cursor, x, y, z [m].
+        torques: torques on the shoulder and elbow joints [N.m].
     """
 
     force: Vector | None = None
@@ -29,7 +29,7 @@ class Command:
 
     @property
     def mode(self) -> str:
-        """What is driven: "force", "position", "torque" or "idle"."""
+        """Which quantity is driven: "force", "position", "torque" or "idle"."""
         if self.target is not None:
             return "position"
         if self.torques is not None:
@@ -41,10 +41,10 @@ IDLE = Command()
 
 
 def finite(value: Any) -> float | None:
-    """A number as a float; None for anything else, truth values included.
+    """A number as a float; None for anything else, including bool.
 
     Args:
-        value: of a message.
+        value: value from a message.
     """
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
@@ -56,9 +56,9 @@ def finite(value: Any) -> float | None:
 
 
 def by_axis(v: Vector) -> dict[str, float]:
-    """A vector as messages hold it.
+    """A vector in the form used in messages.
 
     Args:
-        v: along x, y, z.
+        v: components along x, y, z.
     """
     return dict(zip(AXES, v, strict=True))

@@ -1,7 +1,7 @@
-"""A device as the hand of a simulated arm, over a virtual coupling: a spring and a damper.
+"""A device as the hand of a simulated arm, through a virtual coupling of spring and damper.
 
-The spring is computed at the samples of the device and held between them. Held for Ts it gives back
-at most K Ts/2 v^2 more power than an ideal one takes, which the damper B >= K Ts/2 consumes.
+The spring force is computed at the samples of the device and held between them. Holding it for Ts
+generates at most K Ts/2 v^2 of power; a damper B >= K Ts/2 dissipates it.
 Coupling: J. E. Colgate, M. C. Stanley, J. M. Brown, IROS 1995.
 """
 
@@ -22,8 +22,8 @@ from .client_log import ClientLog, Timing
 from .commands import NOTHING, Pair
 from .planes import PLANES, to_plane, to_space
 
-SETTLING = 50  # exchanges without force, in which the period of the device is measured
-LONGEST = 3600.0  # [s] of a session
+SETTLING = 50  # exchanges without force to measure the period of the device
+LONGEST = 3600.0  # [s] longest session
 
 
 @named
@@ -49,7 +49,7 @@ class Coupled:
         """Refuses a coupling that is not passive.
 
         Args:
-            Ts: between two samples of the device [s].
+            Ts: time between two samples of the device [s].
 
         Raises:
             ParameterError: B < K Ts/2.
@@ -59,7 +59,7 @@ class Coupled:
             raise ParameterError("coupling.B", self.B, bound)
 
     def at(self, Ts: float) -> Coupled:
-        """The coupling with a spring that its damper makes passive.
+        """The coupling, with K lowered until the damper makes it passive.
 
         Args:
             Ts: between two samples of the device [s].
@@ -70,10 +70,10 @@ class Coupled:
         """Force on the simulated handle; the device gets the opposite.
 
         Args:
-            hand: place of the device's handle, in the plane of the arm [m].
-            rate: its velocity [m/s].
-            p: place of the simulated handle [m].
-            v: its velocity [m/s].
+            hand: position of the device's handle, in the plane of the arm [m].
+            rate: velocity of the device's handle [m/s].
+            p: position of the simulated handle [m].
+            v: velocity of the simulated handle [m/s].
         """
         K, B = self.K, self.B
         return (
@@ -83,7 +83,7 @@ class Coupled:
 
     @property
     def operator(self) -> Operator:
-        """The coupling as the operator of a scenario, to whom the hand is a muscle force."""
+        """The coupling as the operator of a scenario; the hand enters as a muscle force."""
         return Operator(0.0, self.B, self.K)
 
     def pull(self, hand: Pair, rate: Pair) -> Pair:
@@ -102,14 +102,14 @@ PLAIN_COUPLING = Coupled()
 class DeviceHand:
     """The handle of a device, as a hand in the plane of the arm.
 
-    It begins at the simulated handle, wherever the device is held.
+    It starts at the simulated handle, wherever the device is.
 
     Attributes:
         client: reads the device.
-        coupling: to the arm, its K lowered where the exchanges come slower than asked.
-        place: of the device's handle, in the plane of the arm [m].
-        rate: its velocity [m/s].
-        held: whether the newest sample came in time.
+        coupling: coupling to the arm; K is lowered if the exchanges are slower than requested.
+        place: position of the device's handle, in the plane of the arm [m].
+        rate: velocity of the device's handle [m/s].
+        held: whether the newest sample arrived in time.
         t: time of the newest sample [s].
     """
 
@@ -122,7 +122,7 @@ class DeviceHand:
             start: place of the simulated handle [m].
 
         Raises:
-            ParameterError: the coupling is not passive at the rate that was asked.
+            ParameterError: the coupling is not passive at the requested rate.
         """
         coupling.check(client.limits.Ts)
         self.client, self.plane = client, coupling.plane
@@ -144,7 +144,7 @@ class DeviceHand:
         return statistics.median(b - a for a, b in zip(t[:-1], t[1:], strict=True))
 
     def exchange(self, p: Pair, v: Pair) -> bool:
-        """Sends the device the force of the coupling, and reads where it is.
+        """Sends the coupling force to the device and reads its position.
 
         Args:
             p: place of the simulated handle [m].
@@ -164,7 +164,7 @@ class DeviceHand:
         return self.held
 
     def watch(self) -> bool:
-        """Reads where the device is, without force.
+        """Reads the position of the device, without force.
 
         Returns:
             Whether the sample came in time.
@@ -181,7 +181,7 @@ class DeviceHand:
         self.rate, self.held, self.t = to_plane(sample.velocity, self.plane), True, sample.t
 
     def notes(self) -> dict[str, object]:
-        """What a record says of the device."""
+        """Notes about the device for a record."""
         return {
             "url": self.client.url,
             "device_id": self.client.device_id,
@@ -193,12 +193,12 @@ class DeviceHand:
 
 
 class Rendered(NamedTuple):
-    """What a person at a device felt.
+    """Result of a session with a device.
 
     Attributes:
-        record: of the simulated arm.
-        log: what was exchanged with the device.
-        timing: how regular that was.
+        record: record of the simulated arm.
+        log: exchanges with the device.
+        timing: timing of the exchanges.
     """
 
     record: Record
@@ -216,21 +216,21 @@ def render(
     limits: Limits = PLAIN,
     engine: str = "python",
 ) -> Rendered:
-    """Lets a device, real or simulated, take the place of a scenario's hand, without a window.
+    """Replaces the hand of a scenario by a device, real or simulated, without a window.
 
-    Between two samples of the device the arm is simulated for as long as they lie apart; then the
-    force of the coupling goes to the device. Where a sample is lost the hand lets go.
+    Between two samples of the device, the simulation advances by the time between them. It then
+    sends the coupling force to the device. If a sample is lost, the hand lets go.
 
     Args:
-        scenario: arm, clay and control; its operator, muscle force, length and t_max do not count.
+        scenario: arm, clay and control; its operator, muscle force, length and t_max are ignored.
         url: of an Inverse service, as ws://127.0.0.1:10001.
-        duration: of the session [s], > 0, at most 3600.
+        duration: length of the session [s], > 0, at most 3600.
         coupling: between device and simulated handle.
         limits: of force and time.
         engine: as in `simulate`; "native" compiles before the session.
 
     Returns:
-        Record, exchanges and their timing. The record's notes have the timing, too.
+        Record, exchanges and their timing. The notes of the record also contain the timing.
 
     Raises:
         ParameterError: there is no device, the coupling is not passive at its rate, or a value is
@@ -259,7 +259,7 @@ def render(
 
 
 def _muscle(hand: DeviceHand, p: Pair, v: Pair, passed: float) -> Pair:
-    """Muscle force of the hand [N]; of one that was out of sight it lets go."""
+    """Muscle force of the hand [N]; the hand lets go after a lost sample."""
     if passed > hand.client.limits.patience:
         return hand.coupling.pull(p, v)
     return hand.coupling.pull(hand.place, hand.rate)

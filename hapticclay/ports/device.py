@@ -1,4 +1,4 @@
-"""The simulated device: an arm with a hand at it, moved by forces and measured by its hardware."""
+"""The simulated device: an arm and a hand, driven by forces and measured by simulated hardware."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from ..simulation.stepwise import Simulation
 from .commands import Pair
 from .driven_arm import LARGEST_FORCE, Drive, DrivenArm, Sensed
 
-LONGEST = 1e5  # [s] of a session
+LONGEST = 1e5  # [s] longest session
 
 
 @named
 @dataclass(frozen=True)
 class Trajectory:
-    """Where the hand wants to be over time: straight from point to point, at rest behind the last.
+    """Target of the hand over time: straight from point to point, at rest after the last.
 
     Attributes:
         t: times [s], ascending, shape (n,).
-        points: places of the handle [m], shape (n, 2).
+        points: positions of the handle [m], shape (n, 2).
     """
 
     t: Annotated[tuple[float, ...], Bound(unit="s")]
@@ -46,7 +46,7 @@ class Trajectory:
             raise ParameterError("hand.t", self.t, "must ascend")
 
     def at(self, t: float) -> tuple[Pair, Pair]:
-        """Place [m] and velocity [m/s] at a time.
+        """Position [m] and velocity [m/s] at a time.
 
         Args:
             t: the time [s].
@@ -63,16 +63,16 @@ class Trajectory:
 
     @classmethod
     def to(cls, target: Pair) -> Trajectory:
-        """A hand that wants to be at one place.
+        """A hand with a constant target.
 
         Args:
-            target: the place [m].
+            target: the position [m].
         """
         return cls((0.0,), (target,))
 
     @classmethod
     def of_file(cls, path: str | os.PathLike[str]) -> Trajectory:
-        """A hand of a CSV file with the columns t [s], x and y [m].
+        """Reads a trajectory from a CSV file with the columns t [s], x and y [m].
 
         Args:
             path: the file.
@@ -87,12 +87,12 @@ class Trajectory:
 def read_columns(
     field: str, path: str | os.PathLike[str], names: tuple[str, ...]
 ) -> list[tuple[float, ...]]:
-    """Numbers of some columns of a CSV file.
+    """Reads some columns of a CSV file.
 
     Args:
         field: name for the error.
-        path: the file, whose first line has the names of its columns.
-        names: of the columns to read.
+        path: the file; its first line names the columns.
+        names: columns to read.
 
     Raises:
         ParameterError: the file cannot be read, or lacks a column.
@@ -109,14 +109,14 @@ def read_columns(
 
 
 class SimulatedDevice:
-    """The arm of a scenario beside its hand, driven by a client in place of its controller.
+    """The arm and hand of a scenario, driven by a client instead of the controller.
 
-    A force acts through the transposed Jacobian at the measured joint angles, held for a control
-    sample, within the torque limits and behind the delay of the scenario's hardware.
+    A force acts through the transposed Jacobian at the measured joint angles. It is held for a
+    control sample, limited by the torque limits and delayed as the scenario's hardware says.
 
     Attributes:
-        scenario: what is simulated.
-        paced: whether something else than the clock of a service moves it: no.
+        scenario: the simulated scenario.
+        paced: whether anything but the clock of a service advances the device; False here.
     """
 
     paced = False
@@ -130,18 +130,18 @@ class SimulatedDevice:
         largest_force: float = LARGEST_FORCE,
         clay: bool = False,
     ):
-        """Builds the device; nothing moves yet.
+        """Makes the device, at rest.
 
         Args:
-            scenario: its arm, hand, hardware, clay and step; compensator and servo do not act.
-            period: time of which `advance` makes a whole part [s]; None for the control sample.
-            hand: where the hand wants to be; None for the muscle force of the scenario.
-            largest_force: longest force that acts [N], > 0, at most 1e3.
-            clay: whether the clay of the scenario acts as well.
+            scenario: arm, hand, hardware, clay and step are used; compensator and servo are not.
+            period: time by which `advance` moves on [s]; None for the control sample.
+            hand: target of the hand; None for the muscle force of the scenario.
+            largest_force: largest magnitude of the force [N], > 0, at most 1e3.
+            clay: whether the clay of the scenario acts.
 
         Raises:
-            ParameterError: the period is no whole multiple of the control sample, or the hand has
-                no spring to follow a trajectory by.
+            ParameterError: the period is not a whole multiple of the control sample, or the hand
+                lacks the spring that it needs to follow a trajectory.
         """
         self.scenario, self._samples = device_scenario(scenario, period, clay)
         self._hand = None if hand is None else _follower(hand, self.scenario)
@@ -166,12 +166,12 @@ class SimulatedDevice:
 
     @property
     def torques(self) -> Pair:
-        """Torques that act on the joints beside that force [N.m]."""
+        """Torques that act on the joints in addition to that force [N.m]."""
         return self._arm.asked.torques
 
     @property
     def ended(self) -> str:
-        """Why the device no longer moves; "" while it does."""
+        """Why the device stopped; "" while it runs."""
         outcome = self._simulation.outcome
         return "" if outcome is None else str(outcome)
 
@@ -179,15 +179,15 @@ class SimulatedDevice:
         """Changes what the motors do from the next control sample on.
 
         Args:
-            drive: in the plane of the arm.
+            drive: the drive, in the plane of the arm.
 
         Returns:
-            The force that will act: shortened where it is longer than the limit [N].
+            The force that will act, limited in length [N].
         """
         return self._arm.drive(drive)
 
     def advance(self, samples: int | None = None) -> None:
-        """Moves on.
+        """Advances the simulation.
 
         Args:
             samples: control samples; None for a period.
@@ -198,35 +198,35 @@ class SimulatedDevice:
         self._simulation.advance(n, force=force)
 
     def record(self) -> Record:
-        """The record so far; the device no longer moves.
+        """Stops the device and returns the record so far.
 
         Raises:
-            RuntimeError: it has not moved.
+            RuntimeError: the device has not run.
         """
         return replace_scenario(self._simulation.record(), self.scenario)
 
 
 def replace_scenario(record: Record, scenario: Scenario) -> Record:
-    """A record that names its scenario without the law that a client stands for.
+    """A record whose scenario does not contain the law that the client replaces.
 
     Args:
         record: the record.
-        scenario: what it is to name.
+        scenario: the scenario to store in the record.
     """
     return replace(record, scenario=scenario)
 
 
 def device_scenario(scenario: Scenario, period: float | None, clay: bool) -> tuple[Scenario, int]:
-    """The scenario of a device, and its control samples in a period.
+    """The scenario of a device, and the number of control samples per period.
 
     Args:
-        scenario: what was given; without Ts, the control sample is a whole part of the period, and
-            0.36 ms at most.
-        period: of a client [s]; None for the control sample.
-        clay: whether its clay acts.
+        scenario: the given scenario; without Ts, the control sample is the period divided by a
+            whole number, at most 0.36 ms.
+        period: period of a client [s]; None for the control sample.
+        clay: whether the clay acts.
 
     Raises:
-        ParameterError: the period is no whole multiple of Ts.
+        ParameterError: the period is not a whole multiple of Ts.
     """
     if period is not None:
         period = number("period", period, 1e-5, 1.0, unit="s")
@@ -256,7 +256,7 @@ def device_scenario(scenario: Scenario, period: float | None, clay: bool) -> tup
 
 
 def _follower(hand: Trajectory, scenario: Scenario) -> Any:
-    """Muscle force of a hand that is to follow a trajectory, over time."""
+    """Muscle force over time with which a hand follows a trajectory."""
     if any(h is None or not h.spring for h in scenario.operators):
         bound = "needs an operator with a spring on both axes, which pulls the handle along"
         raise ParameterError("hand", hand, bound)

@@ -1,4 +1,4 @@
-"""The motors of a simulated device: they do what a client asks, and measure as hardware does."""
+"""The motors and sensors of a simulated device, commanded by a client."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from ..model.sampled_controller import Controller
 from ..scene.scenario import Scenario
 from .commands import Pair
 
-LARGEST_FORCE = 10.0  # [N] of the length of a force, unless asked for
-TARGET_STIFFNESS, TARGET_DAMPING = 1000.0, 60.0  # [N/m], [N.s/m] by which a place is held
+LARGEST_FORCE = 10.0  # [N] default limit of the length of a force
+TARGET_STIFFNESS, TARGET_DAMPING = 1000.0, 60.0  # [N/m], [N.s/m] to hold a position
 NOWHERE: Pair = (0.0, 0.0)
 
 
 class Sensed(NamedTuple):
-    """What the device measured at a control sample.
+    """Measurements of the device at a control sample.
 
     Attributes:
         t: time of the sample [s].
-        position: of the handle [m].
-        velocity: of the handle [m/s].
-        angles: of the joints [rad].
-        rates: of the joints [rad/s].
+        position: position of the handle [m].
+        velocity: velocity of the handle [m/s].
+        angles: joint angles [rad].
+        rates: joint rates [rad/s].
     """
 
     t: float
@@ -35,12 +35,12 @@ class Sensed(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """What the motors are asked to do, in the plane of the arm.
+    """Command to the motors, in the plane of the arm.
 
     Attributes:
-        force: on the handle [N].
-        target: where the handle is to be held [m]; None for nowhere.
-        torques: of the joints, beside both [N.m].
+        force: force on the handle [N].
+        target: position at which to hold the handle [m]; None for no target.
+        torques: additional joint torques [N.m].
     """
 
     force: Pair = NOWHERE
@@ -52,21 +52,21 @@ LIMP = Drive()
 
 
 class DrivenArm:
-    """Motors that apply forces, hold a place, or apply torques, held for a control sample.
+    """Motors that apply a force, hold a position, or apply torques, held for a control sample.
 
     Attributes:
-        largest_force: a longer sum of force and pull to the target is shortened to this [N].
+        largest_force: limit on the sum of the force and the pull to the target [N].
         sensed: the newest measurement.
-        asked: what the motors are asked to do.
-        force: on the handle, as it acts from the newest sample on [N].
+        asked: command to the motors.
+        force: force on the handle from the newest sample on [N].
     """
 
     def __init__(self, scenario: Scenario, largest_force: float = LARGEST_FORCE):
-        """Limp, at the start of a scenario.
+        """Starts without torque, at the initial state of a scenario.
 
         Args:
-            scenario: has arm, origin, start and velocity.
-            largest_force: > 0, at most 1e3 [N].
+            scenario: arm, origin, start and velocity are used.
+            largest_force: limit, > 0, at most 1e3 [N].
 
         Raises:
             ParameterError: the force is out of its bounds.
@@ -82,10 +82,10 @@ class DrivenArm:
         """Changes what the motors do from the next control sample on.
 
         Args:
-            drive: what is asked.
+            drive: the command.
 
         Returns:
-            The force that will act on the handle if it stays where it is [N].
+            The force that will act on the handle if the handle does not move [N].
         """
         self.asked = drive
         self.force = self._at(self.sensed)

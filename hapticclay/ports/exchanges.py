@@ -1,4 +1,4 @@
-"""What client and device exchanged: a row a message."""
+"""Exchanges of a client and the device, one row per message."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ class Exchange(NamedTuple):
         received: when the message came, on the computer's clock [s].
         began: simulated time from which its force acted [s].
         sampled: simulated time at which the answered state was measured [s].
-        position: of the handle in the plane of the arm, as answered [m].
-        velocity: of the handle, as answered [m/s].
-        asked: force that the client asked for [N]: in the plane of the arm, and across it.
-        applied: force on the handle in the plane of the arm, of all clients, after the limit [N].
+        position: answered position of the handle in the plane of the arm [m].
+        velocity: answered velocity of the handle [m/s].
+        asked: force that the client requested [N]: in the plane of the arm, and normal to it.
+        applied: force of all clients on the handle, in the plane of the arm, after the limit [N].
     """
 
     received: float
@@ -57,16 +57,16 @@ class Exchange(NamedTuple):
 @named
 @dataclass(frozen=True, eq=False)
 class Exchanges:
-    """What one client and the device exchanged, a row a message.
+    """Exchanges of one client and the device, one row per message.
 
     Attributes:
         received: when each message came, on the computer's clock [s], shape (n,).
         began: simulated time from which its force acted [s], shape (n,).
         sampled: simulated time at which the answered state was measured [s], shape (n,).
-        position: of the handle in the plane of the arm [m], shape (n, 2).
-        velocity: of the handle [m/s], shape (n, 2).
-        asked: force that the client asked for [N], shape (n, 3): in the plane of the arm, and
-            across it, where it cannot act.
+        position: position of the handle in the plane of the arm [m], shape (n, 2).
+        velocity: velocity of the handle [m/s], shape (n, 2).
+        asked: force that the client requested [N], shape (n, 3): in the plane of the arm, and
+            normal to it, where the planar arm cannot act.
         applied: force on the handle in the plane of the arm [N], shape (n, 2).
     """
 
@@ -86,7 +86,7 @@ class Exchanges:
 
     @classmethod
     def of_table(cls, table: np.ndarray) -> Exchanges:
-        """Exchanges of a table.
+        """Makes exchanges from a table.
 
         Args:
             table: columns as in COLUMNS, shape (n, 12).
@@ -95,12 +95,12 @@ class Exchanges:
         return cls(t[:, 0], t[:, 1], t[:, 2], t[:, 3:5], t[:, 5:7], t[:, 7:10], t[:, 10:12])
 
     def table(self) -> np.ndarray:
-        """All of it, columns as in COLUMNS, shape (n, 12)."""
+        """All exchanges, columns as in COLUMNS, shape (n, 12)."""
         times = self.received, self.began, self.sampled
         return np.column_stack([*times, self.position, self.velocity, self.asked, self.applied])
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Writes a CSV file, to the last bit, whole or not at all.
+        """Writes a CSV file with exact values, whole or not at all.
 
         Args:
             path: the file.
@@ -124,7 +124,7 @@ class Exchanges:
         """Reads what `save` wrote.
 
         Args:
-            path: the file, or the folder of a record that has exchanges.csv.
+            path: the file, or the folder of a record with an exchanges.csv.
 
         Raises:
             ParameterError: the file cannot be read, or holds something else.
@@ -142,23 +142,23 @@ class Exchanges:
             raise ParameterError("record", str(path), bound) from None
 
 
-FILE = "exchanges.csv"  # beside the record of a session
+FILE = "exchanges.csv"  # stored with the record of a session
 
 
 class ExchangeLog:
     """Keeps the newest exchanges."""
 
     def __init__(self, most: int = MOST_ROWS):
-        """Begins empty.
+        """Makes an empty log.
 
         Args:
-            most: rows to keep, the newest.
+            most: number of newest rows to keep.
         """
         self._rows = Rows(len(COLUMNS), most)
 
     @property
     def count(self) -> int:
-        """Exchanges so far, kept or not."""
+        """Number of exchanges so far, kept or not."""
         return self._rows.count
 
     def add(self, row: Exchange) -> None:
@@ -171,5 +171,5 @@ class ExchangeLog:
         self._rows.add((*times, *position, *velocity, *asked, *applied))
 
     def exchanges(self) -> Exchanges:
-        """What is kept."""
+        """The exchanges that are kept."""
         return Exchanges.of_table(self._rows.table())

@@ -1,6 +1,6 @@
 """Messages of the Haply Inverse service, versions 3.1 to 3.5 as one union, without sockets.
 
-Whatever arrives is read to a `Message`: what cannot be used is left out and told in its notices.
+Every input is read into a `Message`. Unusable content is dropped and reported in its notices.
 Vectors are (x, y, z) in metre, metre per second and newton, z up.
 """
 
@@ -14,13 +14,13 @@ from typing import Any
 from .commands import AXES, NOTHING, Command, Pair, Vector, by_axis, finite
 
 LARGEST_MESSAGE = 65_536  # bytes
-JOINTS = ("a0", "a1")  # of the arm, which is planar
-KEYS = {  # of a command's body, of 3.5 first
+JOINTS = ("a0", "a1")  # joints of the planar arm
+KEYS = {  # keys of a command's body, that of version 3.5 first
     "set_cursor_force": ("vector", "values"),
     "set_cursor_position": ("position", "values"),
     "set_angular_torques": ("torques", "values"),
 }
-NAMES = {  # of a command's body, in notices
+NAMES = {  # names of a command's body in notices
     "set_cursor_force": "force",
     "set_cursor_position": "position",
     "set_angular_torques": "torque",
@@ -34,7 +34,7 @@ UNTURNED = {"w": 1.0, "x": 0.0, "y": 0.0, "z": 0.0}
 
 @dataclass(frozen=True)
 class Force:
-    """A force that a client asks of a device.
+    """A force that a client commands.
 
     Attributes:
         device_id: of the device.
@@ -47,11 +47,11 @@ class Force:
 
 @dataclass(frozen=True)
 class Target:
-    """A place at which a client wants a device to hold its cursor.
+    """A position at which a client wants the cursor held.
 
     Attributes:
         device_id: of the device.
-        vector: the place [m].
+        vector: the position [m].
     """
 
     device_id: str
@@ -60,11 +60,11 @@ class Target:
 
 @dataclass(frozen=True)
 class Torques:
-    """Torques that a client asks of a device.
+    """Torques that a client commands.
 
     Attributes:
         device_id: of the device.
-        torques: of the joints a0 and a1 [N.m].
+        torques: torques on the joints a0 and a1 [N.m].
     """
 
     device_id: str
@@ -73,16 +73,16 @@ class Torques:
 
 @dataclass(frozen=True)
 class Message:
-    """What a client sent.
+    """A message from a client.
 
     Attributes:
-        forces: in the order of their entries; those for one device add up.
+        forces: forces in the order of their entries; forces for the same device add up.
         devices: ids of the devices that the message names.
-        full: whether the answer is to hold the configuration.
+        full: whether the answer must include the configuration.
         profile: name that the client gives its session; "" for none.
-        notices: what was left out, and why.
-        targets: in the order of their entries; for one device the last one counts.
-        torques: in the order of their entries; those for one device add up.
+        notices: what was dropped, and why.
+        targets: targets in the order of their entries; the last one for a device counts.
+        torques: torques in the order of their entries; torques for the same device add up.
     """
 
     forces: tuple[Force, ...] = ()
@@ -94,7 +94,7 @@ class Message:
     torques: tuple[Torques, ...] = ()
 
     def command(self, device_id: str) -> Command:
-        """What the message asks of a device.
+        """The command in the message for a device.
 
         Args:
             device_id: of the device.
@@ -112,13 +112,13 @@ class Cursor:
     """State of the handle of an Inverse3.
 
     Attributes:
-        position: [m].
-        velocity: [m/s].
-        force: that the device applies [N].
+        position: position [m].
+        velocity: velocity [m/s].
+        force: force that the device applies [N].
         mode: what a client drives: "force", "position", "torque", or "idle" for nothing.
-        angles: of the joints a0 and a1 [deg].
-        rates: of these joints [deg/s].
-        torques: of these joints [N.m].
+        angles: angles of the joints a0 and a1 [deg].
+        rates: rates of these joints [deg/s].
+        torques: torques on these joints [N.m].
     """
 
     position: Vector
@@ -132,15 +132,15 @@ class Cursor:
 
 @dataclass(frozen=True)
 class Frame:
-    """What the service sends: an Inverse3 and a wireless grip.
+    """A state frame of the service: an Inverse3 and a wireless grip.
 
     Attributes:
-        device_id: of the Inverse3, hexadecimal.
-        cursor: its handle.
-        grip_id: of the grip, hexadecimal.
-        buttons: names of those pressed, of "a", "b", "c", "home".
-        session_id: of the client's session.
-        full: whether it holds the configuration.
+        device_id: id of the Inverse3, hexadecimal.
+        cursor: state of its handle.
+        grip_id: id of the grip, hexadecimal.
+        buttons: names of the pressed buttons, from "a", "b", "c", "home".
+        session_id: id of the client's session.
+        full: whether the frame includes the configuration.
     """
 
     device_id: str
@@ -161,7 +161,7 @@ def read_message(data: str | bytes) -> Message:
         data: a frame, text or binary.
 
     Returns:
-        The message; of rubbish one without forces, with a notice.
+        The message. For unreadable data it has no forces and one notice.
     """
     try:
         tree = json.loads(data)
@@ -193,7 +193,7 @@ def read_message(data: str | bytes) -> Message:
 
 @dataclass
 class _Found:
-    """What the entries of a message hold."""
+    """Contents of the entries of a message."""
 
     devices: list[str]
     forces: list[Force]
@@ -202,7 +202,7 @@ class _Found:
 
 
 def _session(part: Any, notices: list[str]) -> tuple[bool, str]:
-    """Whether a full frame is asked for, and the name of the profile."""
+    """Whether the client requests a full frame, and the name of the profile."""
     if not isinstance(part, Mapping):
         notices.append("session is no object")
         return False, ""
@@ -231,7 +231,7 @@ def _entries(part: Any, kind: str, notices: list[str]) -> Iterator[Mapping[str, 
 def _read_commands(
     device: str, entry: Mapping[str, Any], found: _Found, notices: list[str]
 ) -> None:
-    """Adds the commands of a device's entry to what was found."""
+    """Adds the commands in a device's entry to the contents found so far."""
     notices += [
         f"unknown key {name} of a device"
         for name in entry
@@ -248,7 +248,7 @@ def _read_commands(
             x, y, z = _numbers(name, body, AXES, notices) or NOTHING
             found.forces.append(Force(device, (x, y, z)))
         elif name == "set_cursor_position":
-            if place := _numbers(name, body, AXES, notices):  # no place is no target
+            if place := _numbers(name, body, AXES, notices):  # no position, no target
                 found.targets.append(Target(device, (place[0], place[1], place[2])))
         elif name == "set_angular_torques":
             a0, a1 = _numbers(name, body, JOINTS, notices) or (0.0, 0.0)
@@ -260,7 +260,7 @@ def _read_commands(
 def _numbers(
     command: str, body: Any, names: Sequence[str], notices: list[str]
 ) -> tuple[float, ...] | None:
-    """The numbers of a command's body, 0 where one is missing; None where one is not finite."""
+    """The numbers of a command's body; 0 if missing, None if one is not finite."""
     given = None
     if isinstance(body, Mapping):
         given = next((body[key] for key in KEYS[command] if key in body), None)
@@ -275,10 +275,10 @@ def _numbers(
 
 
 def message_text(message: Message) -> str:
-    """A message as a client sends it, with the key of 3.1 to 3.4, which all versions take.
+    """The text of a client's message, with the key of 3.1 to 3.4, which all versions accept.
 
     Args:
-        message: what to send; its notices are not.
+        message: message to send; its notices are not sent.
     """
     tree: dict[str, Any] = {}
     session: dict[str, Any] = {"force_render_full_state": {}} if message.full else {}
@@ -315,10 +315,10 @@ def _entry(device_id: str, command: str, body: dict[str, Any]) -> dict[str, Any]
 
 
 def frame_data(frame: Frame) -> dict[str, Any]:
-    """A frame as the service sends it, as plain data.
+    """A frame of the service as plain data.
 
     Args:
-        frame: what to send.
+        frame: frame to send.
     """
     device: dict[str, Any] = {"device_id": frame.device_id}
     if frame.full:
@@ -346,10 +346,10 @@ GRIP_STATUS = {"connected": True, "awake": True, "ready": True}
 
 
 def frame_text(frame: Frame) -> str:
-    """A frame as the service sends it.
+    """The text of a frame of the service.
 
     Args:
-        frame: what to send.
+        frame: frame to send.
     """
     return json.dumps(frame_data(frame), allow_nan=False)
 
@@ -422,13 +422,13 @@ def _device_config(device_id: str) -> dict[str, Any]:
 
 
 def read_frame(data: str | bytes) -> Frame | None:
-    """Reads what a service sent: its first Inverse3, and its first wireless grip.
+    """Reads the first Inverse3 and the first wireless grip from a service's frame.
 
     Args:
         data: a frame, text or binary.
 
     Returns:
-        The frame; None if there is no Inverse3 with a finite position in it.
+        The frame; None if it has no Inverse3 with a finite position.
     """
     try:
         tree = json.loads(data)
@@ -467,4 +467,4 @@ def _vector(given: Mapping[str, Any]) -> Vector:
 
 def _pair(given: Mapping[str, Any]) -> Pair:
     a, b = (finite(given.get(joint, 0.0)) for joint in JOINTS)
-    return a or 0.0, b or 0.0  # which no loop depends on
+    return a or 0.0, b or 0.0  # no loop depends on it

@@ -1,4 +1,4 @@
-"""How a Haply Inverse service talks: an inventory at first, then one state frame a message."""
+"""The dialogue of a Haply Inverse service: an inventory, then one state frame per message."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ class InverseProtocol:
         """The inventory.
 
         Args:
-            service: that is asked.
-            session: of the client.
+            service: the service.
+            session: session of the client.
         """
         return [inverse.frame_text(frame_of(service, session, full=True))]
 
     def answer(self, service: Host, session: Session, data: str | bytes) -> list[str]:
-        """One frame, whatever the message is.
+        """Returns one frame for any message.
 
         Args:
-            service: that is asked.
-            session: of the client.
-            data: its message.
+            service: the service.
+            session: session of the client.
+            data: message of the client.
         """
         message, shown = inverse.read_message(data), service.inverse3
         others = {x for x in message.devices if x not in (shown.device_id, shown.grip_id)}
@@ -43,11 +43,11 @@ class InverseProtocol:
         return [inverse.frame_text(frame_of(service, session, message.full))]
 
     def due(self, service: Host, session: Session) -> list[str]:
-        """Nothing: the service speaks when it is spoken to.
+        """Nothing: the service only answers messages.
 
         Args:
-            service: that is asked.
-            session: of the client.
+            service: the service.
+            session: session of the client.
         """
         return []
 
@@ -55,7 +55,7 @@ class InverseProtocol:
         """The devices of each kind, as plain data.
 
         Args:
-            service: that is asked.
+            service: the service.
         """
         found = inverse.frame_data(frame_of(service, None, full=True))
         return {kind: found[kind] for kind in inverse.DEVICES}
@@ -65,9 +65,9 @@ def frame_of(service: Host, session: Session | None, full: bool) -> inverse.Fram
     """The state of the device.
 
     Args:
-        service: that has it.
-        session: of the client that it is for; None for nobody.
-        full: whether it holds the configuration.
+        service: the service that owns the device.
+        session: session of the receiving client; None for no client.
+        full: whether the frame includes the configuration.
     """
     mode, number = (session.command.mode, session.number) if session else ("idle", 0)
     shown = service.inverse3

@@ -1,14 +1,14 @@
-"""Between the cursor of a device, x, y, z, and the plane in which the arm moves."""
+"""Conversion between the cursor of a device, x, y, z, and the plane of the arm."""
 
 from __future__ import annotations
 
 from .commands import NOTHING, Pair, Vector
 
-PLANES = {"xy": (0, 1), "xz": (0, 2)}  # axes of the cursor that are x and y of the arm
+PLANES = {"xy": (0, 1), "xz": (0, 2)}  # axes of the cursor that become x and y of the arm
 
 
 def to_plane(v: Vector, plane: str) -> Pair:
-    """What a vector of the cursor has in the plane of the arm.
+    """Components of a cursor vector in the plane of the arm.
 
     Args:
         v: the vector.
@@ -19,7 +19,7 @@ def to_plane(v: Vector, plane: str) -> Pair:
 
 
 def normal_component(v: Vector, plane: str) -> float:
-    """What a vector of the cursor has across the plane of the arm.
+    """Component of a cursor vector normal to the plane of the arm.
 
     Args:
         v: the vector.
@@ -29,12 +29,12 @@ def normal_component(v: Vector, plane: str) -> float:
 
 
 def to_space(v: Pair, plane: str, rest: Vector = NOTHING) -> Vector:
-    """A vector of the arm's plane as one of the cursor.
+    """Converts a vector in the plane of the arm to a cursor vector.
 
     Args:
         v: the vector.
         plane: of PLANES.
-        rest: what is added to it.
+        rest: vector to add to the result.
     """
     out = list(rest)
     for axis, value in zip(PLANES[plane], v, strict=True):

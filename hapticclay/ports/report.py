@@ -1,4 +1,4 @@
-"""The loop report: what a client's loop rendered, and what this hand, rate and delay can carry."""
+"""The loop report: the wall a client rendered, and the limit for this hand, rate and delay."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from ..theory.client_loop import (
 )
 from .exchanges import Exchanges
 
-LATEST = 4  # answers back that a force may have been computed from
-FEWEST = 8  # messages in contact that a fit needs
-FORCE_LEAST = 1e-9  # [N] a smaller force is none
-EXPLAINED = 0.9  # share of the force's square that a wall must explain
-DOUBT = 0.2  # largest standard error of K, as a share of K
+LATEST = 4  # oldest answer, counted back, that a force may have been computed from
+FEWEST = 8  # fewest messages in contact for a fit
+FORCE_LEAST = 1e-9  # [N] smaller forces count as zero
+EXPLAINED = 0.9  # least share of the squared force that a wall must explain
+DOUBT = 0.2  # largest relative standard error of K
 UNTOLD = ("delay", "K", "B", "K_error", "explained", "limit", "rate_needed")  # without a wall
-LINE = 25  # values of B of the line of theory
+LINE = 25  # number of values of B on the theoretical limit line
 
 
 class WallFit(NamedTuple):
@@ -36,12 +36,12 @@ class WallFit(NamedTuple):
         K: stiffness [N/m].
         B: damping [N.s/m].
         K_error: standard error of K [N/m].
-        explained: share of the square of the force that it explains.
-        back: answers between the state that a force was computed from and the force, 1 for the
+        explained: share of the squared force that the wall explains.
+        back: age, in answers, of the state that a force was computed from, 1 for the
             newest.
         normal: direction of the force.
-        place: mean place in contact [m].
-        contact: messages that were fitted.
+        place: mean position in contact [m].
+        contact: number of messages used in the fit.
     """
 
     K: float
@@ -57,28 +57,28 @@ class WallFit(NamedTuple):
 @named
 @dataclass(frozen=True)
 class LoopReport(Result):
-    """What a client's loop did, beside what it can carry.
+    """The wall a client's loop rendered, and the limit of that loop.
 
     Attributes:
-        messages: that were read.
+        messages: number of messages read.
         rate: mean rate of the messages [Hz].
         intervals: median and 99th percentile of the time between two messages [s].
         period: median of the simulated time between two messages [s].
-        delay: simulated time from the measurement that a force was computed from to the force [s];
-            NaN where the forces do not tell.
-        limited: share of the messages whose force was shortened, or added to that of others.
-        K: stiffness that the forces show [N/m]; NaN where they do not tell.
-        B: damping that they show [N.s/m]; NaN where they do not tell.
+        delay: simulated time from a measurement to the force computed from it [s];
+            NaN if the forces do not determine it.
+        limited: share of the messages whose force was limited, or added to that of others.
+        K: stiffness estimated from the forces [N/m]; NaN if they do not determine it.
+        B: damping estimated from the forces [N.s/m]; NaN if they do not determine it.
         K_error: standard error of K [N/m].
-        explained: share of the square of the force that K and B explain.
-        contact: messages that were fitted.
+        explained: share of the squared force that K and B explain.
+        contact: number of messages used in the fit.
         normal: direction of the wall.
-        limit: stiffness that this period, delay, hand and B carry [N/m].
-        rate_needed: rate that would carry K and B with as many samples of delay [Hz]; inf for none
-            up to a thousand times the present one.
-        line_B: damping of a line of theory [N.s/m], from 0 on.
-        line_K: stiffness that it carries [N/m]: the Z-width of this period, delay and hand.
-        note: why K and B are not told; "" where they are.
+        limit: largest stable stiffness at this period, delay, hand and B [N/m].
+        rate_needed: rate at which K and B are stable with as many samples of delay [Hz]; inf for
+            none up to a thousand times the present rate.
+        line_B: damping along the theoretical limit line [N.s/m], from 0 on.
+        line_K: largest stable stiffness there [N/m]: the Z-width at this period, delay and hand.
+        note: why K and B could not be estimated; "" if they were.
     """
 
     drawn_by = "hapticclay.views.loop_plots:loop_plot"
@@ -115,7 +115,7 @@ class LoopReport(Result):
 
     @property
     def z_width(self) -> tuple[float, float, float]:
-        """Largest stiffness that the loop carries, at which damping, and its largest damping.
+        """Largest stable stiffness, the damping at which it is stable, and the largest damping.
 
         [N/m], [N.s/m], [N.s/m]; NaN without a wall.
         """
@@ -125,7 +125,7 @@ class LoopReport(Result):
         return K, B, max((b for b, k in zip(self.line_B, self.line_K, strict=True) if k), default=0)
 
     def headline(self) -> str:
-        """The report in a line."""
+        """The report in one line."""
         rate = f"{1.0 / self.period:.4g} Hz" if self.period > 0.0 else "no rate"
         if math.isnan(self.K):
             return f"{self.messages} messages at {rate}; {self.note}"
@@ -141,7 +141,7 @@ class LoopReport(Result):
         return text + f"; {self.rate_needed:.4g} Hz would carry it"
 
     def tables(self) -> Tables:
-        """The report, and the line of theory."""
+        """The report, and the theoretical limit line."""
         (p50, p99), (K, B, most) = self.intervals, self.z_width
         undamped = self.line_K[0] if self.line_K else math.nan
         rows: dict[str, Any] = {
@@ -171,18 +171,18 @@ class LoopReport(Result):
 
 @checked
 def loop_report(exchanges: Exchanges, scenario: Scenario) -> LoopReport:
-    """Reads a client's loop from what it exchanged with a device.
+    """Estimates a client's loop from its exchanges with a device.
 
-    The stiffness and damping are those that explain its forces best (least squares over place and
-    velocity of the answers, along the main direction of the force); which answer a force was
-    computed from is found by the same fit. The limit is that of the exact sampled loop.
+    Stiffness and damping are a least-squares fit of the forces to position and velocity of the
+    answers, along the main direction of the force. The same fit finds the answer from which each
+    force was computed. The limit is that of the exact sampled loop.
 
     Args:
         exchanges: of one client.
         scenario: of the device: its arm and its hand.
 
     Returns:
-        The report; where the forces do not tell a wall, K and B are NaN and `note` says why.
+        The report; if the forces do not determine a wall, K and B are NaN and `note` says why.
 
     Raises:
         ParameterError: there are fewer than two messages.
@@ -231,13 +231,13 @@ def loop_report(exchanges: Exchanges, scenario: Scenario) -> LoopReport:
 def limit_line(
     handle: Handle, B: float, Ts: float, delay: float
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Damping and the stiffness that it carries, from 0 to where nothing is carried.
+    """Largest stable stiffness over damping, from zero damping to where none is stable.
 
     Args:
         handle: arm and hand.
-        B: damping that the line is to reach [N.s/m].
-        Ts: of the client [s].
-        delay: of its force [s].
+        B: damping that the line must reach [N.s/m].
+        Ts: period of the client [s].
+        delay: delay of its force [s].
 
     Returns:
         B [N.s/m] and K [N/m], of equal length.
@@ -256,12 +256,12 @@ def fit_wall(exchanges: Exchanges) -> tuple[WallFit | None, str]:
         exchanges: of one client.
 
     Returns:
-        The wall, or None; and the reason, "" for none.
+        The wall, or None with the reason; the reason is "" if there is a wall.
     """
     force = exchanges.asked[:, :2]
     size = np.hypot(*force.T)
     contact = np.isfinite(size) & (size > FORCE_LEAST)
-    contact[:LATEST] = False  # whose state may have come with the inventory
+    contact[:LATEST] = False  # its state may have come with the inventory
     if contact.sum() < FEWEST:
         return None, f"{int(contact.sum())} messages had a force: a wall is told from {FEWEST}"
     normal = np.linalg.svd(force[contact], full_matrices=False)[2][0]
@@ -278,7 +278,7 @@ def fit_wall(exchanges: Exchanges) -> tuple[WallFit | None, str]:
 def _fitted(
     exchanges: Exchanges, force: np.ndarray, normal: np.ndarray, contact: np.ndarray, back: int
 ) -> WallFit:
-    """Least squares of the force over place and velocity of the answer so many messages before."""
+    """Least-squares fit of the force to the position and velocity a number of answers earlier."""
     at = np.flatnonzero(contact)
     place, rate = exchanges.position[at - back], exchanges.velocity[at - back]
     given = np.column_stack([place @ normal, rate @ normal, np.ones(len(at))])
@@ -291,7 +291,7 @@ def _fitted(
     error = math.sqrt(square * spread[0, 0]) / scale[0] if rank == 3 else math.inf
     K, B, _ = 0.0 - solution / scale
     total = float(((y - y.mean()) ** 2).sum())
-    even = total < 1e-12 * float(y @ y)  # a constant force is no wall
+    even = total < 1e-12 * float(y @ y)  # a constant force does not show a wall
     explained = 0.0 if even else 1.0 - float(missed @ missed) / total
     mean = place.mean(axis=0)
     way = float(normal[0]), float(normal[1])

@@ -1,7 +1,7 @@
 """Messages of rosbridge v2, JSON over a WebSocket, without sockets, and the ROS messages in them.
 
-Whatever arrives is read to an `Operation`: what cannot be used has an error in it. Names of types
-are those of ROS 1 and ROS 2, and stamps have the fields of both.
+Every input is read into an `Operation`; its `error` says why it cannot be used. Type names of both
+ROS 1 and ROS 2 are accepted, and stamps have the fields of both.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from .inverse import Cursor
 
 FRAME = "base"
 IDENTITY = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
-LEVELS = ("none", "error", "warning", "info")  # of status messages, each with those before it
-PUBLISHED = {  # last part of a topic's name: its type
+LEVELS = ("none", "error", "warning", "info")  # each includes those before it
+PUBLISHED = {  # type of a topic, by the last part of its name
     "measured_cp": "geometry_msgs/PoseStamped",
     "measured_cv": "geometry_msgs/TwistStamped",
     "measured_js": "sensor_msgs/JointState",
@@ -35,24 +35,24 @@ TAKEN = {
     "servo_cp": "geometry_msgs/PoseStamped",
     "phantom/force_feedback": "omni_msgs/OmniFeedback",
 }
-PLACES = {"geometry_msgs/WrenchStamped": ("wrench", "force")}  # of the vector in a message
+PLACES = {"geometry_msgs/WrenchStamped": ("wrench", "force")}  # keys of the vector in a message
 PLACES |= {"geometry_msgs/PoseStamped": ("pose", "position"), "omni_msgs/OmniFeedback": ("force",)}
 JOINTS = ("shoulder", "elbow")
 
 
 @dataclass(frozen=True)
 class Operation:
-    """What a client sent.
+    """An operation from a client.
 
     Attributes:
-        op: the operation; "" where nothing can be read.
-        id: that an answer repeats; None for none.
+        op: the operation; "" if it is unreadable.
+        id: id to repeat in the answer; None for none.
         topic: its name, or that of a service.
-        type: of the topic, without "msg"; "" for none.
+        type: type of the topic, without "msg"; "" for none.
         msg: the ROS message, or the arguments of a service.
         throttle: least time between two messages of a subscription [s].
-        compression: that a subscription asks for.
-        error: why the operation cannot be used; "" where it can.
+        compression: compression that a subscription requests.
+        error: why the operation cannot be used; "" if it can.
     """
 
     op: str = ""
@@ -75,7 +75,7 @@ def read_operation(data: str | bytes) -> Operation:
         data: a frame, text or binary.
 
     Returns:
-        The operation; of rubbish one with an error.
+        The operation; unreadable data give one with an error.
     """
     try:
         tree = json.loads(data)
@@ -103,13 +103,13 @@ def plain_type(given: Any) -> str:
     """Name of a type as ROS 1 has it: geometry_msgs/PoseStamped.
 
     Args:
-        given: of ROS 1 or ROS 2; anything else is "".
+        given: name of a type of ROS 1 or ROS 2; anything else gives "".
     """
     return given.replace("/msg/", "/") if isinstance(given, str) else ""
 
 
 def kind_of(topic: str, kinds: Mapping[str, str]) -> str:
-    """Which of some topics a name ends with, whatever namespace stands before; "" for none.
+    """The kind of topic with which a name ends, in any namespace; "" for none.
 
     Args:
         topic: the name, as in /arm/body/servo_cf.
@@ -120,14 +120,14 @@ def kind_of(topic: str, kinds: Mapping[str, str]) -> str:
 
 
 def command_of(kind: str, msg: Mapping[str, Any]) -> tuple[Command, str]:
-    """What a message on a topic that is taken asks of the device.
+    """The command in a message on a command topic.
 
     Args:
-        kind: of TAKEN.
+        kind: topic, from TAKEN.
         msg: the message.
 
     Returns:
-        The command, and what was left out of it, "" for nothing.
+        The command, and a notice of what was dropped, "" for nothing.
     """
     part: Any = msg
     for name in PLACES[TAKEN[kind]]:
@@ -164,8 +164,8 @@ def status_text(level: str, text: str, to: Operation) -> str:
 
     Args:
         level: "error", "warning" or "info".
-        text: what there is to say.
-        to: the operation that it is about.
+        text: text of the message.
+        to: the operation that it refers to.
     """
     name = {} if to.id is None else {"id": to.id}
     return json.dumps({"op": "status", **name, "level": level, "msg": text})
@@ -176,8 +176,8 @@ def response_text(to: Operation, values: Any, result: bool) -> str:
 
     Args:
         to: the call.
-        values: what it returns; of a failure, the reason.
-        result: whether it succeeded.
+        values: values to return; after a failure, the reason.
+        result: whether the call succeeded.
     """
     name = {} if to.id is None else {"id": to.id}
     body = {"service": to.topic, "values": values, "result": result}
@@ -199,7 +199,7 @@ def ros_message(kind: str, cursor: Cursor, pressed: frozenset[str], t: float) ->
     """The message of a published topic.
 
     Args:
-        kind: of PUBLISHED.
+        kind: topic, from PUBLISHED.
         cursor: newest measurement.
         pressed: names of the pressed buttons.
         t: time of the measurement [s].
@@ -233,7 +233,7 @@ def _joint_state(cursor: Cursor) -> dict[str, Any]:
 
 
 def _omni_state(cursor: Cursor, pressed: frozenset[str]) -> dict[str, Any]:
-    """In millimetres, as the drivers publish it unless they are told otherwise."""
+    """State in millimetres, the default unit of the drivers."""
     x, y, z = (1e3 * a for a in cursor.position)
     u, v, w = (1e3 * a for a in cursor.velocity)
     return {

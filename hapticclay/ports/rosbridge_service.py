@@ -1,4 +1,4 @@
-"""How a rosbridge server with a haptic device talks: topics in, topics out, few services."""
+"""The dialogue of a rosbridge server with a haptic device: topics in and out, few services."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from .rosbridge import LEVELS, PUBLISHED, TAKEN, Operation
 if TYPE_CHECKING:
     from .sessions import Host, Session
 
-MOST_TOPICS = 100  # that a client may subscribe to
+MOST_TOPICS = 100  # topics that a client may subscribe to
 
 
 @dataclass
 class Subscriptions:
-    """What a client has asked to be sent.
+    """Subscriptions of a client.
 
     Attributes:
         topics: their kinds, by name.
         throttles: least time between two messages [s], by topic and id of the subscription.
         sent: simulated time of the newest state sent, by topic [s].
-        level: of the status messages that it wants.
-        buttons: that it was told of last; None for none.
+        level: level of the status messages that the client wants.
+        buttons: buttons in the last message to the client; None for no message yet.
     """
 
     topics: dict[str, str] = field(default_factory=dict)
@@ -35,20 +35,20 @@ class Subscriptions:
     buttons: frozenset[str] | None = None
 
     def add(self, operation: Operation, kind: str) -> None:
-        """Begins a subscription.
+        """Adds a subscription.
 
         Args:
-            operation: that asks for it.
-            kind: of its topic.
+            operation: operation that requests it.
+            kind: kind of the topic.
         """
         self.topics[operation.topic] = kind
         self.throttles.setdefault(operation.topic, {})[operation.id] = operation.throttle
 
     def remove(self, operation: Operation) -> None:
-        """Ends a subscription, or without an id all of a topic.
+        """Ends one subscription; without an id, all subscriptions to a topic.
 
         Args:
-            operation: that asks for it.
+            operation: operation that requests it.
         """
         left = self.throttles.get(operation.topic, {})
         if operation.id is None:
@@ -71,19 +71,19 @@ class RosbridgeProtocol:
         """Nothing: a client subscribes first.
 
         Args:
-            service: that is asked.
-            session: of the client.
+            service: the service.
+            session: session of the client.
         """
         session.memory = Subscriptions()
         return []
 
     def answer(self, service: Host, session: Session, data: str | bytes) -> list[str]:
-        """Status messages, answers of services, and what is due after a command.
+        """Status messages, service responses, and the topics that are due after a command.
 
         Args:
-            service: that is asked.
-            session: of the client.
-            data: its message.
+            service: the service.
+            session: session of the client.
+            data: message of the client.
         """
         operation = rosbridge.read_operation(data)
         if operation.error:
@@ -95,11 +95,11 @@ class RosbridgeProtocol:
         return act(self, service, session, operation)
 
     def due(self, service: Host, session: Session) -> list[str]:
-        """Topics of a client with a state that it has not been sent.
+        """Subscribed topics with a state newer than the last one sent.
 
         Args:
-            service: that is asked.
-            session: of the client.
+            service: the service.
+            session: session of the client.
         """
         kept, t, out = session.memory, service.device.sensed.t, []
         cursor, pressed = service.cursor(), service.pressed
@@ -122,7 +122,7 @@ class RosbridgeProtocol:
         """Topics and their types, as plain data.
 
         Args:
-            service: that is asked.
+            service: the service.
         """
         return {"published": dict(PUBLISHED), "taken": dict(TAKEN)}
 
@@ -158,7 +158,7 @@ class RosbridgeProtocol:
         return []
 
     def _unadvertise(self, service: Host, session: Session, x: Operation) -> list[str]:
-        """A client that stops publishing a command stops commanding."""
+        """Removes the command of a client that stops publishing it."""
         if rosbridge.kind_of(x.topic, TAKEN) and session.command != IDLE:
             session.command = IDLE
         return []
@@ -182,7 +182,7 @@ class RosbridgeProtocol:
         return [rosbridge.response_text(x, values, True)]
 
     def _called(self, service: Host, x: Operation) -> dict[str, Any] | None:
-        """What a service returns; None for a service that there is not."""
+        """Result of a service; None for an unknown service."""
         both = PUBLISHED | TAKEN
         if x.topic == "/rosapi/topics":
             return {"topics": [f"/{name}" for name in both], "types": list(both.values())}
@@ -201,7 +201,7 @@ class RosbridgeProtocol:
     def _status(
         self, service: Host, session: Session, level: str, text: str, to: Operation
     ) -> list[str]:
-        """A status message, for a client that wants those of its level."""
+        """A status message, if the client wants messages of its level."""
         service.count(text)
         if LEVELS.index(level) > LEVELS.index(session.memory.level):
             return []
@@ -221,7 +221,7 @@ OPERATIONS = {
 
 
 def _wrong_type(x: Operation, known: str) -> str:
-    """Why a topic cannot have the type that a client gives it; "" where it can."""
+    """Why the type that a client gives a topic is wrong; "" if it is right."""
     if not known or not x.type or x.type == known:
         return ""
     return f"{x.topic} is of type {known}, not {x.type}"

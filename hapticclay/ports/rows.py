@@ -1,4 +1,4 @@
-"""Rows of numbers that grow, the newest kept, in little memory."""
+"""A growing table of numbers that keeps its newest rows in little memory."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-CHUNK = 4096  # rows that are allocated at once
+CHUNK = 4096  # rows per allocation
 MOST_ROWS = 1_000_000  # 17 minutes at 1 kHz
 
 
@@ -15,15 +15,15 @@ class Rows:
     """The newest rows of a table.
 
     Attributes:
-        count: rows so far, kept or not.
+        count: number of rows so far, kept or not.
     """
 
     def __init__(self, width: int, most: int = MOST_ROWS):
-        """Begins empty.
+        """Makes an empty table.
 
         Args:
-            width: numbers in a row.
-            most: rows to keep.
+            width: numbers per row.
+            most: number of rows to keep.
         """
         self.count, self._width, self._most = 0, width, most
         chunks = -(-most // CHUNK) + 1
@@ -45,7 +45,7 @@ class Rows:
         self.count += 1
 
     def table(self) -> np.ndarray:
-        """What is kept, in order, shape (n, width)."""
+        """The rows that are kept, in order, shape (n, width)."""
         if not self.count:
             return np.empty((0, self._width))
         last = (self.count - 1) % CHUNK + 1

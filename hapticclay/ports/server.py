@@ -1,4 +1,4 @@
-"""The service on a WebSocket, as programs for a real Inverse3 find it."""
+"""The service on a WebSocket, compatible with programs for a real Inverse3."""
 
 from __future__ import annotations
 
@@ -28,30 +28,30 @@ from .sessions import PLAIN, Inverse3
 
 LOCAL = ("127.0.0.1", "localhost", "::1")
 CLOCKS = ("wall", "tick")
-PUSH_PERIOD = 0.002  # [s] between two states that a client has not asked for
-LONGEST_QUEUE = 16  # messages of a client that wait to be answered
+PUSH_PERIOD = 0.002  # [s] between two states pushed to a client
+LONGEST_QUEUE = 16  # longest queue of unanswered messages of a client
 
 
 @checked
 class DeviceServer:
-    """A service that runs in a thread of its own.
+    """A service that runs in its own thread.
 
     Attributes:
         service: sessions and clock.
-        url: for WebSocket clients.
-        port: that it listens on.
+        url: URL for WebSocket clients.
+        port: port on which it listens.
     """
 
     def __init__(self, service: Service, host: str = "127.0.0.1", port: int = 0):
-        """Listens.
+        """Starts to listen.
 
         Args:
-            service: what answers.
-            host: address to listen on; a token guards any but this machine's.
-            port: to listen on; 0 for a free one.
+            service: service that answers the clients.
+            host: address to listen on; addresses other than this machine's need a token.
+            port: port to listen on; 0 for a free one.
 
         Raises:
-            ParameterError: the port or the address cannot be had, or websockets is not installed.
+            ParameterError: port or address is not available, or websockets is not installed.
         """
         integer("port", port, 0, 65_535)
         if not isinstance(host, str):
@@ -92,17 +92,17 @@ class DeviceServer:
         self.service.stop()
 
     def record(self) -> Record:
-        """The record of the device so far, which then no longer moves.
+        """Stops the device and returns its record so far.
 
         Raises:
-            RuntimeError: it has not moved.
+            RuntimeError: the device has not run.
         """
         self.close()
         return self.service.device.record()
 
     @property
     def exchanges(self) -> list[Exchanges]:
-        """What each client exchanged with the device, in the order of their connection."""
+        """Exchanges of each client with the device, in the order of connection."""
         return [log.exchanges() for log in self.service.logs]
 
     # ---- the thread
@@ -121,7 +121,7 @@ class DeviceServer:
         from websockets.asyncio.server import serve as listen
 
         quiet = logging.getLogger("hapticclay.ports.websockets")
-        quiet.setLevel(logging.CRITICAL)  # whoever knocks with rubbish gets no traceback
+        quiet.setLevel(logging.CRITICAL)  # a malformed request causes no traceback
         async with listen(
             self._talk,
             host,
@@ -140,7 +140,7 @@ class DeviceServer:
             await self._done.wait()
 
     async def _talk(self, connection: Any) -> None:
-        """A client, until it goes."""
+        """Serves a client until it disconnects."""
         from websockets.exceptions import ConnectionClosed
 
         connected = connection.transport.get_extra_info("socket")
@@ -156,7 +156,7 @@ class DeviceServer:
             async for data in connection:
                 for text in self.service.answer(number, data):
                     await connection.send(text)
-                await asyncio.sleep(0.0)  # a turn for others, however many messages wait
+                await asyncio.sleep(0.0)  # lets other clients run, however many messages wait
         except ConnectionClosed:
             pass
         finally:
@@ -165,7 +165,7 @@ class DeviceServer:
             self.service.leave(number)
 
     async def _push(self, connection: Any, number: int) -> None:
-        """Sends a client what it has not asked for, until it goes."""
+        """Pushes states to a client until it disconnects."""
         from websockets.exceptions import ConnectionClosed
 
         with contextlib.suppress(ConnectionClosed):
@@ -175,7 +175,7 @@ class DeviceServer:
                 await asyncio.sleep(PUSH_PERIOD)
 
     def _http(self, connection: Any, request: Any) -> Any:
-        """Answers plain GETs; None lets a WebSocket through."""
+        """Answers plain GET requests; None passes a WebSocket on."""
         where = urlsplit(request.path)
         given = parse_qs(where.query).get("token", [""])[0]
         if not hmac.compare_digest(given.encode(), self._token.encode()):
@@ -217,23 +217,23 @@ def serve(
     clay: bool = False,
     inverse3: Inverse3 = PLAIN,
 ) -> Iterator[DeviceServer]:
-    """Serves the arm of a scenario as a device, while the `with` block runs.
+    """Serves the arm of a scenario as a device while the `with` block runs.
 
         with hapticclay.ports.serve(scenario, period=0.005) as server:
             run_my_program(server.url)
             record = server.record()
 
     Args:
-        scenario: its arm, hand, hardware and step; compensator and servo do not act.
-        host: address to listen on; a token, part of `url`, guards any but this machine's.
-        port: to listen on; 0 for a free one.
-        clock: "tick": each message of the first client moves the device by a period, so that a
-            test gives the same run each time; "wall": the device moves in real time.
+        scenario: arm, hand, hardware and step are used; compensator and servo are not.
+        host: address to listen on; addresses other than this machine's need a token, part of `url`.
+        port: port to listen on; 0 for a free one.
+        clock: "tick": each message of the first client advances the device by a period, so that a
+            test repeats exactly; "wall": the device runs in real time.
         period: between two messages with the clock "tick" [s], 1e-5 to 1; None for the control
             sample.
-        hand: where the hand wants to be over time; None for the muscle force of the scenario.
-        clay: whether the clay of the scenario acts as well.
-        inverse3: what the device shows itself as, and the protocol it speaks.
+        hand: target of the hand over time; None for the muscle force of the scenario.
+        clay: whether the clay of the scenario acts.
+        inverse3: identity and protocol of the simulated device.
 
     Yields:
         The server.

@@ -1,9 +1,9 @@
-"""The service behind the sockets: sessions of clients, a clock that moves the device, a watchdog.
+"""The service behind the sockets: client sessions, the clock of the device, a watchdog.
 
-What a client says is read and answered by a protocol; here all clients only have commands. Two
-clocks. "tick": each command of the first client moves the device by a period, so that the same
-messages give the same run to the last bit. "wall": the device moves in real time in a thread of its
-own, under the newest command of each client (a zero-order hold).
+A protocol reads and answers the messages; this module handles only commands. There are two clocks.
+"tick": each command of the first client advances the device by a period, so that the same messages
+give bit-identical runs. "wall": the device runs in real time in its own thread, under the newest
+command of each client (a zero-order hold).
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from .inverse import Cursor
 from .planes import normal_component, to_plane, to_space
 from .sessions import PLAIN, Device, Inverse3, Session, WireProtocol
 
-REST: Vector = (0.08, -0.15, 0.14)  # [m] where an Inverse3 has its cursor at rest: handle at p = 0
+REST: Vector = (0.08, -0.15, 0.14)  # [m] cursor of an Inverse3 at rest: handle at p = 0
 # [s] without a message after which a client's command no longer acts: with the thread's turn, 50 ms
 PATIENCE = 0.048
-LATE = 0.1  # [s] behind the clock from which on time is skipped
+LATE = 0.1  # [s] lag behind the clock beyond which time is skipped
 MOST_LOGS = 100  # of clients
-MOST_NOTICES, LONGEST_NOTICE = 100, 120  # kinds that are counted apart; characters
-AT_ONCE = 8  # control samples that the thread makes before clients get their turn
-LOOK = 0.002  # [s] between two looks at the clients of a device that something else moves
+MOST_NOTICES, LONGEST_NOTICE = 100, 120  # kinds of notices counted separately; characters
+AT_ONCE = 8  # control samples per turn of the thread, before clients get theirs
+LOOK = 0.002  # [s] between two checks of the clients of an externally paced device
 LOG = logging.getLogger("hapticclay.ports")
 
 
@@ -37,13 +37,13 @@ class Service:
     """Clients, their commands, and the clock.
 
     Attributes:
-        device: what is driven.
+        device: the driven device.
         clock: "tick" or "wall".
-        inverse3: what the device shows itself as.
-        protocol: that clients speak.
-        notices: what was left out of messages, and how often.
-        skipped: control samples that the wall clock left out, since the computer was late.
-        samples: control samples that it made.
+        inverse3: identity of the simulated device.
+        protocol: protocol of the clients.
+        notices: what was dropped from messages, and how often.
+        skipped: control samples that the wall clock skipped because the computer was late.
+        samples: control samples that the wall clock made.
     """
 
     def __init__(
@@ -53,12 +53,12 @@ class Service:
         clock: str = "wall",
         inverse3: Inverse3 = PLAIN,
     ):
-        """Waits for clients; the wall clock goes from `start` on.
+        """Makes the service; `start` starts the wall clock.
 
         Args:
-            device: what is driven.
+            device: the driven device.
             clock: "tick" or "wall".
-            inverse3: what the device shows itself as, and the protocol it speaks.
+            inverse3: identity and protocol of the simulated device.
         """
         self.device, self.clock, self.notices = device, clock, Counter[str]()
         self.inverse3, self._plane = inverse3, inverse3.plane
@@ -73,58 +73,58 @@ class Service:
     # ---- clients
 
     def connect(self) -> tuple[int, list[str]]:
-        """A new client.
+        """Adds a client.
 
         Returns:
-            The number of its session, and what to send first.
+            The number of its session, and the first message to send.
         """
         with self._lock:
             self._count += 1
             number = self._count
             session = self._sessions[number] = Session(number)
             self._logs[number] = session.log
-            if len(self._logs) > MOST_LOGS:  # clients that come and go fill no memory
+            if len(self._logs) > MOST_LOGS:  # bounds memory when many clients come and go
                 gone = [k for k in self._logs if k not in self._sessions]
                 if gone:
                     del self._logs[min(gone, key=lambda k: self._logs[k].count)]
             return number, self.protocol.greet(self, session)
 
     def leave(self, number: int) -> None:
-        """A client has gone, and its command with it.
+        """Removes a client and its command.
 
         Args:
-            number: of its session.
+            number: number of the session.
         """
         with self._lock:
             self._sessions.pop(number, None)
             self.device.drive(LIMP if self.clock == "tick" else self._drive())
 
     def answer(self, number: int, data: str | bytes) -> list[str]:
-        """What to send for a message.
+        """The answer to a message.
 
         Args:
-            number: of the client's session.
-            data: its message, text or binary, whatever it is.
+            number: number of the client's session.
+            data: its message, text or binary, of any content.
         """
         with self._lock:
             return self.protocol.answer(self, self._sessions[number], data)
 
     def due(self, number: int) -> list[str]:
-        """What to send a client that has not asked.
+        """Messages to push to a client.
 
         Args:
-            number: of its session.
+            number: number of the session.
         """
         with self._lock:
             session = self._sessions.get(number)
             return [] if session is None else self.protocol.due(self, session)
 
     def apply(self, session: Session, command: Command) -> None:
-        """Takes a client's command; with the clock "tick", the first client's moves the device.
+        """Applies a client's command; with the clock "tick", that of the first advances the device.
 
         Args:
-            session: of the client.
-            command: what it asks; without anything it is idle.
+            session: session of the client.
+            command: the command; an empty one is idle.
         """
         device = self.device
         session.command, session.heard = command, time.monotonic()
@@ -137,7 +137,7 @@ class Service:
         applied = device.drive(self._drive())
         if self.clock == "tick" and session.number == min(self._sessions):
             device.advance()
-            for s in self._sessions.values():  # a command holds for a tick
+            for s in self._sessions.values():  # a command acts for one tick
                 if s.number != session.number:
                     s.command = IDLE
         seen = device.sensed
@@ -147,7 +147,7 @@ class Service:
 
     @property
     def logs(self) -> list[ExchangeLog]:
-        """Exchanges of each client, in the order of their connection; of 100 at most."""
+        """Exchanges of each client, in the order of connection; 100 clients at most."""
         return list(self._logs.values())
 
     @property
@@ -156,27 +156,27 @@ class Service:
         return len(self._sessions)
 
     def inventory(self) -> dict[str, Any]:
-        """What the device shows itself as, as plain data."""
+        """Identity of the device, as plain data."""
         with self._lock:
             return self.protocol.inventory(self)
 
     def count(self, notice: str) -> None:
-        """Counts what was left out of a message, and says it the first time.
+        """Counts what was dropped from a message, and reports it the first time.
 
         Args:
-            notice: what, and why.
+            notice: what was dropped, and why.
         """
         notice = notice[:LONGEST_NOTICE]
         if notice not in self.notices and len(self.notices) >= MOST_NOTICES:
-            notice = "further kinds"  # whoever sends rubbish at random fills no memory
+            notice = "further kinds"  # bounds memory under random input
         self.notices[notice] += 1
         if self.notices[notice] == 1:
             LOG.warning(notice)
 
-    # ---- between cursor and arm
+    # ---- conversion between cursor and arm
 
     def _drive(self) -> Drive:
-        """What all clients ask together, those that were silent for too long left out."""
+        """The combined command of all clients, except those that have timed out."""
         now = time.monotonic()
         fresh = [
             s.command
@@ -200,7 +200,7 @@ class Service:
         """The newest measurement, in the frame of the device.
 
         Args:
-            mode: what the client that it is for drives.
+            mode: what the receiving client drives.
         """
         seen, device, plane = self.device.sensed, self.device, self._plane
         return Cursor(
@@ -221,13 +221,13 @@ class Service:
     # ---- the wall clock
 
     def start(self) -> None:
-        """Lets the wall clock go; does nothing with the clock "tick"."""
+        """Starts the wall clock; does nothing with the clock "tick"."""
         if self.clock == "wall":
             self._thread = threading.Thread(target=self._go, name="device", daemon=True)
             self._thread.start()
 
     def stop(self) -> None:
-        """Stops the clock; the device no longer moves."""
+        """Stops the clock and the device."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join()
@@ -257,7 +257,7 @@ class Service:
 
 
 def protocol_of(protocol: str) -> WireProtocol:
-    """The protocol of a name.
+    """The protocol with a given name.
 
     Args:
         protocol: "inverse" or "rosbridge".

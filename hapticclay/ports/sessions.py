@@ -1,4 +1,4 @@
-"""What a service and its protocols share: the device, what it shows itself as, and its clients."""
+"""Types shared by a service and its protocols: the device, its identity, and its clients."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from .exchanges import ExchangeLog
 from .inverse import Cursor
 
 ID = re.compile("[0-9A-F]{1,16}")
-PORTS = {"inverse": 10_001, "rosbridge": 9090}  # where clients look for each protocol
+PORTS = {"inverse": 10_001, "rosbridge": 9090}  # default port of each protocol
 
 
 @named
 @dataclass(frozen=True)
 class Inverse3:
-    """What the simulated device shows itself as.
+    """Identity of the simulated device.
 
     Attributes:
-        device_id: of the Inverse3, 1 to 16 hexadecimal digits.
-        grip_id: of the grip, 1 to 16 hexadecimal digits.
+        device_id: id of the Inverse3, 1 to 16 hexadecimal digits.
+        grip_id: id of the grip, 1 to 16 hexadecimal digits.
         plane: "xy" or "xz", plane of the cursor in which the arm moves.
-        buttons: of the grip, over time.
+        buttons: pressed buttons of the grip over time.
         largest_force: longer forces are shortened to this length [N], > 0, at most 1e3.
-        protocol: "inverse", of the Haply Inverse service, or "rosbridge", topics of ROS as JSON.
+        protocol: "inverse" for the Haply Inverse service, or "rosbridge" for ROS topics as JSON.
     """
 
     device_id: str = "04EA"
@@ -53,10 +53,10 @@ PLAIN = Inverse3()
 
 
 class Device(Protocol):
-    """What a service drives: a `SimulatedDevice`, or the arm of a session that a person watches.
+    """The device of a service: a `SimulatedDevice`, or the arm of a session with a viewer.
 
     Attributes:
-        paced: whether something else than the clock of the service moves it.
+        paced: whether anything but the clock of the service advances the device.
     """
 
     paced: bool
@@ -78,29 +78,29 @@ class Device(Protocol):
 
     @property
     def torques(self) -> Pair:
-        """Torques that act on the joints beside that force [N.m]."""
+        """Torques that act on the joints in addition to that force [N.m]."""
         ...
 
     @property
     def ended(self) -> str:
-        """Why the device no longer moves; "" while it does."""
+        """Why the device stopped; "" while it runs."""
         ...
 
     @property
     def scenario(self) -> Scenario:
-        """What is simulated."""
+        """The simulated scenario."""
         ...
 
     def drive(self, drive: Drive) -> Pair:
         """Changes what the motors do from the next control sample on.
 
         Args:
-            drive: in the plane of the arm.
+            drive: the drive, in the plane of the arm.
         """
         ...
 
     def advance(self, samples: int | None = None) -> None:
-        """Moves on.
+        """Advances the simulation.
 
         Args:
             samples: control samples; None for a period.
@@ -109,15 +109,15 @@ class Device(Protocol):
 
 @dataclass
 class Session:
-    """A client that is connected.
+    """A connected client.
 
     Attributes:
         number: 1 for the first client, and so on.
-        command: its newest one.
-        heard: when its last command came [s].
-        log: its exchanges.
-        profile: name that it gave itself.
-        memory: what its protocol keeps.
+        command: newest command.
+        heard: when the last command arrived [s].
+        log: exchanges.
+        profile: name that the client gave itself.
+        memory: state that the protocol keeps.
     """
 
     number: int
@@ -129,12 +129,12 @@ class Session:
 
 
 class Host(Protocol):
-    """What a protocol sees of the service.
+    """The service as a protocol sees it.
 
     Attributes:
-        device: what is driven.
+        device: the driven device.
         clock: "tick" or "wall".
-        inverse3: what the device shows itself as.
+        inverse3: identity of the simulated device.
     """
 
     device: Device
@@ -150,69 +150,69 @@ class Host(Protocol):
         """The newest measurement, in the frame of the device.
 
         Args:
-            mode: what the client that it is for drives.
+            mode: what the receiving client drives.
         """
         ...
 
     def apply(self, session: Session, command: Command) -> None:
-        """Takes a client's command.
+        """Applies a client's command.
 
         Args:
-            session: of the client.
-            command: what it asks.
+            session: session of the client.
+            command: the command.
         """
 
     def count(self, notice: str) -> None:
-        """Counts what was left out of a message.
+        """Counts what was dropped from a message.
 
         Args:
-            notice: what, and why.
+            notice: what was dropped, and why.
         """
 
 
 class WireProtocol(Protocol):
-    """A protocol: reads what a client sends, and writes what it is sent.
+    """A protocol: reads messages from a client and writes messages to it.
 
     Attributes:
-        name: of the protocol.
-        pushes: whether clients are sent states that they have not asked for.
+        name: name of the protocol.
+        pushes: whether the service pushes states to clients.
     """
 
     name: str
     pushes: bool
 
     def greet(self, service: Host, session: Session) -> list[str]:
-        """What a client is sent first.
+        """The first message to a client.
 
         Args:
-            service: that it talks to.
-            session: of the client.
+            service: the service.
+            session: session of the client.
         """
         ...
 
     def answer(self, service: Host, session: Session, data: str | bytes) -> list[str]:
-        """What a client is sent for a message.
+        """The answer to a message of a client.
 
         Args:
-            service: that it talks to.
-            session: of the client.
-            data: its message, text or binary, whatever it is.
+            service: the service.
+            session: session of the client.
+            data: its message, text or binary, of any content.
         """
         ...
 
     def due(self, service: Host, session: Session) -> list[str]:
-        """What a client is sent that it has not asked for.
+        """Messages to push to a client.
 
         Args:
-            service: that it talks to.
-            session: of the client.
+            service: the service.
+            session: session of the client.
         """
         ...
 
     def inventory(self, service: Host) -> dict[str, Any]:
-        """What there is, as plain data.
+        """The available devices or topics, as plain data.
 
         Args:
-            service: that is asked.
+            service: the service.
         """
         ...

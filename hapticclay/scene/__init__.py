@@ -1,3 +1,3 @@
-"""How a scene is written: fields, units, files, text, experiments."""
+"""Scene descriptions: fields, units, files, text, experiments."""
 
 from . import experiments  # noqa: F401  # so that every file may name one

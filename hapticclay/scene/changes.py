@@ -14,26 +14,26 @@ from .field_kinds import ENTIRE, join_names
 from .given_values import laid_over, make_part, values_of
 
 T = TypeVar("T")
-HAND = ["mass", "damper", "spring"]  # what a hand is added by
+HAND = ["mass", "damper", "spring"]  # fields that add a hand
 
 
 @checked
 def with_fields(part: T, changes: Mapping[str, Any]) -> T:
-    """A copy of a part with some fields changed.
+    """Copies a part with some fields changed.
 
     Args:
         part: the part, as a scenario.
         changes: values by dotted name, as in {"arm.l1": 0.3, "gain.x": 2.0}: numbers, "5 cm",
-            parts, or plain data of parts. What changes an entry goes before what changes the whole.
+            parts, or plain data of parts. Changes of an entry override those of the whole.
 
     Returns:
-        A part of the same class. One number for a pair, and one part for a pair of parts, is that
-        of both axes. A part that was None begins as its defaults; but a hand is added whole, by
-        its mass, damper and spring.
+        A part of the same class. One number, or one part, given for a pair applies to both axes.
+        A part that was None starts from its defaults. A hand must be added as a whole, by its
+        mass, damper and spring.
 
     Raises:
-        ParameterError: part is none, there is no such field, a value was refused, or a hand is
-            added in part.
+        ParameterError: part is not a part, there is no such field, a value was refused, or a hand
+            is added incompletely.
     """
     if not dataclasses.is_dataclass(part) or isinstance(part, type):
         raise ParameterError("part", part, "must be a part, as a Scenario")
@@ -47,10 +47,10 @@ def check_added_hand(old: Any, *changes: Mapping[Any, Any]) -> None:
 
     Args:
         old: the operator before.
-        *changes: plain data from `nested`, the later ones on top.
+        *changes: plain data from `nested`; later ones override earlier ones.
 
     Raises:
-        ParameterError: a hand is added in part.
+        ParameterError: a hand is added incompletely.
     """
     given = functools.reduce(laid_over, changes, {}).get("operator")
     _check_hand(given, old, "operator")
@@ -74,13 +74,13 @@ def _check_hand(given: Any, old: Any, path: str) -> None:
 
 
 def nested(changes: Mapping[str, Any]) -> dict[Any, Any]:
-    """Plain data of values by dotted name; the key None holds what is given for a whole field.
+    """Converts values by dotted name to plain data; the key None holds the value of a whole field.
 
     Args:
-        changes: values by dotted name, or by name and deep.
+        changes: values by dotted name, or nested values by name.
 
     Raises:
-        ParameterError: one value is given in both ways, or lies too deep.
+        ParameterError: a value is given in both ways, or is nested too deeply.
     """
     out: dict[Any, Any] = {}
     for name, value in changes.items():
@@ -124,7 +124,7 @@ def named_values(field: str, words: Iterable[str]) -> dict[str, Any]:
         Values by dotted name.
 
     Raises:
-        ParameterError: a word is not name=value, or a name stands twice.
+        ParameterError: a word is not name=value, or a name appears twice.
     """
     out: dict[str, Any] = {}
     for word in words:

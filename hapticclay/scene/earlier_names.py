@@ -1,4 +1,4 @@
-"""Names of release 0.2 in files, and the names that stand for them now."""
+"""Names of release 0.2 in files, and their present names."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ VALUES = {("render", "implicit"): "physical"}
 
 
 def with_present_names(data: Any) -> Any:
-    """Plain data with the names of now, however deep, in tables and dotted names.
+    """Renames the keys of plain data to the present names, in nested tables and dotted names.
 
     Args:
-        data: what a file holds.
+        data: contents of a file.
 
     Raises:
-        ParameterError: a table has both names of one thing.
+        ParameterError: a table has both the old and the present name of a field.
     """
     if isinstance(data, list):
         return [with_present_names(x) for x in data]

@@ -1,4 +1,4 @@
-"""What a field can hold: parts of one or several classes, pairs, numbers, and its default."""
+"""Types of fields: parts of one or several classes, pairs, numbers, and their defaults."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from ..errors import Bound, ParameterError, field_types
 from ..model.constants import AXES
 from ..model.hardware import JOINTS
 
-KIND = "kind"  # key of the class, where a field takes several
+KIND = "kind"  # key of the class, for a field of several classes
 USUAL_KIND = "multisine"  # the class without that key, where none of its own is usual
 UNSET = dataclasses.MISSING
-MOST_TOLD = 8  # names that an error lists beside the nearest one
-ENTIRE = None  # key of the value of a whole field, beside those of its entries
+MOST_TOLD = 8  # names that an error lists besides the nearest one
+ENTIRE = None  # key of the value of a whole field, besides those of its entries
 
 
 def terms_field(kind: type) -> str:
-    """The field of a class that needs nothing but a tuple of parts, as a sum; "" for others.
+    """The field of a class that only needs a tuple of parts, such as a sum; "" for other classes.
 
     Args:
         kind: the class.
@@ -34,7 +34,7 @@ def terms_field(kind: type) -> str:
 
 
 def union_members(hint: Any) -> tuple[Any, ...]:
-    """Types of a union; a tuple of the type itself where it is none.
+    """Members of a union; for another type, a tuple of the type itself.
 
     Args:
         hint: the type.
@@ -43,7 +43,7 @@ def union_members(hint: Any) -> tuple[Any, ...]:
 
 
 def is_pair(hint: Any) -> bool:
-    """Whether a type is a pair of parts, one an axis.
+    """Whether a type is a pair of parts, one per axis.
 
     Args:
         hint: the type.
@@ -58,7 +58,7 @@ def is_pair(hint: Any) -> bool:
 
 
 def part_classes(hint: Any) -> dict[str, type]:
-    """Classes of the parts that a type takes, alone or in a tuple, by name in lower case.
+    """Classes of parts that a type accepts, single or in a tuple, by lower-case name.
 
     Args:
         hint: the type; its subclasses count.
@@ -75,7 +75,7 @@ def part_classes(hint: Any) -> dict[str, type]:
 
 
 def _family(kind: type) -> Iterator[type]:
-    """A class and its subclasses, where they are parts; not one that is there for them alone."""
+    """A class and its subclasses that are parts, except bases without fields."""
     below = kind.__subclasses__()
     if dataclasses.is_dataclass(kind) and (dataclasses.fields(kind) or not below):
         yield kind
@@ -84,11 +84,11 @@ def _family(kind: type) -> Iterator[type]:
 
 
 def usual_class(hint: Any, classes: Mapping[str, type]) -> type | None:
-    """The class of a part without a kind; None if it must have one.
+    """The class of a part without a kind; None if the kind is required.
 
     Args:
         hint: the type of the field.
-        classes: those it takes, from `part_classes`.
+        classes: classes that it accepts, from `part_classes`.
     """
     if len(classes) == 1:
         return next(iter(classes.values()))
@@ -101,8 +101,8 @@ def entry_names(kind: Any, bound: Bound, old: Any = UNSET) -> dict[str, int]:
 
     Args:
         kind: the type of the tuple.
-        bound: its bound, which has the names.
-        old: the tuple itself, where its length is not fixed.
+        bound: its bound, which holds the names.
+        old: the tuple itself, if its length is not fixed.
     """
     if get_args(kind)[1:] == (...,):
         return {str(i): i for i in range(len(old) if isinstance(old, tuple | list) else 0)}
@@ -128,7 +128,7 @@ def no_field(name: str, value: Any, known: Sequence[str]) -> ParameterError:
     Args:
         name: dotted name that was given.
         value: its value.
-        known: dotted names that there are.
+        known: dotted names that exist.
     """
     if not known:
         whole = name.rpartition(".")[0]
@@ -137,7 +137,7 @@ def no_field(name: str, value: Any, known: Sequence[str]) -> ParameterError:
     depth = name.count(".")
     level = list(dict.fromkeys(".".join(k.split(".")[: depth + 1]) for k in known))
     near = difflib.get_close_matches(name, level, n=1)
-    if not near:  # another part may have it
+    if not near:  # another part may have this field
         last, ends = name.rpartition(".")[2], {k.rpartition(".")[2]: k for k in reversed(known)}
         near = [ends[n] for n in difflib.get_close_matches(last, ends, n=1)]
     path, _, _ = name.rpartition(".")
@@ -152,7 +152,7 @@ def no_field(name: str, value: Any, known: Sequence[str]) -> ParameterError:
 
 
 def default_of(kind: type, name: str) -> Any:
-    """The default of a field; UNSET where it has none.
+    """The default of a field; UNSET if it has none.
 
     Args:
         kind: the class.

@@ -31,7 +31,7 @@ R = TypeVar("R")
 
 
 class Field(NamedTuple):
-    """A field that takes numbers or words.
+    """A field that accepts numbers or words.
 
     Attributes:
         name: its dotted name.
@@ -49,7 +49,7 @@ class Field(NamedTuple):
 
 
 def fields_of(kind: type, path: str = "", part: Any = UNSET) -> tuple[Field, ...]:
-    """The fields of a class that take numbers or words, those of the parts within included.
+    """The fields of a class that accept numbers or words, including those of nested parts.
 
     Args:
         kind: the class.
@@ -80,7 +80,7 @@ def _fields_at(hint: Any, bound: Bound, path: str, default: Any, about: str) -> 
         return
     for kind in classes.values():
         if any(kind in part_classes(h).values() for h, _ in field_types(kind).values()):
-            continue  # made of its like
+            continue  # made of parts of its own class
         part = default if type(default) is kind else UNSET
         for field in fields_of(kind, path, part):
             told = f"of {kind.__name__.lower()}: {field.about}" if len(classes) > 1 else field.about
@@ -88,7 +88,7 @@ def _fields_at(hint: Any, bound: Bound, path: str, default: Any, about: str) -> 
 
 
 def dotted_names(kind: type, path: str = "") -> list[str]:
-    """Names of all fields of a class, in the order of `fields_of`; and of the parts that have none.
+    """Names of all fields of a class, in the order of `fields_of`, then of parts without fields.
 
     Args:
         kind: the class.
@@ -100,7 +100,7 @@ def dotted_names(kind: type, path: str = "") -> list[str]:
 
 
 def bounds_at(hint: Any, bound: Bound | None, names: Sequence[str]) -> list[Bound]:
-    """Bounds of what lies at a dotted name below a field; empty if nothing does.
+    """Bounds of the value at a dotted name below a field; empty if there is none.
 
     Args:
         hint: type of the field.
@@ -132,12 +132,12 @@ def bounds_at(hint: Any, bound: Bound | None, names: Sequence[str]) -> list[Boun
 def function_of(
     kind: Callable[P, T], name: str, answer: Callable[[T], R], refused: str
 ) -> Callable[P, R]:
-    """A function with the fields of a dataclass as its arguments, and its description.
+    """Makes a function with the fields of a dataclass as arguments, and its description.
 
     Args:
         kind: the dataclass.
-        name: of the function, in the module of `answer`.
-        answer: what the function returns, of an instance; its return annotation is the function's.
+        name: name of the function, in the module of `answer`.
+        answer: computes the result from an instance; its return annotation is the function's.
         refused: why the function raises ParameterError.
     """
     assert isinstance(kind, type)
@@ -160,7 +160,7 @@ def function_of(
 
 
 def field_descriptions(kind: type) -> dict[str, str]:
-    """What the docstrings of a dataclass and its bases say of each field, on one line.
+    """Descriptions of fields from the docstrings of a dataclass and its bases, one line each.
 
     Args:
         kind: the class.

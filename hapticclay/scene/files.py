@@ -19,7 +19,7 @@ SCENARIO_FILES = (".toml", ".json")
 
 
 def is_scenario_file(word: str) -> bool:
-    """Whether a word is the name of a scenario file.
+    """Whether a word names a scenario file.
 
     Args:
         word: the word.
@@ -28,7 +28,7 @@ def is_scenario_file(word: str) -> bool:
 
 
 def read_settings(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Plain data of a scenario file; the name of the file is that of a scenario without one.
+    """Reads a scenario file as plain data; a scenario without a name gets that of the file.
 
     Args:
         path: the file, .toml or .json.
@@ -39,7 +39,7 @@ def read_settings(path: str | os.PathLike[str]) -> dict[str, Any]:
     file = Path(path)
     kind = _file_kind(file)
     try:
-        if file.exists() and not file.is_file():  # a pipe would be waited for
+        if file.exists() and not file.is_file():  # reading a pipe would block
             raise ValueError("it is not a regular file")
         text = file.read_bytes().decode("utf-8-sig")
         data = tomllib.loads(text) if kind == "TOML" else json.loads(text, object_pairs_hook=_table)
@@ -81,13 +81,13 @@ def write_part(
         path: the file, .toml or .json.
         head: values before those of the part.
         part: the part.
-        name: the field that an error is about.
+        name: the field to name in an error.
 
     Returns:
         The file.
 
     Raises:
-        ParameterError: the file cannot be written, or the part holds what is no data.
+        ParameterError: the file cannot be written, or the part holds something other than data.
     """
     file, units = Path(path), {}
     kind = _file_kind(file, name)
@@ -107,7 +107,7 @@ def toml_text(data: Mapping[str, Any], units: Mapping[str, str] = {}) -> str:
 
     Args:
         data: the data.
-        units: by dotted name.
+        units: units by dotted name.
     """
     return "\n".join(_toml_table(data, units)).strip("\n") + "\n"
 
@@ -119,7 +119,7 @@ def _toml_table(
     key: str = "",
     row: bool = False,
 ) -> list[str]:
-    """Lines of a table, or of a row of an array of tables: its values, then the tables in it."""
+    """Lines of a table, or of an entry of an array of tables: values first, then nested tables."""
     values = {k: v for k, v in data.items() if not _holds_tables(v)}
     shown = key and (values or row or not data)
     lines = ["", f"[[{key}]]" if row else f"[{key}]"] if shown else []
@@ -154,6 +154,6 @@ def _toml_value(value: Any) -> str:
     if isinstance(value, Mapping):
         inner = (f"{_toml_key(k)} = {_toml_value(v)}" for k, v in value.items())
         return f"{{{', '.join(inner)}}}"
-    if isinstance(value, str):  # escapes of JSON are those of TOML, but for one character
+    if isinstance(value, str):  # JSON and TOML escape the same characters, except one
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return repr(value).lower()  # true, false; numbers to the last bit

@@ -1,4 +1,4 @@
-"""Parts from plain data: what each field makes of the value it is given."""
+"""Parts from plain data: conversion of a given value by each field."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ T = TypeVar("T")
 def make_part(
     kind: type[T], data: Mapping[Any, Any], start: Mapping[str, Any] = {}, path: str = ""
 ) -> T:
-    """A part of its plain data.
+    """Makes a part from plain data.
 
     Args:
         kind: its class.
-        data: values by name; may be deep.
-        start: values of the fields that data leaves out; those left out here have their defaults.
+        data: values by name; may be nested.
+        start: values of fields omitted in data; fields omitted here have their defaults.
         path: dotted name of the part, for errors.
 
     Raises:
@@ -58,12 +58,12 @@ def make_part(
 def merged_values(
     kind: type, data: Mapping[Any, Any], start: Mapping[str, Any], path: str = ""
 ) -> dict[str, Any]:
-    """Values of the fields of a part, changed by plain data; arguments of its class.
+    """Applies plain data to the values of the fields of a part; returns arguments of its class.
 
     Args:
         kind: its class.
         data: the changes.
-        start: the values before; defaults where left out.
+        start: the values before; defaults if omitted.
         path: dotted name of the part, for errors.
 
     Raises:
@@ -89,7 +89,7 @@ def values_of(part: Any) -> dict[str, Any]:
 
 
 def _taken(hint: Any, bound: Bound, value: Any, path: str, old: Any) -> Any:
-    """What a field takes of plain data; old: its value before, UNSET for none."""
+    """Value of a field from plain data; old: its value before, UNSET for none."""
     if isinstance(value, Mapping) and ENTIRE in value:
         old = _taken(hint, bound, value[ENTIRE], path, old)
         value = {k: v for k, v in value.items() if k is not ENTIRE}
@@ -110,21 +110,21 @@ def _taken(hint: Any, bound: Bound, value: Any, path: str, old: Any) -> Any:
     for kind in kinds:
         if get_origin(kind) is tuple:
             return _taken_numbers(kind, bound, value, path, old)
-    if isinstance(value, Mapping):  # below a number
+    if isinstance(value, Mapping):  # a name below a number
         name, inner = next(iter(value.items()), ("", value))
         raise ParameterError(join_names(path, name), inner, f"no such field: {path} has no parts")
     return _taken_one(kinds, bound, value, path)
 
 
 def _taken_one(kinds: Sequence[Any], bound: Bound, value: Any, path: str) -> Any:
-    """A number, a flag or a word; the class of the part refuses what is none of its own."""
+    """A number, a flag or a word; the class of the part refuses invalid values."""
     if isinstance(value, str):
         words = [w for k in kinds if get_origin(k) is Literal for w in get_args(k)]
         if value in words or not {float, int} & set(kinds):
             return value
         number = quantity(path, value, bound.unit)
         return value if number is None else number
-    if isinstance(value, float):  # sweeps and words give floats alone
+    if isinstance(value, float):  # sweeps and words only give floats
         if bool in kinds and value in (0.0, 1.0):
             return bool(value)
         if int in kinds and value.is_integer():
@@ -133,7 +133,7 @@ def _taken_one(kinds: Sequence[Any], bound: Bound, value: Any, path: str) -> Any
 
 
 def _taken_numbers(kind: Any, bound: Bound, value: Any, path: str, old: Any) -> Any:
-    """Numbers of a tuple: all, entries by name or index, or one for each."""
+    """Numbers of a tuple: all, entries by name or index, or one number for all."""
     item, open_ = get_args(kind)[0], get_args(kind)[1:] == (...,)
 
     def entry(name: object, x: Any, before: Any = UNSET) -> Any:
@@ -162,7 +162,7 @@ def _taken_numbers(kind: Any, bound: Bound, value: Any, path: str, old: Any) -> 
 
 
 def _taken_pair(pair: Any, alone: list[Any], value: Any, path: str, old: Any) -> Any:
-    """A part for both axes, or one for each; what names no axis goes to both."""
+    """A part for both axes, or one per axis; values without an axis apply to both."""
     if isinstance(value, Mapping):
         shared = {k: v for k, v in value.items() if k not in AXES}
         if alone and len(shared) == len(value) and not isinstance(old, tuple):
@@ -186,11 +186,11 @@ def _taken_pair(pair: Any, alone: list[Any], value: Any, path: str, old: Any) ->
 
 
 def laid_over(below: Any, above: Any) -> Any:
-    """Plain data on top of other plain data.
+    """Overrides plain data by other plain data.
 
     Args:
-        below: the other; a dictionary.
-        above: goes before what is below.
+        below: data to override; a dictionary.
+        above: data that override.
     """
     if not isinstance(above, Mapping) or not isinstance(below, Mapping):
         return above
@@ -200,7 +200,7 @@ def laid_over(below: Any, above: Any) -> Any:
 def _taken_by_name(
     hint: Any, classes: dict[str, type], value: Mapping[Any, Any], path: str, old: Any
 ) -> Any:
-    """A part, or some of several parts by their indices."""
+    """A part, or some of several parts by index."""
     if not isinstance(old, tuple):
         return _taken_part(hint, classes, value, path, old)
     known = {str(i): part for i, part in enumerate(old)}

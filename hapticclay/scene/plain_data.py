@@ -3,7 +3,7 @@
 Plain data of a part is a dictionary of its fields: numbers, words, lists of numbers, and
 dictionaries for the parts within. A pair of parts has the keys x and y. Where a field takes parts
 of several classes, the key "kind" holds the name of the class in lower case. None, or the word
-"none", stands for nothing.
+"none", means no value.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ def plain_data(
     units: dict[str, str] | None = None,
     left_out: list[str] | None = None,
 ) -> dict[str, Any]:
-    """A part as plain data, from which `make_part` makes it again.
+    """Converts a part to plain data, from which `make_part` restores it.
 
     Args:
         part: the part.
-        full: whether fields that have their default values are written too.
-        units: takes the unit of each field by dotted name; None for none.
-        left_out: takes the names of fields that are no data, such as a function; they are then
+        full: whether to include fields with default values.
+        units: receives the unit of each field by dotted name; None for none.
+        left_out: receives the names of fields that are not data, such as functions; they are
             written as None.
 
     Raises:
-        ParameterError: it holds what is no data, and left_out is None.
+        ParameterError: the part holds something other than data, and left_out is None.
     """
     return _as_data(part, UNSET if full else None, "", {} if units is None else units, left_out)
 
@@ -123,7 +123,7 @@ def _value_as_data(hint: Any, value: Any, old: Any, path: str, units: dict[str, 
         if len(classes) == 1 or (usual and old is not UNSET) or KIND in field_types(kind):
             return _as_data(value, old, path, units)
         return {KIND: kind.__name__.lower(), **_as_data(value, old, path, units)}
-    if hint is Any and callable(value):  # a function is its name, where others find it by that
+    if hint is Any and callable(value):  # an importable function is its name
         name = function_name(value)
         if name:
             return name

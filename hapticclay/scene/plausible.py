@@ -1,4 +1,4 @@
-"""What of a scenario can be run and is hardly meant: said as a warning before the run."""
+"""Warnings before a run about values that are valid but implausible."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from ..model.constants import AXES
 from ..model.operator import Operator
 from .scenario import Scenario
 
-# The most that a hand and arm at a handle may plausibly have: measured are up to 3 kg, 50 N.s/m and
-# 1 kN/m in a firm grip, so ten times that is no person's.
+# Largest plausible hand and arm at a handle: ten times the largest measured values in a firm grip,
+# 3 kg, 50 N.s/m and 1 kN/m.
 HAND_MOST = {"mass": (30.0, "kg"), "damper": (500.0, "N.s/m"), "spring": (1e4, "N/m")}
 
 
 def warn_of(scenario: Scenario) -> None:
-    """Issues a `Warning` for each value of a scenario that is hardly meant, at the user's line.
+    """Issues a `Warning` for each implausible value of a scenario, at the user's line.
 
     Args:
-        scenario: what is to be run.
+        scenario: the scenario to run.
     """
     for text in implausible(scenario):
         warnings.warn(text, Warning, stacklevel=_users_level())
 
 
 def _users_level() -> int:
-    """`stacklevel` that names the user's line, of a warning that the caller issues."""
+    """`stacklevel` of the user's line, for a warning that the caller issues."""
     level, frame = 0, sys._getframe()
     while frame and frame.f_globals.get("__name__", "").startswith("hapticclay."):
         level, frame = level + 1, frame.f_back
@@ -40,7 +40,7 @@ def _users_level() -> int:
 
 
 def implausible(scenario: Scenario) -> Iterator[str]:
-    """Field, value and plausible range of each value that is hardly meant.
+    """Field, value and plausible range of each implausible value.
 
     Args:
         scenario: the scenario.
@@ -67,7 +67,7 @@ def _hand_parts(field: str, hand: Operator | None) -> Iterator[str]:
 
 
 def _within(scenario: Scenario, clay: Clay) -> bool:
-    """Whether the handle can come to any point of the clay."""
+    """Whether the handle can reach any point of the clay."""
     laws = [(*law.lines, law.some) for law in clay.laws if law.some.any()]
     inside = np.zeros((3, 3), dtype=bool)
     inside[1, 1] = True

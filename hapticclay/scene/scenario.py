@@ -31,7 +31,7 @@ from .given_values import merged_values, values_of
 from .text import scenario_rows
 
 SERVO_STEP = 1.0  # radians of the servo's fastest mode in a step: stable below 2, and 4 % off at 1
-WHOLE = 1e-6  # by which Ts/dt may differ from a whole number
+WHOLE = 1e-6  # tolerance of Ts/dt from a whole number
 REACH_MARGIN = 1e-3  # [m] short of the stretched and the folded arm, where no force can be rendered
 FOLD_MARGIN = math.radians(1.001)  # of the elbow, likewise: a run ends at 1 degree (`monitor.FOLD`)
 
@@ -49,7 +49,7 @@ Control = Literal["continuous", "sampled"]
 Render = Literal["held", "physical"]
 
 SCENARIO_SCHEMA, SCENARIO_SCHEMA_0_2 = "hapticclay-scenario-2", "hapticclay-scenario-1"
-EXPERIMENTS: dict[str, Any] = {}  # classes of `experiments`, by the name that files give them
+EXPERIMENTS: dict[str, Any] = {}  # classes of `experiments`, by their name in files
 
 
 @named
@@ -162,7 +162,7 @@ class Scenario:
 
     @classmethod
     def of(cls, settings: Mapping[str, Any], *changes: Mapping[str, Any]) -> Scenario:
-        """The scenario of plain data: its fields; or an experiment, its parameters and fields.
+        """Makes a scenario from plain data: fields, or an experiment with parameters and fields.
 
         Args:
             settings: the data, as in a file (docs/scenarios.md).
@@ -245,7 +245,7 @@ class Scenario:
         return any(x is not None and x.varies for x in (self.muscle, self.command))
 
     def _check_servo(self) -> None:
-        """Refuses a servo too fast for the step, which would diverge by itself."""
+        """Refuses a servo too fast for the step; the servo alone would diverge."""
         fastest = max(x.stiffness for servo in self.servo for x in (servo.G, servo.S)) ** 0.5
         fast = self.control == "continuous" and self.integrator == "fast"
         if fast and self.dt * fastest >= SERVO_STEP:
@@ -264,11 +264,11 @@ class Scenario:
 
     @property
     def rotated(self) -> bool:
-        """Whether clay ties the axes together, its own not being x and y."""
+        """Whether rotated clay couples the axes."""
         return self.clay is not None and self.clay.angle != 0.0
 
     def _check_rotated_axes(self) -> None:
-        """Refuses rotated axes where clay is stiff: see docs/equations.md, section 4."""
+        """Refuses rotated axes in stiff clay: see docs/equations.md, section 4."""
         clay = self.clay
         if clay is None or not self.rotated:
             return
@@ -282,7 +282,7 @@ class Scenario:
             raise ParameterError("clay.angle", clay.angle, bound)
 
     def _soft_damping(self) -> float:
-        """Damping of clay up to which no kick is split: see damping.split_damping [N.s/m]."""
+        """Largest damping at which no kick is split: see damping.split_damping [N.s/m]."""
         held = self.control == "sampled" and self.render == "held"
         if held or self.integrator == "accurate":
             return math.inf
@@ -321,7 +321,7 @@ class Scenario:
 
 
 def choose_step(part: Any) -> None:
-    """Makes a dt that was not given a whole part of Ts: that of a class is told by its identity.
+    """Makes a dt that was not given a whole part of Ts; `is` recognises the default.
 
     Args:
         part: a scenario, or an experiment, before its fields are checked.
@@ -334,7 +334,7 @@ def choose_step(part: Any) -> None:
 
 
 def _compensators(given: Any) -> Any:
-    """Compensators of what may be systems of other packages: one, or a pair."""
+    """Converts one compensator, or a pair, from systems of other packages."""
     if isinstance(given, tuple) and len(given) == 2 and not isinstance(given[0], list | tuple):
         return Compensator.of(given[0]), Compensator.of(given[1])
     return Compensator.of(given)

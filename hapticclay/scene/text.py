@@ -1,4 +1,4 @@
-"""What a scenario is, in a few lines: for prompts, notebooks and `hapticclay info`."""
+"""Short description of a scenario for prompts, notebooks and `hapticclay info`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def scenario_rows(scenario: Any) -> list[tuple[str, str]]:
-    """Name and value, with unit, of what tells a scenario from others.
+    """Names and values, with units, that characterise a scenario.
 
     Args:
         scenario: the scenario.
@@ -46,7 +46,7 @@ def scenario_rows(scenario: Any) -> list[tuple[str, str]]:
 
 
 def clay_text(clay: Clay | None) -> str:
-    """What clay resists with, the ranges of its quantities.
+    """Resistance of clay, with the ranges of its quantities.
 
     Args:
         clay: the clay; None for none.

@@ -22,11 +22,11 @@ from .files import read_settings, write_part
 from .given_values import make_part
 from .scenario import Scenario
 
-LEVER = 0.24  # [m] link 1, which is the device: its motions are small beside this
-STRONG = (1e6, 1e6)  # [N.m] motors that no wall drives into their limits
+LEVER = 0.24  # [m] link 1, which is the device: its motions are much smaller
+STRONG = (1e6, 1e6)  # [N.m] motors that no wall saturates
 UPRIGHT = 0.5 * math.pi  # [rad] joint 1 where x = 0
 WALL_SCHEMA, WALL_SCHEMA_0_2 = "hapticclay-wall-2", "hapticclay-wall-1"
-SAMPLE_STEPS = 8  # engine steps a sample, so that the error of a step is far below that of the hold
+SAMPLE_STEPS = 8  # engine steps per sample: the error of a step is far below that of the hold
 MASS_MAX = 1e6  # [kg]
 
 
@@ -98,7 +98,7 @@ class VirtualWall:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> VirtualWall:
-        """The wall of a file: fields by name, as in `device.mass = 0.1`, `Ts = "1 ms"`.
+        """Reads a wall from a file: fields by name, as in `device.mass = 0.1`, `Ts = "1 ms"`.
 
         Args:
             path: the file, .toml or .json.
@@ -144,17 +144,17 @@ class VirtualWall:
         muscle: Signal | None = None,
         steps: int = SAMPLE_STEPS,
     ) -> Scenario:
-        """Build a run of it: link 1 of an arm is the device, the wall a sampled controller.
+        """Makes a scenario: link 1 of an arm is the device, the wall a sampled controller.
 
-        Motions of 1 cm move it by 3 parts in 1e4 off a straight line (the square of x over twice
+        A motion of 1 cm deviates from a straight line by 3 parts in 1e4 (the square of x over twice
         LEVER squared).
 
         Args:
             t_max: length of the run [s].
             push: velocity at the start [m/s].
-            start: place at the start [m].
+            start: position at the start [m].
             muscle: force of the operator on x over time [N]; None for none.
-            steps: engine steps a sample, such that dt = Ts/steps lies within 1e-6 to 0.02 s.
+            steps: engine steps per sample, such that dt = Ts/steps lies within 1e-6 to 0.02 s.
         """
         d, hand, lever, counts = self.device, self.hand, LEVER, None
         if d.quantum:
@@ -196,14 +196,14 @@ class VirtualWall:
 
 
 def wall_law(t, q, qd, fh, state, params):
-    """The law of a virtual wall as a `Controller`: torque of joint 1, which moves the handle in x.
+    """Law of a virtual wall for a `Controller`: torque of joint 1, which moves the handle in x.
 
     Args:
         t: time [s].
         q: joint angles as measured [rad].
         qd: joint rates as measured [rad/s].
         fh: hand force as measured, (x, y) [N]; not used.
-        state: velocity at the last sample [m/s], and 1.0 where there was one.
+        state: velocity at the last sample [m/s], and 1.0 if there was one.
         params: K [N/m], B [N.s/m], M [kg], lever of joint 1 [m], Ts [s], 1.0 for a surface.
 
     Returns:

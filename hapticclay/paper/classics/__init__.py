@@ -1,4 +1,4 @@
-"""Classic results of haptics, each beside runs of the simulator: a page and a command for each."""
+"""Classic results of haptics, compared with runs: one page and one command for each."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import importlib
 from ...errors import choice
 from .classic import Classic
 
-CLASSICS = (  # a module of this folder each, in the order of the years
+CLASSICS = (  # one module of this folder each, by year
     "colgate1997",
     "hannaford2002",
     "abbott2005",
@@ -18,7 +18,7 @@ CLASSICS = (  # a module of this folder each, in the order of the years
 
 
 def classic(name: str) -> Classic:
-    """A classic by name; its module is imported only now.
+    """Returns a classic by name; imports its module on demand.
 
     Args:
         name: as in CLASSICS.

@@ -1,4 +1,4 @@
-"""Abbott and Okamura 2005: an encoder and friction decide, beside damping, what wall is passive."""
+"""Abbott and Okamura 2005: passive walls depend on damping, friction and encoder."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MASS, DAMPER, FRICTION, TS = 0.1, 5.0, 0.05, 1e-3  # kg, N.s/m, N, s
 QUANTA = (4e-6, 1e-5, 2e-5, 4e-5)  # [m]
 QUICK_QUANTA = (4e-6, 2e-5)
 FOUND = 0.01  # share: friction along the large path, damping along the small one
-ENERGY = 0.02  # share: friction that turns round in one of 32 steps, beside what is left over
+ENERGY = 0.02  # share: friction that reverses in one of 32 steps, relative to the remainder
 LARGE, SMALL_SHARE = 2e-3, 0.01  # [m] and of the quantum: amplitudes of the two zigzags
 
 
@@ -28,21 +28,21 @@ def bound(quantum: float) -> float:
     """K = min(2 b/Ts, 2 fc/Delta) [N/m].
 
     Args:
-        quantum: Delta of the encoder [m].
+        quantum: Delta, distance per encoder count [m].
     """
     return min(2.0 * DAMPER / TS, 2.0 * FRICTION / quantum)
 
 
 def _energies(wall: VirtualWall) -> tuple[float, float]:
-    """Energy that runs along a large and a small zigzag take over a period [J]."""
+    """Energy absorbed per period in runs along a large and a small zigzag [J]."""
     quantum = wall.device.quantum
     large = zigzag(round(LARGE / quantum) * quantum)
-    small = zigzag(SMALL_SHARE * quantum, 0.5 * quantum)  # about an edge of the encoder
+    small = zigzag(SMALL_SHARE * quantum, 0.5 * quantum)  # around an encoder edge
     return taken_energy(wall, large), taken_energy(wall, small)
 
 
 def _modes(tell: Tell) -> list[Row]:
-    """The two modes, each active while the other is passive."""
+    """The two modes; each can be active while the other is passive."""
     tell("the two modes")
     damped, rubbed = _wall(4e-6, 1.2 * 2.0 * DAMPER / TS), _wall(4e-5, 1.2 * 2.0 * FRICTION / 4e-5)
     rows = []

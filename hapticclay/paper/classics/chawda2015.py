@@ -1,4 +1,4 @@
-"""Chawda, Celik and O'Malley 2015: the cut-off of the velocity filter, and the Z-width."""
+"""Chawda, Celik and O'Malley 2015: cut-off of the velocity filter and Z-width."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ SMOOTH = VirtualWall(device=Device(MASS, DAMPER), Ts=TS)
 Cutoffs = tuple[float | None, ...]
 CUTOFFS: Cutoffs = (10.0, 30.0, 100.0, 300.0, None)  # [Hz]
 QUICK_CUTOFFS: Cutoffs = (10.0, 30.0, None)
-NYQUIST = 0.5 / TS  # [Hz] where no filter is drawn
-AROUND, SOFTEST = 3000.0, 100.0  # [N/m] where searches begin
-AT_B = 10.0  # [N.s/m] damping of which K is compared
+NYQUIST = 0.5 / TS  # [Hz] at which "no filter" is drawn
+AROUND, SOFTEST = 3000.0, 100.0  # [N/m] start of searches
+AT_B = 10.0  # [N.s/m] damping at which K is compared
 B = (0.0, 1.0, 3.0, AT_B, 20.0, 30.0)
-FOUND = 5e-3  # share: paths of finite slowness
-MARGIN = 1.05  # ratio that tells an optimum from the ragged edge of a rough device
+FOUND = 5e-3  # share: test paths are not infinitely slow
+MARGIN = 1.05  # ratio that separates an optimum from the irregular limit of a rough device
 
 
 def _names(cutoffs: Cutoffs) -> str:
@@ -33,7 +33,7 @@ def _names(cutoffs: Cutoffs) -> str:
 
 
 def _stiffest(wall: VirtualWall, cutoffs: Cutoffs, B: tuple[float, ...]) -> list[list[float]]:
-    """Largest stable K for each cut-off and B, by runs [N/m]."""
+    """Largest stable K for each cut-off and B, from runs [N/m]."""
     families = ([replace(wall, velocity_filter=f, B=x) for x in B] for f in cutoffs)
     return [stiffest(walls, [AROUND] * len(B), SOFTEST, PRESS, unshown) for walls in families]
 
@@ -44,7 +44,7 @@ def _words(cutoffs: Cutoffs, K: list[float]) -> str:
 
 
 def _trade_off(quick: bool, tell: Tell) -> tuple[list[Row], tuple[Curve, ...]]:
-    """The two sides of a filter: phase alone, and phase with noise."""
+    """The trade-off of a filter: phase lag alone, and phase lag with noise."""
     cutoffs, dampings = (QUICK_CUTOFFS, (AT_B,)) if quick else (CUTOFFS, B)
     tell("cut-offs, exact position")
     smooth = [K[0] for K in _stiffest(SMOOTH, cutoffs, (AT_B,))]

@@ -1,4 +1,4 @@
-"""What the classics share: what one is, what it found, and how its claims are marked."""
+"""Base of the classics: sources, results, and how claims are marked."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Found:
-    """What the runs of a classic gave.
+    """Results of the runs of a classic.
 
     Attributes:
         rows: the table of claims.
@@ -32,15 +32,15 @@ class Found:
 
 @dataclass(frozen=True)
 class Classic:
-    """A published result and the runs that stand beside it.
+    """A published result and the runs that check it.
 
     Attributes:
-        name: of the command and of the page.
-        title: in a few words.
+        name: name of the command and the page.
+        title: short title.
         citation: authors, title, journal, year.
-        read: what of the source could be read for this page, and what could not.
-        method: how the runs find what is claimed.
-        make: makes the runs: whether quick, and what to call with the name of each step.
+        read: which parts of the source were available, and which were not.
+        method: how the runs check the claims.
+        make: function that makes the runs; arguments: quick, and a callback for step names.
     """
 
     name: str
@@ -52,11 +52,11 @@ class Classic:
 
 
 def holds(cells: str, ours: bool, status: str, reason: str) -> Row:
-    """A row of a claim that holds or not: 1 is expected.
+    """A row for a claim that holds or not; 1 is expected.
 
     Args:
         cells: "claim | place | as printed".
-        ours: whether the runs show it.
+        ours: whether the runs confirm it.
         status: as in CLASSIC_STATUSES.
         reason: the numbers behind it.
     """

@@ -1,4 +1,4 @@
-"""Colgate and Schenkel 1997: how stiff a sampled wall may be and stay passive."""
+"""Colgate and Schenkel 1997: the stiffest passive sampled wall."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from .classic import BESIDE, FORMULA, Classic, Found, Tell, holds
 
 MASS, DAMPER, TS = 0.1, 2.0, 1e-3  # kg, N.s/m, s
 WALL = VirtualWall(device=Device(MASS, DAMPER), Ts=TS)
-FOUND = 5e-3  # share of K: paths as slow as pi/48 a sample, where the line is that of pi/infinity
-ENERGY = 1e-3  # share: forces of 2 m v at each corner are summed over the steps of the engine
+FOUND = 5e-3  # share of K: slowest paths at pi/48 a sample; the line is for pi/infinity
+ENERGY = 1e-3  # share: impulses of 2 m v at the corners are summed over engine steps
 AMPLITUDE = 1e-4  # [m] of the zigzag
-STEPS = 8  # engine steps a sample; the zigzag's energy is exact but for one part in them
+STEPS = 8  # engine steps per sample; the zigzag's energy is exact to one part in this number
 
 
 def bound(wall: VirtualWall) -> float:
     """K of b = K Ts/2 + |B| [N/m]; 0 where no K is passive.
 
     Args:
-        wall: all but K.
+        wall: all fields but K.
     """
     return max(0.0, 2.0 * (wall.device.damper - abs(wall.B)) / wall.Ts)
 
 
 def _limits(quick: bool, tell: Tell) -> Iterator[tuple[str, VirtualWall, float]]:
-    """Walls whose largest passive K is searched for by runs."""
+    """Walls with the largest passive K, found by runs."""
     cases = {
         "b = 2 N.s/m, Ts = 1 ms": WALL,
         "the same, B = 1 N.s/m": replace(WALL, B=1.0),
@@ -51,7 +51,7 @@ def _limits(quick: bool, tell: Tell) -> Iterator[tuple[str, VirtualWall, float]]
 
 
 def _worst_path() -> Iterator[Row]:
-    """The energy that a hand at half the sampling frequency draws, above and below the bound."""
+    """Energy that a hand at half the sampling frequency extracts, above and below the bound."""
     for share, sign in ((0.9, "takes"), (1.1, "gives")):
         wall = replace(WALL, K=share * bound(WALL))
         A, b, K = AMPLITUDE, DAMPER, wall.K
@@ -66,7 +66,7 @@ def _worst_path() -> Iterator[Row]:
 
 
 def _passive_is_stable(tell: Tell) -> Row:
-    """Stability at the passive limit in the hands of a range, by runs."""
+    """Stability at the passive limit with a range of hands, from runs."""
     tell("stability in a hand")
     hands = (None, Operator(0.5, 2.0, 200.0))
     walls = [replace(WALL, operator=x) for x in hands]
@@ -105,7 +105,7 @@ def make(quick: bool, tell: Tell) -> Found:
     """Makes the runs.
 
     Args:
-        quick: three limits by runs and no hand.
+        quick: only three limits by runs, and no hand.
         tell: called with the name of each step.
     """
     found = list(_limits(quick, tell))

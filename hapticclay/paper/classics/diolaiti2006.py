@@ -1,4 +1,4 @@
-"""Diolaiti et al. 2006: friction holds walls that are not passive, up to a size of motion."""
+"""Diolaiti et al. 2006: friction stabilises walls that are not passive, for small motions."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Tell, holds
 MASS, DAMPER, FRICTION, TS = 0.1, 0.1, 0.05, 1e-3  # kg, N.s/m, N, s
 WALL = VirtualWall(device=Device(MASS, DAMPER, FRICTION), Ts=TS)
 STIFF, QUICK_STIFF = (1000.0, 2000.0, 4000.0, 8000.0), (8000.0,)  # [N/m]
-THRESHOLD = 0.03  # share: harmonics that a describing function leaves out, and a bisection to 2 %
-BRACKET = 1.02  # ratio of two speeds that a search ends between
-SPAN = 2.0  # ratio of its ends to the scale 2 fc/(K Ts), which knows no describing function
+THRESHOLD = 0.03  # share: harmonics neglected by the describing function, and bisection to 2 %
+BRACKET = 1.02  # ratio of two speeds at which a search ends
+SPAN = 2.0  # ratio of its ends to the scale 2 fc/(K Ts), independent of the describing function
 ROUGH = Device(MASS, 0.5, 0.02, 5e-5)  # a device with an encoder, passive up to 800 N/m
-BUZZ = 2.0  # [N.s/m] virtual damping at which a buzz of ROUGH is above 1 um
+BUZZ = 2.0  # [N.s/m] virtual damping at which ROUGH buzzes by more than 1 um
 
 
 def damping_needed(wall: VirtualWall) -> float:
-    """Physical damping at which the linear wall is on the border of stability [N.s/m].
+    """Physical damping at which the linear wall is marginally stable [N.s/m].
 
     Args:
-        wall: with its K; friction is left out.
+        wall: wall with its K; friction is ignored.
     """
 
     def unstable(b: float) -> bool:
@@ -40,23 +40,23 @@ def damping_needed(wall: VirtualWall) -> float:
 
 
 def threshold(wall: VirtualWall) -> float:
-    """Speed of an oscillation that friction just holds, by its describing function [m/s].
+    """Speed of an oscillation that friction just balances, by its describing function [m/s].
 
-    To a sine of speed V Coulomb friction is a damper 4 fc/(pi V); the oscillation goes on where
-    it makes up for the damping that the device lacks.
+    For a sine of speed V, Coulomb friction acts as a damper 4 fc/(pi V). The oscillation persists
+    if this equals the missing damping of the device.
 
     Args:
-        wall: with its K and friction.
+        wall: wall with its K and friction.
     """
     d = wall.device
     return 4.0 * d.friction / (math.pi * (damping_needed(wall) - d.damper))
 
 
 def held_speed(wall: VirtualWall) -> float:
-    """Largest speed at the start from which a wall comes to rest, by runs [m/s].
+    """Largest initial speed from which a wall comes to rest, from runs [m/s].
 
     Args:
-        wall: with its K and friction; 2 fc/(K Ts) is the scale around which the search begins.
+        wall: wall with its K and friction; the search starts around the scale 2 fc/(K Ts).
     """
     around = 2.0 * wall.device.friction / (wall.K * wall.Ts)
     low, high = around / SPAN, around * SPAN
@@ -104,7 +104,7 @@ def _thresholds(quick: bool, tell: Tell) -> tuple[list[Row], Chart]:
 
 
 def _stable_but_active(tell: Tell) -> Row:
-    """A wall that a hand can draw energy from, and that comes to rest all the same."""
+    """A wall that is active, since a hand can extract energy, yet comes to rest."""
     tell("a wall that is stable and not passive")
     limit = passivity_limit(VirtualWall(device=ROUGH))
     stiff = VirtualWall(K=1.2 * limit, device=ROUGH)
@@ -120,7 +120,7 @@ def _stable_but_active(tell: Tell) -> Row:
 
 
 def _quantum(tell: Tell) -> Row:
-    """Friction of half a quantum's force tells rest from a buzz."""
+    """Friction of half the force of a quantum separates rest from a buzz."""
     tell("quantum and friction")
     edge = 2.0 * ROUGH.friction / ROUGH.quantum
     tried = [

@@ -1,4 +1,4 @@
-"""Hannaford and Ryu 2002: an observer of energy and a damper that keep a wall passive."""
+"""Hannaford and Ryu 2002: an energy observer and a damper keep a wall passive."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Tell, holds
 
 MASS, DAMPER, TS = 1.0, 1.0, 1e-3  # kg, N.s/m, s
 HAND = Operator(0.2, 5.0, 100.0)
-PRESS, SPEED, START = 2.0, 0.05, -0.002  # N, m/s, m: it meets the wall at x = 0
-STIFF, DELAY, SOFT = 1e5, 15, 1e3  # N/m, samples, and N/m of the wall that is late
+PRESS, SPEED, START = 2.0, 0.05, -0.002  # N, m/s, m: the handle meets the wall at x = 0
+STIFF, DELAY, SOFT = 1e5, 15, 1e3  # N/m, samples, and N/m of the delayed wall
 T_MAX = 2.0  # [s]
-STEPS = 4  # engine steps a sample
-PLAIN, PUBLISHED, FREE, OURS = 0.0, 1.0, 2.0, 3.0  # the damper: none, bounded, unbounded, ours
-MOST_DAMPING = 0.5  # of mass/Ts: the damper stops half of the speed within a sample
-LAST = 0.2  # share of a run in which it must have come to rest
-REST = 0.1  # largest speed there over the largest of the run
-OBSERVED = 1e-3  # share: the hand's spring over a sample is taken at the mean of its ends
+STEPS = 4  # engine steps per sample
+PLAIN, PUBLISHED, FREE, OURS = 0.0, 1.0, 2.0, 3.0  # damper: none, bounded, unbounded, ours
+MOST_DAMPING = 0.5  # of mass/Ts: the damper halves the speed within a sample
+LAST = 0.2  # share of a run by which the handle must rest
+REST = 0.1  # ratio of the largest speed there to that of the run
+OBSERVED = 1e-3  # share: the hand's spring over a sample is evaluated at the mean of its ends
 
 
 def observed_wall(t, q, qd, fh, state, params):
-    """A wall on one side behind a delay, with a passivity observer and controller, as a law.
+    """Control law of a delayed one-sided wall with a passivity observer and controller.
 
     Args:
         t: time [s].
         q: joint angles [rad].
         qd: joint rates [rad/s].
         fh: hand force [N]; not used.
-        state: energy that the wall has taken [J], place [m] and force [N] of the last sample, 1.0
-            where there was one, then the forces on their way.
-        params: K [N/m], lever [m], Ts [s], which damper, mobility of the handle [1/kg].
+        state: energy that the wall has taken [J], position [m] and force [N] of the last sample,
+            1.0 if there was one, then the delayed forces.
+        params: K [N/m], lever [m], Ts [s], index of the damper, mobility of the handle [1/kg].
 
     Returns:
         Torques; the next state.
@@ -61,11 +61,11 @@ def observed_wall(t, q, qd, fh, state, params):
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """A run against the wall, and the energy that its observer saw.
+    """A run against the wall, and the energy seen by its observer.
 
     Attributes:
-        record: of the run, a row a sample.
-        force: of the wall, as it is held [N], (n,).
+        record: record of the run, one row per sample.
+        force: held force of the wall [N], (n,).
     """
 
     record: Record
@@ -73,12 +73,12 @@ class Contact:
 
     @property
     def energy(self) -> np.ndarray:
-        """Energy that the wall has taken by each sample, force held times the way [J], (n,)."""
+        """Energy that the wall has taken by each sample, held force by displacement [J], (n,)."""
         return np.append(0.0, np.cumsum(self.force[:-1] * np.diff(self.record.p[:, 0])))
 
     @property
     def rest(self) -> float:
-        """Largest speed in the last part of the run over the largest of the run."""
+        """Ratio of the largest speed in the last part of the run to the largest of the run."""
         v = np.abs(self.record.v[:, 0])
         if self.record.outcome.code != "time limit":
             return 1.0
@@ -86,12 +86,12 @@ class Contact:
 
 
 def contact(K: float, damper: float, delay: int = 0) -> Contact:
-    """Run a device and a hand that press against a wall.
+    """Runs a device and a hand that press against a wall.
 
     Args:
         K: stiffness [N/m].
-        damper: which passivity controller.
-        delay: of the wall's force, behind which observer and controller are [samples].
+        damper: index of the passivity controller.
+        delay: delay of the wall's force, before observer and controller [samples].
     """
     wall = VirtualWall(device=Device(MASS, DAMPER), Ts=TS, operator=HAND, velocity="exact")
     push = Constant((PRESS, 0.0))
@@ -107,8 +107,8 @@ def contact(K: float, damper: float, delay: int = 0) -> Contact:
 def _balance(record: Record) -> np.ndarray:
     """Force of the wall over each sample, from the change of momentum of device and hand [N].
 
-    It is what slows them beyond muscle, springs and dampers: taken from the motion, not from the
-    law, so that the energy above is not the observer's own sum.
+    It is the force that remains after muscle, springs and dampers. It comes from the motion, not
+    from the law, so that the energy balance is independent of the observer's sum.
     """
     x, v = record.p[:, 0], record.v[:, 0]
     way, change = np.diff(x), np.diff(v)
@@ -157,7 +157,7 @@ def _claims(quick: bool, tell: Tell) -> tuple[list[Row], dict[str, Contact]]:
 
 
 def _observer(plain: Contact) -> Row:
-    """The observer's sum beside the energy balance of the motion."""
+    """The observer's sum compared with the energy balance of the motion."""
     K, x = STIFF, plain.record.p[:, 0]
     held = K * np.maximum(x, 0.0)
     seen = float(np.sum(held[:-1] * np.diff(x)))
@@ -175,7 +175,7 @@ def make(quick: bool, tell: Tell) -> Found:
     """Makes the runs.
 
     Args:
-        quick: one wall, without delay.
+        quick: only one wall, without delay.
         tell: called with the name of each step.
     """
     rows, shown = _claims(quick, tell)

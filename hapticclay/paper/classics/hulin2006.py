@@ -1,4 +1,4 @@
-"""Hulin et al. 2006: the boundary of stability over damping, delay, and the hand."""
+"""Hulin et al. 2006: stability boundary over damping, delay and hand."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from ..ledger import Row, row
 from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Tell, holds
 
 MASS, TS = 1.0, 1e-3  # kg, s
-RULE = 0.01  # share: the rule is of first order in (b + B) Ts/mass, see docs/equations.md
-GROWTH = 3e-3  # share to which a search by growth ends
-SMALL = 4.0  # [N.s/m] b + B where the rule holds to 1 %
+RULE = 0.01  # share: the rule is first-order in (b + B) Ts/mass, see docs/equations.md
+GROWTH = 3e-3  # relative accuracy of a search by growth
+SMALL = 4.0  # [N.s/m] b + B at which the rule holds to 1 %
 DELAYS, QUICK_DELAYS = (0.0, 0.5, 1.0, 2.0), (0.0, 1.0)  # samples
 
 
@@ -29,7 +29,7 @@ def rule(b: float, B: float, delay: float) -> float:
     """K = (b + B)/(Ts/2 + delay) [N/m].
 
     Args:
-        b: physical damping, of device and hand [N.s/m].
+        b: physical damping of device and hand [N.s/m].
         B: virtual damping [N.s/m].
         delay: in samples.
     """
@@ -37,7 +37,7 @@ def rule(b: float, B: float, delay: float) -> float:
 
 
 def _by_runs(wall: VirtualWall, *B: float) -> list[float]:
-    """Largest stable K at each B, from the growth of runs [N/m]; the rule is where they begin."""
+    """Largest stable K at each B, from the growth of runs [N/m]; searches start at the rule."""
     b, samples = wall.device.damper + wall.hand.damper, wall.delay / wall.Ts
     around = [rule(b, x, samples) for x in B]
     return stiffest([replace(wall, B=x) for x in B], around, min(around), PRESS, unshown)
@@ -63,7 +63,7 @@ def _rows_of_the_rule(quick: bool, tell: Tell) -> list[Row]:
 
 
 def _row_of_the_hand(tell: Tell) -> Row:
-    """A hand adds its damper to the device's, and its mass moves the boundary little."""
+    """A hand adds its damping to the device; its mass hardly moves the boundary."""
     tell("stable K in a hand")
     hand = Operator(0.5, 3.0, 0.0)
     return row(
@@ -76,7 +76,7 @@ def _row_of_the_hand(tell: Tell) -> Row:
 
 
 def _boundary(quick: bool, tell: Tell) -> tuple[list[Row], Chart]:
-    """The whole boundary, where the rule is no rule any more."""
+    """The whole boundary, including where the rule fails."""
     rows, curves, unit = [], [], MASS / TS
     shares = (0.1, 0.4) if quick else (0.1, 0.4, 0.8)
     for delay in (0.0, 1.0) if quick else (0.0, 1.0, 2.0):
@@ -117,7 +117,7 @@ def make(quick: bool, tell: Tell) -> Found:
     """Makes the runs.
 
     Args:
-        quick: fewer delays and dampings, and no hand.
+        quick: fewer delays and dampings, no hand.
         tell: called with the name of each step.
     """
     rows = _rows_of_the_rule(quick, tell)
