@@ -83,15 +83,11 @@ class ClientLog:
     def __init__(self, most: int = MOST_ROWS):
         """Makes an empty log.
 
-                Args:
-        <<<<<<< HEAD
-                    most: rows to keep, the newest, 1 to 10^9.
+        Args:
+            most: number of newest rows to keep, 1 to 10^9.
 
-                Raises:
-                    ParameterError: most is out of its bounds.
-        =======
-                    most: number of newest rows to keep.
-        >>>>>>> doc1
+        Raises:
+            ParameterError: most is out of its bounds.
         """
         self.missed = 0
         self._rows = Rows(12, integer("most", most, 1, 10**9))  # numbers of an Exchanged
