@@ -156,7 +156,7 @@ def test_instability_is_a_result_with_advice(capsys, tmp_path):
         (["help", "nope"], ["command = 'nope'"]),
         (["--nonsense"], ["--nonsense: no option of hapticclay; see hapticclay --help"]),
         (["info"], ["info needs record: a path"]),
-        (["compare"], ["compare needs source: one or more, each a path"]),
+        (["compare"], ["2 to 5 files"]),
         (["device", "srve"], ["action = 'srve'", "did you mean 'serve'?"]),
         (["export", "o", "--format", "cvs"], ["--format = 'cvs'", "did you mean 'csv'?"]),
         (["run", "variable", "--growth", "nne"], ["--growth = 'nne'", "did you mean 'none'?"]),
