@@ -292,7 +292,7 @@ class Grid(CellLaw):
         )
         for field, edges in names:
             if len(edges) < 2:
-                raise ParameterError(field, edges, "must be two borders or more, an outline")
+                raise ParameterError(field, edges, "must have at least two edges per axis")
         middles = [[0.5 * (a + b) for a, b in zip(e, e[1:], strict=False)] for e in (x, y)]
         inner = [[b(at, across) for across in middles[1]] for at in middles[0]]
         return cls(x, y, _framed(inner, outside))

@@ -263,7 +263,7 @@ def fit_wall(exchanges: Exchanges) -> tuple[WallFit | None, str]:
     contact = np.isfinite(size) & (size > FORCE_LEAST)
     contact[:LATEST] = False  # its state may have come with the inventory
     if contact.sum() < FEWEST:
-        return None, f"{int(contact.sum())} messages had a force: a wall is told from {FEWEST}"
+        return None, f"{int(contact.sum())} messages had a force: a fit needs {FEWEST}"
     normal = np.linalg.svd(force[contact], full_matrices=False)[2][0]
     normal = normal if normal[np.argmax(np.abs(normal))] > 0.0 else -normal
     found = [_fitted(exchanges, force @ normal, normal, contact, back) for back in range(1, LATEST)]
@@ -271,7 +271,10 @@ def fit_wall(exchanges: Exchanges) -> tuple[WallFit | None, str]:
     if best.explained < EXPLAINED:
         return None, f"a spring and damper explain {best.explained:.0%} of the force"
     if best.K <= 0.0 or best.K_error > DOUBT * best.K:
-        return None, f"stiffness {best.K:.3g} +- {best.K_error:.2g} N/m: the forces tell too little"
+        return (
+            None,
+            f"stiffness {best.K:.3g} +- {best.K_error:.2g} N/m: the forces do not determine it",
+        )
     return best, ""
 
 

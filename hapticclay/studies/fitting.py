@@ -397,7 +397,7 @@ def _warnings(r: Fitted, s: Sliding, count: float) -> tuple[str, ...]:
         out.append(
             f"speeds of the middle {100 * MIDDLE:g} % of samples range over a factor of "
             f"{fast / slow:.2g} only, less than {NARROW:g}: terms of the law, n above all, can "
-            "hardly be told apart"
+            "hardly be distinguished"
         )
     if s.motion and fast > FAST:
         out.append(

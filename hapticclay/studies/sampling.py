@@ -163,7 +163,7 @@ class Sweep:
                 told = (
                     "must have a count, as in 1:1000:50log"
                     if self.runs is None
-                    else "takes no count: runs has it"
+                    else "must have no count: runs gives it"
                 )
                 raise ParameterError(
                     name,

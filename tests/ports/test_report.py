@@ -70,7 +70,7 @@ def test_the_standard_error_holds():
     [
         (lambda e: dataclasses.replace(e, asked=0.0 * e.asked), "0 messages had a force"),
         (lambda e: dataclasses.replace(e, asked=np.ones_like(e.asked)), "explain 0%"),
-        (lambda e: dataclasses.replace(e, asked=-e.asked), "tell too little"),
+        (lambda e: dataclasses.replace(e, asked=-e.asked), "do not determine it"),
     ],
 )
 def test_what_is_no_wall_is_not_told(change, note):

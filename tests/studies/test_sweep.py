@@ -566,8 +566,8 @@ def test_without_a_terminal_a_line_tells_every_tenth(tmp_path, capsys, monkeypat
 @pytest.mark.parametrize(
     "design,text,word",
     [
-        ("lhs", "b=1:1000:50log", "takes no count"),
-        ("sobol", "b=1:2:2", "takes no count"),
+        ("lhs", "b=1:1000:50log", "must have no count"),
+        ("sobol", "b=1:2:2", "must have no count"),
         ("grid", "b=1:2", "have a count"),
         ("grid", "b=1:10log", "have a count"),
     ],

@@ -161,7 +161,7 @@ CLASSIC = Classic(
     "complex shape, and a new linear condition for short delays, fast sampling and relatively low "
     "damping. The figures of both and their numbers could not; the condition "
     "K < (b + B)/(Ts/2 + td) and the exact boundary are derived in equations.md, section 7.",
-    "A wall is stable if the oscillation of a run decays; K is searched for at which its growth "
-    "rate is zero. The search is told neither rule nor boundary beyond where to begin.",
+    "A wall is stable if the oscillation of a run decays. A search finds the K at which its growth "
+    "rate is zero; of rule and boundary it uses a starting point alone.",
     make,
 )
