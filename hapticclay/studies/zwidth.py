@@ -239,8 +239,9 @@ def zwidth(
 
     Args:
         wall: device, hand and timing; its own K and B are ignored. Or the arm with its servo and
-            compensator, or a scenario, of which it uses x (for y pass `PushedLoop.of(scenario,
-            "y")`): the plane is then that of the clay's b and k, at the gain of the loop.
+            compensator, or a scenario, of which it uses x (for y pass
+            `PushedLoop.of(scenario, "y")`): the plane is then that of the clay's b and k, at the
+            gain of the loop.
         vary: parameter of a family: "Ts", "delay", "quantum", "damper", "friction", "mass",
             "filter" or "velocity_window", for an arm "Ts", "delay" or "gain"; "" for one region.
         values: values of the parameter [SI]; for "filter" None means no filter.
