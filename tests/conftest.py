@@ -41,7 +41,6 @@ GROUPS = {  # by fixture, or by the end of a file's name: tests that run in one 
     "poses": "poses",
     "whole": "sweep",
     "screen": "gui",
-    "page": "gui",
     "test_page.py": "gui",
 }
 PLAIN = {  # files whose tests are about steps in Python

@@ -77,6 +77,7 @@ from . import (
 )
 from . import hardware as wires
 from .engine import mujoco
+from .inlining import InlinedCompiler
 from .machine_code import COMPLETE, cache_folder, compile_time, is_kept, mark
 from .notice import Notice
 
@@ -87,7 +88,10 @@ SOURCES = (
     engine_step, begin, energy, laws, many, monitor, driver, friction, sampled, sampled_controller,
     wires, ends, instant, march, modes, search, vector,
 )  # fmt: skip
-LAW: Any = {"error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
+LAW: Any = {
+    "error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False,
+    "pipeline_class": InlinedCompiler,
+}  # fmt: skip
 ENTRY: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
 SIGNALS = [getattr(signal, x) for x in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, x)]
 # measured: time that machine code saves in a careful step, and that it takes to load [s]

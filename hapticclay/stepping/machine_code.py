@@ -16,11 +16,11 @@ from typing import Any
 from . import parts as p_
 
 # measured: time to compile the whole steps of the plain cut, and what a part adds to it [s]
-COMPILING = 6.0
+COMPILING = 4.0
 COMPILING_PART = {
-    p_.Form: 1.0, p_.Hand: 0.3, p_.Special: 1.0, p_.Flow: 3.5, p_.Springs: 1.5, p_.Groove: 5.0,
-    p_.Sampler: 4.0, p_.Difference: 1.0, p_.Converter: 0.5, p_.Delay: 1.0, p_.Passivity: 1.0,
-    p_.Coupling: 1.0, p_.Accurate: 2.5, p_.Modal: 4.5,
+    p_.Form: 2.0, p_.Hand: 0.3, p_.Special: 1.5, p_.Flow: 2.0, p_.Springs: 0.5, p_.Groove: 2.0,
+    p_.Sampler: 3.0, p_.Difference: 1.0, p_.Converter: 0.5, p_.Delay: 1.0, p_.Passivity: 1.0,
+    p_.Coupling: 1.0, p_.Accurate: 2.0, p_.Modal: 2.0,
 }  # fmt: skip
 # what begins the kind of more than whole steps; times that it takes as long to compile
 CARRY, COMPLETE = "many runs made together", "steps that may cross borders"

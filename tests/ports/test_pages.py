@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.snippets import printed_by
+
 DOCS = Path(__file__).parents[2] / "docs"
 
 
@@ -20,15 +22,14 @@ def test_the_test_of_the_device_page_passes(tmp_path):
     assert out.returncode == 0 and "1 passed" in out.stdout, out.stdout
 
 
-def test_the_snippet_of_the_buzz_page_prints_what_it_says():
+def test_the_snippet_of_the_buzz_page_prints_what_it_says(tmp_path):
     code = code_of("buzz.md")
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert out.stdout.splitlines() == re.findall(r"^# (.*)", code, re.M) != []
+    out = printed_by(code, tmp_path)
+    assert out.splitlines() == re.findall(r"^# (.*)", code, re.M) != []
 
 
 def test_the_snippet_of_the_page_about_devices_prints_what_it_says(tmp_path):
     code = code_of("connect.md")
-    words = [sys.executable, "-c", code]
-    out = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert out.stdout.splitlines() == re.findall(r"^# (.*)", code, re.M) != []
+    out = printed_by(code, tmp_path)
+    assert out.splitlines() == re.findall(r"^# (.*)", code, re.M) != []
     assert len((tmp_path / "device.csv").read_text().splitlines()) > 300

@@ -368,21 +368,27 @@ def test_native_is_faster():
 
 @fast
 def test_nothing_that_a_scene_lacks_is_compiled(tmp_path):
-    """Of the functions that machine code was made of, none belongs to a part that is None."""
+    """Of the functions that machine code was made of, none belongs to a part that is None.
+
+    Only the entry is turned into machine code, with all that it calls: no function twice.
+    """
     code = (
         "import sys, json, hapticclay as hc; from hapticclay.stepping import lacking, compiled; "
-        "plain = lacking.without; made = set(); "
+        "from numba.core.codegen import JITCodeLibrary as Library; "
+        "plain = lacking.without; made = set(); finish, alone = Library._finalize_specific, []; "
+        "Library._finalize_specific = lambda x: alone.append(x.name) or finish(x); "
         "name = lambda f: (f.__module__.rpartition('.')[2], f.__name__); "
         "lacking.without = lambda f, *rest: made.add(name(f)) or plain(f, *rest); "
         "s = hc.constant_cut(t_max=0.1); s = eval(sys.argv[1]); "
-        "hc.simulate(s, engine='native'); print(json.dumps(sorted(made)))"
+        "hc.simulate(s, engine='native'); print(json.dumps([sorted(made), alone]))"
     )
     env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
 
     def modules(scenario):
         words = [sys.executable, "-c", code, scenario]
         out = subprocess.run(words, env=env, capture_output=True, text=True, check=True)
-        made = json.loads(out.stdout)
+        made, alone = json.loads(out.stdout)
+        assert [x for x in alone if x in {name for _, name in made}] == ["run_whole_steps"]
         return {module for module, _ in made}, len(made)
 
     used, count = modules("s")

@@ -4,8 +4,6 @@ import json
 import re
 import shlex
 import socket
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -15,25 +13,16 @@ from hapticclay.cli import app
 from hapticclay.simulation import export
 from hapticclay.views.session import Session
 from hapticclay.views.stream import UdpStream
+from tests.snippets import printed_by
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "data.md").read_text()
 
 
-def ran(code, folder):
-    return subprocess.run(
-        [sys.executable, "-W", "error", "-c", code],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout
-
-
 def test_snippet_prints_what_it_says(tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.S)
     said = [x.partition("  # ")[2] for x in code.splitlines() if x.startswith("print(")]
-    assert ran(code, tmp_path).splitlines() == said and all(said)
+    assert printed_by(code, tmp_path).splitlines() == said and all(said)
     assert (tmp_path / "velocity.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -41,10 +30,10 @@ def test_sweep_snippet_runs_on_a_sweep(tmp_path, monkeypatch, capsys):
     text = (DOCS / "sweep.md").read_text()
     code, columns = re.findall(r"```python\n(.*?)```", text, re.S)
     monkeypatch.chdir(tmp_path)
-    assert ran(columns, tmp_path).endswith("['time limit']\n")  # no run is unstable
+    assert printed_by(columns, tmp_path).endswith("['time limit']\n")  # no run is unstable
     grid = ["--grid", "b=20:50:2log gain.x=0.5,1", "--fixed", "t_max=1 dt=0.002"]
     assert app.main(["sweep", *grid, "--out", "out/map", "--workers", "1"]) == 0
-    out = ran(code, tmp_path).splitlines()
+    out = printed_by(code, tmp_path).splitlines()
     assert out[0] == "m/s - steady speed in that clay"
     runs = hc.studies.read_sweep("out/map").to_pandas()
     assert list(runs.columns[:3]) == ["run", "b", "gain.x"] and len(runs) == 4

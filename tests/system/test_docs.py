@@ -5,8 +5,6 @@ import importlib
 import inspect
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -17,6 +15,7 @@ from hapticclay.model import constants
 from hapticclay.simulation import record
 from hapticclay.stepping import engine
 from tests.public import NAMES, told_by, used_in
+from tests.snippets import printed_by
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
@@ -24,21 +23,19 @@ README = (ROOT / "README.md").read_text()
 
 @pytest.mark.parametrize("block", re.findall(r"```python\n(.*?)```", README, re.S))
 def test_readme_snippet_runs_and_prints_what_it_says(block, tmp_path):
-    out = subprocess.run(
-        [sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
+    out = printed_by(block, tmp_path)
     said = re.findall(r"print\(.*\)  # ([^:\n]*)", block)
-    assert out.stdout.splitlines() == said and len(said) >= 3
+    assert out.splitlines() == said and len(said) >= 3
     assert (tmp_path / "out" / "record.npz").is_file()
 
 
 @pytest.mark.parametrize("page", ["stability", "limit_cycles", "hardware", "design"])
-def test_stability_pages_say_what_their_snippets_print(page):
+def test_stability_pages_say_what_their_snippets_print(page, tmp_path):
     text = (ROOT / "docs" / f"{page}.md").read_text()
     code = "\n".join(re.findall(r"```python\n(.*?)```", text, re.S))
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    out = printed_by(code, tmp_path)
     said = " ".join(re.findall(r"print\(.*\)  # ([^:\n]*)", code)).split()
-    for a, b in zip(out.stdout.split(), said, strict=True):
+    for a, b in zip(out.split(), said, strict=True):
         assert a == b or float(a) == pytest.approx(float(b), rel=1e-3)
 
 
@@ -47,17 +44,15 @@ def test_signals_page_runs(tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "signals.md").read_text(), re.S)
     assert len(code.splitlines()) <= 10
     (tmp_path / "force.csv").write_text("t,fx,fy\n0,0,0\n0.5,1,0.2\n1,0,0\n")
-    out = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert "at " in out.stdout
+    out = printed_by(code, tmp_path)
+    assert "at " in out
 
 
 @pytest.mark.parametrize("page", ["materials.md", "fit.md"])
-def test_page_says_what_its_snippet_prints(page):
+def test_page_says_what_its_snippet_prints(page, tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / page).read_text(), re.S)
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert out.stdout.splitlines() == re.findall(r"print\(.*\)  # (.*)", code) != []
+    out = printed_by(code, tmp_path)
+    assert out.splitlines() == re.findall(r"print\(.*\)  # (.*)", code) != []
 
 
 SYMPTOMS = ("wall_vibrates", "fast_enough", "theory_and_practice", "stick_slip") + (
@@ -67,14 +62,14 @@ SYMPTOMS = ("wall_vibrates", "fast_enough", "theory_and_practice", "stick_slip")
 
 
 @pytest.mark.parametrize("page", SYMPTOMS)
-def test_a_symptom_page_shows_its_cause_in_a_few_lines(page):
+def test_a_symptom_page_shows_its_cause_in_a_few_lines(page, tmp_path):
     """Its code says what it prints, its picture has a program, and the remedy follows."""
     text = (ROOT / "docs" / f"{page}.md").read_text()
     (code,) = re.findall(r"```python\n(.*?)```", text, re.S)
     assert len(list(filter(str.strip, code.splitlines()))) <= 16  # the printed lines included
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    out = printed_by(code, tmp_path)
     said = re.findall(r"print\(.*\)  # (.*)", code) or re.findall(r"^# (.*)", code, re.M)
-    assert out.stdout.splitlines() == said != []
+    assert out.splitlines() == said != []
     (picture,) = re.findall(r"!\[.*?\]\((\w+)\.png\)", text)
     assert f"examples/symptoms/{picture}.py" in text
     assert (ROOT / "examples" / "symptoms" / f"{picture}.py").is_file()
@@ -83,20 +78,18 @@ def test_a_symptom_page_shows_its_cause_in_a_few_lines(page):
     assert text.index("**Cause.**") < text.index("## Show it") and "](" in text
 
 
-def test_the_groove_page_says_what_it_prints():
+def test_the_groove_page_says_what_it_prints(tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "groove.md").read_text(), re.S)
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert out.stdout.splitlines() == re.findall(r"^# (.*)", code, re.M) != []
+    out = printed_by(code, tmp_path)
+    assert out.splitlines() == re.findall(r"^# (.*)", code, re.M) != []
 
 
 @pytest.mark.parametrize("page", ["figures.md", "labs.md", "passivity.md", "robustness.md"])
 def test_snippets_of_the_page_run_and_print_its_numbers(page, tmp_path):
     text = (ROOT / "docs" / page).read_text()
     code = "\n".join(re.findall(r"```python\n(.*?)```", text, re.S))
-    out = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    printed = re.findall(r"^[\d.e+-]+|(?<=\[)[\d.]+", out.stdout, re.M)
+    out = printed_by(code, tmp_path)
+    printed = re.findall(r"^[\d.e+-]+|(?<=\[)[\d.]+", out, re.M)
     for said in re.findall(r"print\(.*\)  # ([\d.]+)", code):
         assert any(float(x) == pytest.approx(float(said), rel=1e-3) for x in printed), said
 
@@ -130,10 +123,8 @@ BLOCKS = re.findall(r"## ([^\n]*)\n\n```python\n(.*?)```", PARTS, re.S)
 @pytest.mark.parametrize("block", [b for _, b in BLOCKS], ids=[name for name, _ in BLOCKS])
 def test_each_part_is_brought_in_ten_lines_that_print_what_they_say(block, tmp_path):
     assert len(list(filter(str.strip, block.splitlines()))) <= 10
-    out = subprocess.run(
-        [sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert out.stdout.splitlines() == re.findall(r"print\(.*\)  # (.*)", block) != []
+    out = printed_by(block, tmp_path)
+    assert out.splitlines() == re.findall(r"print\(.*\)  # (.*)", block) != []
 
 
 @pytest.mark.parametrize("line", re.findall(r"^    hapticclay (.+)$", PARTS, re.M))
@@ -287,19 +278,15 @@ START = (ROOT / "docs" / "start.md").read_text()
 
 @pytest.mark.parametrize("block", re.findall(r"```python\n(.*?)```", START, re.S))
 def test_start_page_says_what_it_prints(block, tmp_path):
-    out = subprocess.run(
-        [sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert out.stdout.splitlines() == re.findall(r"print\(.*\)  # (.*)", block) != []
+    out = printed_by(block, tmp_path)
+    assert out.splitlines() == re.findall(r"print\(.*\)  # (.*)", block) != []
 
 
 def test_the_home_page_says_what_its_ten_lines_print(tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "index.md").read_text(), re.S)
-    out = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
+    out = printed_by(code, tmp_path)
     assert len(list(filter(str.strip, code.splitlines()))) <= 10
-    assert out.stdout.splitlines() == re.findall(r"print\(.*\)  # ([^:\n]*)", code) != []
+    assert out.splitlines() == re.findall(r"print\(.*\)  # ([^:\n]*)", code) != []
 
 
 @pytest.mark.parametrize("line", re.findall(r"^    hapticclay (.+)$", START, re.M))
