@@ -188,6 +188,7 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
     monkeypatch.setattr(hits, "CLAYS", (1e1, 1e3))
     monkeypatch.setattr(throughput, "SCENES", {"free space": throughput.SCENES["free space"]})
     monkeypatch.setattr(throughput, "SHORT_QUICK", 40)  # too few to be compiled for
+    monkeypatch.setattr(throughput, "warm", lambda todo: None)  # nobody reads these times
     speed = dict(runs_a_second=1e3, over_floor_cpu=1.2, floor_us_a_run=300.0, us_a_run=360.0)
     columns = [dict(runs=n, control="continuous", peak_MiB=100.0, **speed) for n in (100, 1000)]
     monkeypatch.setattr(throughput, "column_runs", lambda sizes, control: columns)
