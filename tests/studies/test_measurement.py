@@ -263,6 +263,27 @@ def test_files_as_others_write_them(tmp_path):
     assert data.name == "a.csv" and data.reference is None and data.dt == pytest.approx(DT)
 
 
+@pytest.mark.parametrize(
+    "head, size",
+    [
+        ("time [ms],force (kN),pos [um]", (1e-3, 1e3, 1e-6)),
+        ("t,command (mm),pos [cm]", (1.0, 1e-3, 1e-2)),
+        ("t [s],input [raw],output [1]", (1.0, 1.0, 1.0)),  # no units: as they are
+    ],
+)
+def test_a_unit_in_the_name_of_a_column_is_converted(head, size, tmp_path):
+    t = np.arange(120.0)
+    text = "".join(f"{x:g},{x % 7:g},{x % 5:g}\n" for x in t)
+    (tmp_path / "a.csv").write_text(f"{head}\n{text}")
+    names = dict(zip(("t", "input", "output"), head.split(","), strict=True))
+    data = hc.studies.Measurement.load(tmp_path / "a.csv", names)
+    for got, factor, want in zip(
+        (data.t, data.input, data.output), size, (t, t % 7, t % 5), strict=True
+    ):
+        # one product of two rounded numbers
+        np.testing.assert_allclose(got, factor * want, rtol=4e-16)
+
+
 def test_command_line(tmp_path, capsys):
     data, _ = columns("S", "noise", np.random.default_rng(2))
     save(tmp_path / "rig.csv", ("time", "fh", "pos"), data.t, data.input, data.output, mark="\t")
@@ -423,6 +444,11 @@ FILE = ["identify", "--csv", "a.csv"]
         ('t,input,output\n0,1,"2\n' + ROWS, FILE, ["line 202", "'output'"]),
         ("t,input,output\n" + ROWS + "0.3,1,2\n", FILE, ["t[200]", "5 %"]),
         ("t,input,output\n" + ROWS, FILE, ["band", "too short"]),
+        (
+            "t,input,out [deg]\n" + ROWS,
+            [*FILE, "--columns", "output=out [deg]"],
+            ["'out [deg]'", "must be in m, not in deg"],
+        ),
         ("", [*FILE, "--columns", "inptu=a"], ["columns", "did you mean 'input'"]),
         ("", [*FILE, "--columns", "a"], ["columns", "t=time"]),
         ("", [*FILE, "--columns", "t=a", "t=b"], ["columns", "once"]),
