@@ -218,8 +218,9 @@ def delay_lab(quick: bool, tell: Tell) -> Lab:
         "The force of the wall comes late: a bus, a second computer, a network.",
         (
             "How many samples of delay halve the stable stiffness? Derive it from the rule.",
-            "Between whole samples the passive limit lies below the stable one, at whole samples they "
-            "meet. What does a force that changes between two samples do to the worst path of a hand?",
+            "Between whole samples the passive limit lies below the stable one, at whole samples "
+            "they meet. What does a force that changes between two samples do to the worst path of "
+            "a hand?",
             "Which device would you change to win back one sample: mass, damper or rate?",
         ),
         f"from {delays[0]:g} to {delays[-1]:g} samples: stable K {stable[0]:.4g} to "
