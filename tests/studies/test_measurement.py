@@ -176,6 +176,18 @@ def loop(delta, uh, dt):
     return t, *out.T
 
 
+def test_a_virtual_spring_takes_damping_from_the_fit():
+    """docs/identify_device.md: the fitted b is that of the device less K Ts/2 of the held spring."""
+    K, Ts, b = 20.0, 0.01, 0.5
+    push = hc.Multisine((0.05, 0.0), low=0.5, high=20.0, period=4.0, seed=1)
+    rig = hc.VirtualWall(K=K, device=hc.Device(0.1, b), Ts=Ts)
+    r = hc.simulate(rig.scenario(12.0, muscle=push, steps=5), engine="python")
+    data = hc.studies.Measurement(r.t, input=push(r.t)[:, 0], output=r.p[:, 0])
+    gain, damping, _ = hc.studies.identify_data(data, "S", band=(0.5, 8.0)).coefficients
+    # the hold is a damper to first order: (omega Ts)^2/12 of K Ts/2 at 8 Hz are 2 %
+    assert damping.value / gain.value == pytest.approx(b - 0.5 * K * Ts, abs=0.02 * 0.5 * K * Ts)
+
+
 def test_a_reference_takes_the_bias_from_a_closed_loop():
     """A muscle force of 0.7 N rms moves the handle too: without a reference it biases Th.
 
