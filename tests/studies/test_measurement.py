@@ -177,7 +177,7 @@ def loop(delta, uh, dt):
 
 
 def test_a_virtual_spring_takes_damping_from_the_fit():
-    """docs/identify_device.md: the fitted b is that of the device less K Ts/2 of the held spring."""
+    """docs/identify_device.md: the fitted b is that of the device less K Ts/2, by the hold."""
     K, Ts, b = 20.0, 0.01, 0.5
     push = hc.Multisine((0.05, 0.0), low=0.5, high=20.0, period=4.0, seed=1)
     rig = hc.VirtualWall(K=K, device=hc.Device(0.1, b), Ts=Ts)
