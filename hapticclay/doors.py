@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -26,11 +27,24 @@ def attach(
     module = name or package
 
     def __getattr__(wanted: str) -> Any:
-        if wanted in names or wanted.startswith("__"):
-            return found(wanted)
-        raise AttributeError(_unknown(module, wanted, names, doors))
+        if wanted not in names:
+            raise AttributeError(_unknown(module, wanted, names, doors))
+        own, start = vars(sys.modules[module]), vars(sys.modules[package])
+        before = start.get(wanted, start)
+        value = own[wanted] = found(wanted)
+        if own is not start:  # the loader keeps what it found in the package, too
+            _restore(start, wanted, before)
+        return value
 
     return __getattr__, listed, names
+
+
+def _restore(names: dict[str, Any], name: str, before: Any) -> None:
+    """Puts back what a name stood for, or takes it away where it stood for nothing."""
+    if before is names:
+        names.pop(name, None)
+    else:
+        names[name] = before
 
 
 def _unknown(module: str, wanted: str, names: Sequence[str], doors: Sequence[str]) -> str:

@@ -22,3 +22,11 @@ def test_an_unknown_name_names_the_nearest(module, name, said):
         getattr(module, name)
     assert str(told.value).endswith(said)
     assert not hasattr(module, name) and name not in dir(module)
+
+
+def test_a_name_behind_a_door_stays_there():
+    """lazy_loader keeps what it found in the package that the stub's imports start from."""
+    assert callable(hc.walls.zwidth) and callable(hc.materials.material)
+    assert not hasattr(hc, "zwidth") and not hasattr(hc, "material")
+    assert hc.walls.zwidth is vars(hc.walls)["zwidth"]
+    assert set(hc.walls.__all__) <= set(dir(hc.walls))
