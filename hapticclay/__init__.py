@@ -11,9 +11,11 @@ All quantities are SI; axes are ordered (x, y); force signs are fixed in docs/eq
 
 from importlib.metadata import PackageNotFoundError, version
 
-import lazy_loader
+from .doors import attach
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attach(
+    __name__, __file__, doors=("walls", "theory", "studies", "materials", "ports")
+)
 
 try:
     __version__ = version("hapticclay")

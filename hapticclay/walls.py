@@ -1,5 +1,5 @@
 """Virtual walls: which are stable or passive, which can be rendered, what the hand feels."""
 
-import lazy_loader
+from .doors import attach
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub("hapticclay", __file__)
+__getattr__, __dir__, __all__ = attach("hapticclay", __file__, __name__)

@@ -139,7 +139,7 @@ def zwidth_table(found: ZWidth) -> str:
         gap = "-" if math.isnan(r.gap()) else f"{100.0 * r.gap():.2g} %"
         sizes = [r.K[0], r.largest_K, r.largest_B, r.area]
         rows.append([r.name or "-", *map(number, sizes), r.verdict, gap])
-    head = ["region", "K at least B", "largest K", "largest B", "area", "verdict", "off exact"]
+    head = ["region", "K at least B", "largest K", "largest B", "area", "verdict", "from exact"]
     lines = [console.text_table(rows, head, "lrrrrll")]
     lines.append("K [N/m], B [N.s/m], area [N^2.s/m^2]")
     if not math.isnan(found.gap()):

@@ -8,13 +8,12 @@
 Importing this registers the environments. It needs Gymnasium: pip install 'hapticclay[gym]'.
 """
 
-import lazy_loader
-
+from ..doors import attach
 from ..errors import needing
 
 with needing("hapticclay.gym", "gymnasium", "gym"):
     from .registry import register_all
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attach(__name__, __file__)
 
 register_all()

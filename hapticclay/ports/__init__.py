@@ -1,5 +1,5 @@
 """Ports: the simulated arm as a haptic device for other programs."""
 
-import lazy_loader
+from ..doors import attach
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

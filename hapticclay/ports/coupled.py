@@ -1,7 +1,8 @@
 """A device as the hand of a simulated arm, through a virtual coupling of spring and damper.
 
-The spring force is computed at the samples of the device and held between them. Holding it for Ts
-generates at most K Ts/2 v^2 of power; a damper B >= K Ts/2 dissipates it.
+The spring force is computed at the samples of the device and held between them. To motions far
+slower than the sampling a hold of Ts acts like a damper of -K Ts/2; a damper B >= K Ts/2 makes up
+for it. That is no passivity, which needs physical damping in the device: docs/connect.md.
 Coupling: J. E. Colgate, M. C. Stanley, J. M. Brown, IROS 1995.
 """
 
@@ -46,7 +47,7 @@ class Coupled:
         choice("coupling.plane", self.plane, tuple(PLANES))
 
     def check(self, Ts: float) -> None:
-        """Refuses a coupling that is not passive.
+        """Refuses a coupling whose damper is too small for the hold of its spring.
 
         Args:
             Ts: time between two samples of the device [s].
@@ -59,7 +60,7 @@ class Coupled:
             raise ParameterError("coupling.B", self.B, bound)
 
     def at(self, Ts: float) -> Coupled:
-        """The coupling, with K lowered until the damper makes it passive.
+        """The coupling, with K lowered to what the damper makes up for.
 
         Args:
             Ts: between two samples of the device [s].
@@ -122,7 +123,7 @@ class DeviceHand:
             start: place of the simulated handle [m].
 
         Raises:
-            ParameterError: the coupling is not passive at the requested rate.
+            ParameterError: the coupling has B < K Ts/2 at the requested rate.
         """
         coupling.check(client.limits.Ts)
         self.client, self.plane = client, coupling.plane
@@ -233,7 +234,7 @@ def render(
         Record, exchanges and their timing. The notes of the record also contain the timing.
 
     Raises:
-        ParameterError: there is no device, the coupling is not passive at its rate, or a value is
+        ParameterError: there is no device, the coupling has B < K Ts/2 at its rate, or a value is
             out of its bounds.
     """
     duration = number("duration", duration, 0.0, LONGEST, above=True, unit="s")

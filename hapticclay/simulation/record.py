@@ -467,7 +467,8 @@ class Record:
             RecursionError,
             zipfile.BadZipFile,
         ) as error:
-            what = " ".join(str(error).split()) or type(error).__name__
+            text = getattr(error, "strerror", None) or " ".join(str(error).split())
+            what = text or type(error).__name__
             raise ParameterError("record", str(path), f"must be a saved record ({what})") from None
         raise ParameterError("record", str(path), f"must have schema {RECORD_SCHEMA}, has {schema}")
 

@@ -177,7 +177,7 @@ def zwidth_lab(quick: bool, tell: Tell) -> Lab:
             "Virtual damping first helps, then harms. Which part of the loop makes it harm?",
             "Double the physical damper: by how much does the largest K grow, at B = 0 and at its "
             "best B?",
-            "Which of the walls inside of the region are not passive (b > K Ts/2 + |B|)?",
+            "Which walls inside the region are passive, b > K Ts/2 + |B|, and which are not?",
         ),
         f"largest K {top[2]:.4g} N/m at B = {top[1]:g} N.s/m; area {max(areas):.3g} N^2.s/m^2",
         dict(zip(names, map(tuple, zip(*rows, strict=True)), strict=True)),
@@ -218,12 +218,14 @@ def delay_lab(quick: bool, tell: Tell) -> Lab:
         "The force of the wall comes late: a bus, a second computer, a network.",
         (
             "How many samples of delay halve the stable stiffness? Derive it from the rule.",
-            "Between whole samples the passive limit rises again. What does a force that changes "
-            "between two samples do to the worst path of a hand?",
+            "Between whole samples the passive limit lies below the stable one, at whole samples "
+            "they meet. What does a force that changes between two samples do to the worst path of "
+            "a hand?",
             "Which device would you change to win back one sample: mass, damper or rate?",
         ),
         f"from {delays[0]:g} to {delays[-1]:g} samples: stable K {stable[0]:.4g} to "
-        f"{stable[-1]:.4g} N/m, passive K {passive[0]:.4g} to {passive[-1]:.4g} N/m",
+        f"{stable[-1]:.4g} N/m, passive K {passive[0]:.4g} to {passive[-1]:.4g} N/m; passive K by "
+        "runs is an upper bound, since some paths of a hand are tried and not all",
         {
             "delay [samples]": tuple(delays), "stable K by runs [N/m]": tuple(stable),
             "rule [N/m]": tuple(wall_limits.hulin_limit(w) for w in walls),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ import numpy as np
 
 from ..arguments import named
 from ..errors import ParameterError, array_of, choice
+from ..units import parse_unit
 
 COLUMNS = {  # columns of a file and their contents
     "t": "time [s]",
@@ -25,6 +27,8 @@ COLUMNS = {  # columns of a file and their contents
     "output": "position of the handle [m]",
     "reference": "what drives the experiment, free of noise, in any unit",
 }
+UNITS = {"t": ("s",), "input": ("N", "m"), "output": ("m",)}
+NAMED_UNIT = re.compile(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]")  # "time [ms]", "force (N)"
 LEAST_ROWS = 100
 LARGEST_VALUE = 1e50  # value in a column; squares and sums of it do not overflow
 JITTER = 0.05  # largest deviation of a step from the mean step
@@ -79,7 +83,8 @@ class Measurement:
 
         Comma, semicolon or tab separate cells; empty lines and lines that begin with # are skipped.
         A last row after a shorter step is skipped too, because a run ends between two samples.
-        Other columns may hold anything.
+        Other columns may hold anything. Values are SI, unless the name of a column ends with
+        another unit in brackets, as in "time [ms]": they are then converted.
 
         Args:
             path: the file.
@@ -88,7 +93,8 @@ class Measurement:
 
         Raises:
             ParameterError: the file cannot be read or is empty; a column is missing, named twice,
-                or holds a value that is not a finite number; or as `Measurement`.
+                holds a value that is not a finite number, or names a unit of another quantity; or
+                as `Measurement`.
         """
         for key in dict(columns or {}):
             choice("columns", key, tuple(COLUMNS))
@@ -139,6 +145,7 @@ def _read_columns(path: Path, wanted: Mapping[str, str]) -> dict[str, np.ndarray
         bound = f"must name its columns in the first line; that holds {head[0]}, ..."
         raise _bad_file(path, bound)
     at = _places(path, head, wanted)
+    sizes = {key: _unit_size(path, key, head[i]) for key, i in at.items()}
     out: dict[str, list[float]] = {key: [] for key in at}
     for line, row in rows:
         if len(row) != len(head):
@@ -148,7 +155,19 @@ def _read_columns(path: Path, wanted: Mapping[str, str]) -> dict[str, np.ndarray
                 bound = f"must be a finite number, is {row[i][:20]!r}"
                 raise _bad_file(path, f"line {line}, column {head[i]!r}: {bound}")
             out[key].append(float(row[i]))
-    return {key: np.array(x) for key, x in out.items()}
+    return {key: sizes[key] * np.array(x) for key, x in out.items()}
+
+
+def _unit_size(path: Path, key: str, name: str) -> float:
+    """SI size of the unit that the name of a column ends with; 1 without a known unit."""
+    found = NAMED_UNIT.fullmatch(name)
+    unit = parse_unit(found[1]) if found else None
+    if not found or unit is None or not any(unit[1]) or key not in UNITS:
+        return 1.0
+    if unit[1] not in [(parse_unit(x) or unit)[1] for x in UNITS[key]]:
+        bound = f"must be in {' or '.join(UNITS[key])}, not in {found[1]}"
+        raise _bad_file(path, f"column {name!r}: {bound}")
+    return float(unit[0])
 
 
 def _bad_file(path: Path, bound: str) -> ParameterError:

@@ -58,8 +58,8 @@ class Press:
             to the middle between two forces that the encoder can resolve, where rest is least
             likely.
         speed: impact speed of the device [m/s], 0 to 1.
-        still: largest peak-to-peak motion that counts as rest [m], 1e-9 to 1e-2. A hand that grips
-            feels about 1 um at 100 to 300 Hz.
+        still: largest peak-to-peak motion that counts as rest [m], 1e-9 to 1e-2. A gripping hand
+            feels less than 1 um at 150 to 200 Hz (Brisben, Hsiao, Johnson 1999).
     """
 
     force: Annotated[float, Bound(0.0, 1e3, "N")] = 1.0

@@ -368,7 +368,10 @@ def add_legend(figure: Figure, ax: Axes | None, ncols: int = 5, **more: Any) -> 
     """
     if ax is not None:
         more["handles"], more["labels"] = ax.get_legend_handles_labels()
+    count = len(more["handles"])
     for columns in range(ncols, 0, -1):
+        if columns > 1 and -(-count // columns) == -(-count // (columns - 1)):
+            continue  # as many rows with a column less: rows of even length
         legend = figure.legend(loc="outside upper center", ncols=columns, **more)
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
             break

@@ -597,3 +597,19 @@ def test_resolution_is_measured(monkeypatch):
     monkeypatch.setattr(resolution, "END", 0.059)
     row = resolution.run(262144, 16)
     assert row["status"] == "finished" and 1e-4 < row["rms"] < 0.5  # still slowing down
+
+
+@pytest.mark.parametrize("cutoff", [None, 10.0, 30.0, 300.0])
+def test_the_lag_of_a_velocity_is_that_of_the_page(cutoff):
+    """docs/velocity_filter.md: of p = t^2/2 the estimate is t less the lag, Ts/2 + Ts a/(1 - a)."""
+    Ts, y, lag = 1e-3, 0.0, 5e-4
+    for k in range(1, 2001):
+        p, old = ((0.5 * (i * Ts) ** 2, 0.0) for i in (k, k - 1))
+        w, _ = hardware.velocity_difference(k - 1, old, k, p, Ts)
+        y = w if cutoff is None else hardware.low_pass(y, w, cutoff, Ts)
+    if cutoff is not None:
+        a = math.exp(-math.tau * cutoff * Ts)
+        lag += Ts * a / (1.0 - a)
+        assert lag == pytest.approx(1.0 / (math.tau * cutoff), rel=(math.tau * cutoff * Ts) ** 2)
+    # positions of 2 s^2 divided by Ts: a few hundred eps / Ts
+    assert 2000 * Ts - y == pytest.approx(lag, abs=400 * EPS / Ts)

@@ -176,6 +176,18 @@ def loop(delta, uh, dt):
     return t, *out.T
 
 
+def test_a_virtual_spring_takes_damping_from_the_fit():
+    """docs/identify_device.md: the fitted b is that of the device less K Ts/2, by the hold."""
+    K, Ts, b = 20.0, 0.01, 0.5
+    push = hc.Multisine((0.05, 0.0), low=0.5, high=20.0, period=4.0, seed=1)
+    rig = hc.VirtualWall(K=K, device=hc.Device(0.1, b), Ts=Ts)
+    r = hc.simulate(rig.scenario(12.0, muscle=push, steps=5), engine="python")
+    data = hc.studies.Measurement(r.t, input=push(r.t)[:, 0], output=r.p[:, 0])
+    gain, damping, _ = hc.studies.identify_data(data, "S", band=(0.5, 8.0)).coefficients
+    # the hold is a damper to first order: (omega Ts)^2/12 of K Ts/2 at 8 Hz are 2 %
+    assert damping.value / gain.value == pytest.approx(b - 0.5 * K * Ts, abs=0.02 * 0.5 * K * Ts)
+
+
 def test_a_reference_takes_the_bias_from_a_closed_loop():
     """A muscle force of 0.7 N rms moves the handle too: without a reference it biases Th.
 
@@ -261,6 +273,27 @@ def test_files_as_others_write_them(tmp_path):
     np.testing.assert_array_equal(data.input, np.arange(100) % 7)
     np.testing.assert_array_equal(data.output, np.arange(100))
     assert data.name == "a.csv" and data.reference is None and data.dt == pytest.approx(DT)
+
+
+@pytest.mark.parametrize(
+    "head, size",
+    [
+        ("time [ms],force (kN),pos [um]", (1e-3, 1e3, 1e-6)),
+        ("t,command (mm),pos [cm]", (1.0, 1e-3, 1e-2)),
+        ("t [s],input [raw],output [1]", (1.0, 1.0, 1.0)),  # no units: as they are
+    ],
+)
+def test_a_unit_in_the_name_of_a_column_is_converted(head, size, tmp_path):
+    t = np.arange(120.0)
+    text = "".join(f"{x:g},{x % 7:g},{x % 5:g}\n" for x in t)
+    (tmp_path / "a.csv").write_text(f"{head}\n{text}")
+    names = dict(zip(("t", "input", "output"), head.split(","), strict=True))
+    data = hc.studies.Measurement.load(tmp_path / "a.csv", names)
+    for got, factor, want in zip(
+        (data.t, data.input, data.output), size, (t, t % 7, t % 5), strict=True
+    ):
+        # one product of two rounded numbers
+        np.testing.assert_allclose(got, factor * want, rtol=4e-16)
 
 
 def test_command_line(tmp_path, capsys):
@@ -423,6 +456,11 @@ FILE = ["identify", "--csv", "a.csv"]
         ('t,input,output\n0,1,"2\n' + ROWS, FILE, ["line 202", "'output'"]),
         ("t,input,output\n" + ROWS + "0.3,1,2\n", FILE, ["t[200]", "5 %"]),
         ("t,input,output\n" + ROWS, FILE, ["band", "too short"]),
+        (
+            "t,input,out [deg]\n" + ROWS,
+            [*FILE, "--columns", "output=out [deg]"],
+            ["'out [deg]'", "must be in m, not in deg"],
+        ),
         ("", [*FILE, "--columns", "inptu=a"], ["columns", "did you mean 'input'"]),
         ("", [*FILE, "--columns", "a"], ["columns", "t=time"]),
         ("", [*FILE, "--columns", "t=a", "t=b"], ["columns", "once"]),

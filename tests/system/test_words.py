@@ -77,6 +77,14 @@ def test_a_term_has_one_first_page():
         ("impedance control", "impedance"),
         ("human-in-the-loop", "view"),
         ("Z-width", "zwidth"),
+        ("passivity controller", "hardware"),
+        ("quantization limit cycle", "zwidth"),
+        ("encoder resolution", "zwidth"),
+        ("haptics sampling rate", "fast_enough"),
+        ("CRTK", "device"),
+        ("Haply", "device"),
+        ("Inverse3", "connect"),
+        ("Gymnasium", "gym"),
     ],
 )
 def test_a_search_finds_its_page_first(phrase, page):
