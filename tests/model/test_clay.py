@@ -249,7 +249,10 @@ def test_regions_of_random_clay_are_those_of_the_place(n, m, seed):
         (lambda: Grid((), (), [[1.0]], [[2e9]]), r"clay.growth\[0, 0\] = 2000000000.0: .* per s"),
         (lambda: Clay(1, 2), "clay.x = 1: must be a Profile or a Grid"),
         (lambda: Clay(SLAB, SLAB, 4.0), "clay.angle = 4.0: .*3.14159 rad"),
-        (lambda: Grid.of_function(max, (0.0,), (0.0, 1.0)), "clay.x_edges = .*: must have at least two edges"),
+        (
+            lambda: Grid.of_function(max, (0.0,), (0.0, 1.0)),
+            "clay.x_edges = .*: must have at least two edges",
+        ),
         (
             lambda: Grid.of_function(lambda x, y: -1.0, (0, 1), (0, 1)),
             r"clay.values\[1, 1\] = -1.0",
