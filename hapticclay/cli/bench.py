@@ -15,7 +15,7 @@ class BenchCommand:
     """Run the benchmarks of a checkout: accuracy against run time, stiff scenes, throughput.
 
     The benchmarks are not installed with the package. Packages that are not installed are listed as
-    left out. After an interruption, the same command measures only the parts that are missing or
+    omitted. After an interruption, the same command measures only the parts that are missing or
     were measured on other code.
 
     Attributes:
