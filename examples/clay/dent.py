@@ -3,7 +3,7 @@ A wall that dents
 =================
 
 A wall pushes back with k times its indentation, yields at its limit and keeps a dent. The area of
-the loop is the work that it absorbed.
+the force loop is the work that the wall absorbed.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 Smooth clay from a picture
 ==========================
 
-The brightness of a picture becomes damping: cells with borders, on which steps end, or a smooth
-spline without any. Here the picture is a soft blob in hard clay.
+The brightness of a picture becomes damping, either of cells, with borders on which steps end, or of
+a smooth spline without borders. Here the picture is a soft blob in hard clay.
 """
 
 import tempfile

@@ -3,7 +3,8 @@ A push that sticks
 ==================
 
 Clay with a yield force holds the handle until the push exceeds it. At rest the force of the clay
-is that of the hand, the velocity is 0.0, and no step size makes it chatter or creep.
+equals that of the hand and the velocity is exactly 0. The handle does not chatter or creep at any
+step size.
 """
 
 import matplotlib.pyplot as plt

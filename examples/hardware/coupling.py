@@ -2,8 +2,8 @@
 A virtual coupling
 ==================
 
-Clay stiffer than 2/(Ts W) cannot be rendered by motors that hold their force for a sample: each one
-overshoots. A spring and damper between handle and a virtual tool make any clay renderable.
+Motors that hold their force for a sample cannot render clay stiffer than 2/(Ts W): each sample
+overshoots. A spring and damper between the handle and a virtual tool make any clay renderable.
 """
 
 import matplotlib.pyplot as plt

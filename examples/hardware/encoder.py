@@ -2,8 +2,9 @@
 Encoder and filter
 ==================
 
-Angles are rounded to counts, and the velocity is their difference. A longer window or a filter
-smooths it and adds lag. The remaining ripple is one count at the handle, over the window.
+Angles are rounded to counts, and the velocity is the difference of counts. A longer window or a
+filter smooths the velocity and adds lag. The remaining ripple is one count at the handle, divided
+by the window.
 """
 
 import math

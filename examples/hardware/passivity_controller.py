@@ -3,8 +3,8 @@ Time-domain passivity control
 =============================
 
 Where b Ts W > 2, clay that motors hold for a sample gives energy that real clay would absorb. An
-observer adds up the absorbed energy, and a controller changes the force in time so that it never
-becomes negative.
+observer adds up the absorbed energy, and a controller changes the force in time to keep this energy
+from becoming negative.
 """
 
 import matplotlib.pyplot as plt

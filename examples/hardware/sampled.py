@@ -2,9 +2,9 @@
 Sampled control, latency and jitter
 ===================================
 
-Hardware measures, computes and holds (zero-order hold). With ``control="sampled"`` a run does the
-same every Ts, with the latency and jitter of ``hc.Hardware``. A cut close to its gain limit shows
-the effect.
+Hardware measures, computes a torque and holds it (zero-order hold). With ``control="sampled"`` a
+run does the same every Ts, with the latency and jitter of ``hc.Hardware``. A cut close to its gain
+limit shows the effect.
 """
 
 import matplotlib.pyplot as plt

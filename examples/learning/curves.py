@@ -1,4 +1,4 @@
-"""Learning curves of `ppo.py`, a panel for each environment, beside policies that do not learn.
+"""Plots the learning curves of `ppo.py`, a panel for each environment, with the baselines.
 
 python examples/learning/curves.py out/learning/*.csv --out gym_learning.png
 """

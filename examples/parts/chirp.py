@@ -3,8 +3,8 @@ Your own muscle force
 =====================
 
 ``Scenario.muscle`` can be steps, ramps, pulses, chirps, multisines, arrays, any function, and sums
-of them. A chirp shakes the handle through clay; the amplitude of its speed is that of the loop,
-``|v/uh|`` at each frequency.
+of them. A chirp shakes the handle in clay; the amplitude of its speed follows the frequency
+response of the loop, ``|v/uh|``.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 Your own controller
 ===================
 
-A function of the measured values replaces compensator and servo: PD control of the joints towards
-an oscillating target. It is compiled with the run if numba is installed.
+A function of the measured values replaces compensator and servo. Here it is PD control of the
+joints towards an oscillating target. It is compiled with the run if numba is installed.
 """
 
 import math

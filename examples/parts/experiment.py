@@ -2,8 +2,8 @@
 Your own experiment
 ===================
 
-A dataclass with bounds becomes an experiment: a function, options of ``hapticclay run``, names for
-sweeps. A value out of its bounds is refused, and the error names field, value and bound.
+A dataclass with bounds becomes an experiment, with a function, options of ``hapticclay run`` and
+names for sweeps. A value out of its bounds is refused, and the error names field, value and bound.
 """
 
 from dataclasses import dataclass

@@ -3,7 +3,7 @@ Your own hand
 =============
 
 The person's arm is an impedance, mass s² + damper s + spring, on each axis. It changes which K is
-stable: no hand, the paper's, one that grips, and one that leans on the handle.
+stable. Compared are no hand, the paper's hand, a hand that grips, and one that leans on the handle.
 """
 
 import matplotlib.pyplot as plt

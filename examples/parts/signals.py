@@ -2,8 +2,8 @@
 All signals
 ===========
 
-The signals for ``Scenario.muscle`` and ``Scenario.command``. Each is a function of time; sums and
-multiples of signals are signals.
+These signals can be ``Scenario.muscle`` and ``Scenario.command``. Each is a function of time; sums
+and multiples of signals are signals too.
 """
 
 import matplotlib.pyplot as plt

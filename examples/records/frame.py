@@ -2,7 +2,7 @@
 A record as a table
 ===================
 
-``to_frame`` gives a DataFrame of pandas; ``export`` writes CSV, Parquet, netCDF, MAT and others.
+``to_frame`` returns a pandas DataFrame; ``export`` writes CSV, Parquet, netCDF, MAT and others.
 """
 
 import tempfile

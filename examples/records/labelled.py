@@ -2,7 +2,7 @@
 A record with names and units
 =============================
 
-``to_xarray`` keeps axes, joints and units with the numbers, and the whole scenario.
+``to_xarray`` returns the numbers with their axes, joints and units, and the whole scenario.
 """
 
 import json

@@ -3,7 +3,7 @@ Probability of instability
 ==========================
 
 Hand and delay are random; each run is judged by itself. The interval shows how much so few runs can
-say. Runs stay in their folder, and the same call resumes an interrupted study.
+say. The runs are stored in a folder, and the same call resumes an interrupted study.
 """
 
 import tempfile

@@ -2,8 +2,8 @@
 The arm behind the handle
 =========================
 
-``hc.build`` is the MuJoCo model of a run. Its kinematics, at the joint angles of the record, give
-the recorded position of the handle, within rounding.
+``hc.build`` returns the MuJoCo model of a run. At the recorded joint angles its kinematics give the
+recorded position of the handle, within rounding.
 """
 
 import matplotlib.pyplot as plt

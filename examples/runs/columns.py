@@ -1,10 +1,10 @@
 """
-Columns of numbers, ends of runs
-================================
+Final values of many runs
+=========================
 
-``hc.simulate_columns`` runs a scene once for each row of some columns, and keeps the ends. Here the
-gain and the damping of the clay are drawn at random; the speed at the end, over the force, tends to
-that of the linear loop, K/(10 + K b).
+``hc.simulate_columns`` runs a scene once for each row of some columns of numbers, and keeps the
+final values. Here the gain and the damping of the clay are random. The final speed over the force
+tends to that of the linear loop, K/(10 + K b).
 """
 
 import matplotlib.pyplot as plt

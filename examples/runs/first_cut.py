@@ -2,8 +2,8 @@
 A first cut
 ===========
 
-A hand pushes with 1 N through a slab of clay, 10 cm long. Behind each border the speed settles at
-K f/(10 + K b): the compensator's own damper and the clay share the force.
+A hand pushes with 1 N through a slab of clay, 10 cm long. Behind each border the speed settles at K
+f/(10 + K b), because the compensator's own damper and the clay share the force.
 """
 
 import matplotlib.pyplot as plt

@@ -3,8 +3,8 @@ A hit on stiff clay
 ===================
 
 The handle flies into stiff clay and is stopped within milliseconds. Its first moments are those of
-a free mass: v0 exp(-b W t), W being the handle's mobility. A step ends on the border, whatever the
-step is, and the force of the clay keeps its impulse however stiff the clay.
+a free mass: v0 exp(-b W t), W being the handle's mobility. A step ends on the border at any step
+size, and the impulse of the clay's force is right however stiff the clay is.
 """
 
 import matplotlib.pyplot as plt

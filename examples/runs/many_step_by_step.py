@@ -2,9 +2,9 @@
 Many hands at once, step by step
 ================================
 
-``hc.SimulationBatch`` advances many runs by one call, under a force for each. Here 21 hands pull
-with 1 to 8 N, and give way by 30 N.s/m: they look at their speed each 10 ms. The clay begins at
-5 cm.
+``hc.SimulationBatch`` advances many runs in one call, each under its own force. Here 21 hands pull
+with 1 to 8 N minus 30 N.s/m times their speed, which they measure every 10 ms. The clay begins at 5
+cm.
 """
 
 import matplotlib.pyplot as plt

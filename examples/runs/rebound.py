@@ -2,8 +2,9 @@
 A rebound from a spring wall
 ============================
 
-A spring wall returns the speed of the handle. During contact, mass and spring make half a period of
-an oscillation, so the contact lasts about pi/sqrt(k W) and the force peaks at v0 sqrt(k/W).
+A spring wall returns the speed of the handle. During contact, mass and spring go through half a
+period of an oscillation, so the contact lasts about pi/sqrt(k W) and the force peaks at v0
+sqrt(k/W).
 """
 
 import math

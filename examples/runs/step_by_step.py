@@ -2,8 +2,8 @@
 Your own hand, step by step
 ===========================
 
-``hc.Simulation`` advances a run step by step, each under a force of yours. Here a hand follows a
-moving target with a spring and a damper, through the clay and back.
+``hc.Simulation`` advances a run step by step, with a force that you choose at each step. Here a
+hand follows a moving target with a spring and a damper, through the clay and back.
 """
 
 import math

@@ -2,8 +2,8 @@
 The law of a clay from a record
 ===============================
 
-``hc.studies.fit_flow`` chooses among five laws and finds the parameters from noisy, rounded time,
-position and force. Nothing is differentiated, so noise does not bias the law.
+``hc.studies.fit_flow`` chooses among five laws and finds the parameters from noisy, rounded values
+of time, position and force. Nothing is differentiated, so noise does not bias the law.
 """
 
 import math

@@ -3,8 +3,8 @@ Identify G from a noisy record
 ==============================
 
 The arm is excited by a multisine, as in the paper, and the response is fitted with a second-order
-transfer function. Below: the deviation of the fit from the measured lines, and their standard
-deviation.
+transfer function. The lower plot shows the deviation of the fit from the measured lines, and their
+standard deviation.
 """
 
 import matplotlib.pyplot as plt

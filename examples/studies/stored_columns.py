@@ -2,9 +2,9 @@
 Random hands, stored run by run
 ===============================
 
-``hc.studies.run_columns`` makes the runs of some columns and stores their ends in a folder. A
-second call makes what is missing, after an interruption too. Here hands of random mass and damper
-have pulled into clay for 0.3 s.
+``hc.studies.run_columns`` makes one run for each row of some columns and stores the final values in
+a folder. A second call makes the runs that are missing, for example after an interruption. Here
+hands of random mass and damper pull into clay for 0.3 s.
 """
 
 import tempfile

@@ -2,8 +2,8 @@
 Is the computer fast enough?
 ============================
 
-The stiffest virtual wall that a loop renders stably, over its rate. A fixed latency soon makes a
-faster loop useless; a hand that holds the device allows a stiffer wall.
+The plot shows the stiffest virtual wall that a loop renders stably, over its rate. A fixed latency
+soon makes a faster loop useless; a hand that holds the device allows a stiffer wall.
 """
 
 import matplotlib.pyplot as plt

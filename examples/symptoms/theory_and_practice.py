@@ -3,7 +3,7 @@ Stable in theory, buzzing in practice
 =====================================
 
 In continuous time a spring and a damper on a device are stable for any stiffness. Each part of a
-real loop takes from that: the hold, the difference of positions, the filter, the latency.
+real loop lowers the limit: the hold, the difference of positions, the filter, the latency.
 """
 
 import matplotlib.pyplot as plt

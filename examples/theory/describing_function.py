@@ -2,8 +2,8 @@
 Yielding clay as a damper
 =========================
 
-For an oscillation of velocity amplitude V, clay acts as a damper N(V), stiff at small speeds. Where
-N lies in a band of dampings in which the loop is unstable, oscillations grow.
+For an oscillation of velocity amplitude V, clay acts as a damper N(V), stiff at small speeds.
+Oscillations grow where N lies in a band of dampings for which the loop is unstable.
 """
 
 import matplotlib.pyplot as plt

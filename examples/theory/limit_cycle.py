@@ -3,8 +3,8 @@ A limit cycle in clay that yields
 =================================
 
 The loop of y at K = 1 sticks after a small push and oscillates after a large one. The describing
-function predicts speed and frequency, ``hc.theory.exact_cycles`` has them exactly, and a run shows
-them.
+function predicts speed and frequency, ``hc.theory.exact_cycles`` computes them exactly, and a run
+confirms them.
 """
 
 import matplotlib.pyplot as plt

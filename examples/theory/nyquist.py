@@ -1,9 +1,10 @@
 """
-Nyquist
-=======
+Nyquist curves below and above the limit
+========================================
 
-The curve of the loop broken at the compensator. Where it passes the negative real axis, its
-distance from -1 is the gain margin: at K = limit it goes through -1, and beyond encircles it.
+The curve is that of the loop broken at the compensator. Where it crosses the negative real axis,
+its distance from -1 gives the gain margin: at the limit of K it goes through -1, and beyond the
+limit it encircles -1.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 Poles over the gain
 ===================
 
-The poles of the closed loop of y as K grows. They leave the left half-plane where
-``hc.theory.gain_limit`` says so.
+As K grows, the poles of the closed loop of y move. They leave the left half-plane at the K that
+``hc.theory.gain_limit`` computes.
 """
 
 import matplotlib.pyplot as plt

@@ -3,8 +3,8 @@ A sufficient condition, and the limit
 =====================================
 
 The paper requires ``|L| < 1`` (Eq. 11) or ``|G C| < |1/T + Sh|`` (Eq. 13). Both are sufficient,
-neither is necessary: without a hand Eq. 13 admits a part of the stable gains, and with the paper's
-hand, against whose spring the compensator integrates, none.
+neither is necessary. Without a hand Eq. 13 admits some of the stable gains. With the paper's hand
+it admits none, because the compensator integrates against the spring of the hand.
 """
 
 import matplotlib.pyplot as plt

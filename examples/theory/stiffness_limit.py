@@ -2,8 +2,7 @@
 Stiff clay
 ==========
 
-Clay with a stiffness k in addition to its damping b: how stiff may it be before the loop is
-unstable?
+How large may the stiffness k of clay with damping b be before the loop becomes unstable?
 """
 
 import matplotlib.pyplot as plt

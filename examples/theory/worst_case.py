@@ -3,8 +3,8 @@ The worst hand of a box
 =======================
 
 A loop that is stable with one hand may be unstable with another. ``hc.theory.worst_case`` finds the
-lowest gain limit over a whole box of hands, and the hand that has it. No random member of the box
-is worse.
+lowest gain limit over a whole box of hands, and the hand that causes it. No random hand of the box
+has a lower limit.
 """
 
 import matplotlib.pyplot as plt

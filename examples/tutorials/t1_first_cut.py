@@ -3,7 +3,7 @@
 ==============
 
 You simulate a hand that pushes a tool through a slab of clay, look at the result, and replace the
-clay by your own. All quantities are in SI units; pairs are ordered (x, y).
+clay with your own. All quantities are in SI units; pairs are ordered (x, y).
 """
 
 # %%
@@ -75,8 +75,8 @@ print(layered.status)
 
 # %%
 # Real clay does not flow under a small force. ``hc.slab`` makes a slab of clay that yields, here at
-# 2 N, and resists with 30 N.s/m beyond. A push of 1 N comes to rest half a centimetre inside, once
-# its speed is spent; one of 3 N goes through.
+# 2 N, and resists with 30 N.s/m beyond. A tool pushed with 1 N comes to rest half a
+# centimetre inside the clay; one pushed with 3 N goes through.
 
 firm = hc.slab(hc.Flow(Fy=2.0, b=30.0), 0.05, 0.15)
 fig, ax = plt.subplots()
@@ -93,15 +93,15 @@ ax.legend(loc="lower right")
 plt.show()
 
 # %%
-# Keep it, and be sure of it
-# --------------------------
+# Save the run, and check its error
+# ---------------------------------
 # ``record.save(folder)`` writes the record, a summary and the scenario, from which the run can be
 # repeated with bit-identical results; ``hc.Record.load`` reads them back. If the times of the
 # crossings matter, request an error: step and integrator are then chosen and verified.
 
 exact = hc.simulate(scenario, error=1e-8)
 print(exact.error)
-print(f"the default step was off by {record.crossings[-1].time - exact.crossings[-1].time:.1e} s")
+print(f"error of the default step: {record.crossings[-1].time - exact.crossings[-1].time:.1e} s")
 
 # %%
 # Next: :doc:`t2_stability`. More clay: :doc:`/clay`, :doc:`/gallery/clay/index`.

@@ -1,6 +1,6 @@
 """
-2. Is it stable, and how far?
-=============================
+2. Is it stable, and by how much?
+=================================
 
 A motor-assisted handle can become unstable. You raise the gain K until it does, compute the limit
 beforehand, and see how sampling, latency and other hands lower it.
@@ -64,9 +64,9 @@ ax.legend(ncols=3, loc="upper right")
 plt.show()
 
 # %%
-# How far from it?
-# ----------------
-# A verdict has its margin and its assumptions; ``hc.theory.margins`` has gain, phase, delay and
+# How large is the margin?
+# ------------------------
+# A verdict states its margin and its assumptions; ``hc.theory.margins`` has gain, phase, delay and
 # disk margins.
 
 verdict = hc.theory.coupled_stability("x", 1.0, 90.0)

@@ -2,14 +2,14 @@
 3. Your controller on your arm
 ==============================
 
-You define an arm, let the paper's loop run on it, then replace its controller by your own function,
+You define an arm, run the paper's loop on it, then replace its controller with your own function,
 on hardware with encoders and latency.
 """
 
 # %%
 # An arm
 # ------
-# Lengths and inertias make an arm; link 2 is balanced about the elbow. The engine's model is
+# Lengths and inertias define an arm; link 2 is balanced about the elbow. The MuJoCo model is
 # generated from them. With ``inertia_shaping`` the servo hides the arm's inertia, so that
 # the loop is the same on every arm.
 
@@ -33,8 +33,8 @@ print(hc.simulate(cut).status)
 # and rates ``qd``, the force ``fh`` of the hand, a state that you keep, and parameters. It
 # returns the torques of shoulder and elbow, and the next state. This one is an admittance
 # controller. The hand's force moves a virtual mass with a damper; the joints follow it with PD
-# control. With ``render="physical"`` the clay is physical. With "held" the law would have to
-# render it.
+# control. With ``render="physical"`` the clay acts at all times. With ``render="held"`` the law
+# would have to render it.
 
 
 def admittance(t, q, qd, fh, state, params):
@@ -81,7 +81,7 @@ print(record.status)
 
 # %%
 # Outside the clay the handle follows the virtual mass: v = f/D (1 - exp(-D t/M)). In the clay the
-# stiff position loop moves the handle on, and the motors carry the force of the clay.
+# stiff position loop keeps the handle moving, and the motors carry the force of the clay.
 # A law that does not use the force of the clay cannot transmit it to the hand.
 
 fig, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(6.4, 5.0))

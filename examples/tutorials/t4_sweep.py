@@ -1,14 +1,14 @@
 """
-4. A sweep, and what to read in it
-==================================
+4. A sweep, and how to read it
+==============================
 
 You run a space of parameters into a folder of Parquet files, read it as a table, and find out where
 the loop is stable, how fast a cut is, and which numbers to trust.
 """
 
 # %%
-# Describe it
-# -----------
+# Describe the sweep
+# ------------------
 # On the command line this is ::
 #
 #     hapticclay sweep --grid "b=5:2000:7log gain.y=0.1,0.3,0.5,0.7,0.9,1.2" \\
@@ -38,8 +38,8 @@ print(hc.studies.run_sweep(sweep, folder, workers=1), "runs made")
 print(hc.studies.run_sweep(sweep, folder, workers=1), "runs made")
 
 # %%
-# Read it
-# -------
+# Read the results
+# ----------------
 # ``read_sweep`` returns an Arrow table, one row per run; any reader of Parquet opens the folder as
 # well.
 
@@ -50,9 +50,10 @@ print(table.status.value_counts())
 # %%
 # How a run ended
 # ---------------
-# "finished" reached the end of the path, "time limit" did not get there in t_max; both are stable
-# so far. "diverged" and "limit cycle" are not. ``gain_margin_y`` is the limit of the linear loop
-# over the K of the run, in the stiffest clay that the handle met: below 1 the loop is unstable.
+# A "finished" run reached the end of the path, a "time limit" run did not reach it within t_max;
+# both were stable so far. "diverged" and "limit cycle" were not. ``gain_margin_y`` is the limit of
+# the linear loop over the K of the run, in the stiffest clay that the handle met: below 1 the loop
+# is unstable.
 
 unstable = table.status.isin(["diverged", "limit cycle"])
 fig, ax = plt.subplots()
@@ -78,7 +79,7 @@ print(odd[["b", "gain.y", "status", "gain_margin_y", "end_time"]])
 # Speed
 # -----
 # ``speed_x`` is the steady speed in the stiffest clay met. A speed that never became steady is NaN:
-# it is missing, not zero. K f/(10 + K b) is what to expect.
+# it is missing, not zero. The expected speed is K f/(10 + K b).
 
 steady = table[table.speed_x.notna() & ~unstable]
 fig, ax = plt.subplots()

@@ -2,8 +2,8 @@
 Transparency of the arm
 =======================
 
-Transparency at the handle of the paper's arm in clay: the share of the hand's force that is
-rendered, and the effective over the rendered impedance.
+How well does the paper's arm transmit clay to the hand? Shown are the share of the hand's force
+that comes from the clay, and the effective impedance over the rendered one.
 """
 
 import matplotlib.pyplot as plt

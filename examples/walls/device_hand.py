@@ -2,9 +2,9 @@
 Clay at the hand of a device
 ============================
 
-A device is the hand of a simulated arm: it is pulled through the clay along a line and feels it,
-over a spring and damper that are passive at its rate. The device is simulated here; the address of
-an Inverse3 takes its place.
+A device is the hand of a simulated arm. It is pulled through the clay along a line and feels the
+clay through a spring and damper that are passive at its rate. Here the device is simulated; for a
+real Inverse3, give its address instead.
 """
 
 import matplotlib.pyplot as plt

@@ -2,7 +2,7 @@
 Dynamic range
 =============
 
-What is the ratio of the stiffest wall that a device renders stably to its free motion?
+How does the impedance of the stiffest stable wall of a device compare with that of its free motion?
 """
 
 from dataclasses import replace

@@ -2,9 +2,9 @@
 Published limits of a wall
 ==========================
 
-How stiff may a wall be over the latency of its force? Hulin's rule is close where the latency is
-long; the passive limit is lower, because it holds for every passive hand. Hulin's boundary and
-Jury's closed form are exact where they apply.
+How stiff may a wall be at each latency of its force? Hulin's rule is close if the latency is long;
+the passive limit is lower, because it holds for every passive hand. Hulin's boundary and Jury's
+closed form are exact where they apply.
 """
 
 from dataclasses import replace

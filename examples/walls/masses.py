@@ -2,8 +2,8 @@
 Renderable masses and dampers
 =============================
 
-A motor that pushes against the acceleration renders mass. A negative mass makes the device light.
-Theory has the exact borders at each mass; runs find the one at M = 0.05 kg.
+A motor that pushes against the acceleration renders mass. A negative virtual mass makes the device
+lighter. Theory gives the exact border at each mass; runs find the one at M = 0.05 kg.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 Z-width
 =======
 
-Which springs K with which dampers B does a device render stably? Runs find the region; theory has
-an exact line of the linear loop, a sufficient condition, and a rule.
+Which springs K with which dampers B does a device render stably? Runs find the region; theory gives
+the exact border of the linear loop, a sufficient condition, and a rule.
 """
 
 import matplotlib.pyplot as plt

@@ -14,9 +14,9 @@ from ..files import writable
 class BenchCommand:
     """Run the benchmarks of a checkout: accuracy against run time, stiff scenes, throughput.
 
-    The benchmarks are not installed with the package. Packages that are not installed are listed as
-    left out. After an interruption, the same command measures only the parts that are missing or
-    were measured on other code.
+    The installed package does not contain the benchmarks. Other packages that are missing are
+    listed as omitted. After an interruption, the same command measures only the parts that are
+    missing or were measured on other code.
 
     Attributes:
         out: Folder for bench.md, the data and the diagrams.

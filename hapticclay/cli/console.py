@@ -54,7 +54,7 @@ def experiment_words() -> Any:
 
 
 def load_scenario_words(path: tyro.conf.Positional[Path], changes: Changes = ()) -> Any:
-    """A scenario in a file, .toml or .json; the word "file" may be left out.
+    """A scenario in a file, .toml or .json; the word "file" may be omitted.
 
     Args:
         path: the file.
@@ -254,7 +254,7 @@ class FigureOptions:
 
     Attributes:
         format: Formats of the figures: png, svg, pdf; several may be given.
-        dpi: Pixels an inch of PNG [1/inch]; by default 100, and 300 in print.
+        dpi: Resolution of PNG files [pixels/inch]; by default 100, and 300 in print.
         style: For a screen, or for print: one column of 8.5 cm, or two of 17.5 cm.
         data: Also write the numbers that each figure shows, as CSV.
     """

@@ -46,7 +46,7 @@ class DeviceCommand:
         host: Address to listen on. Any address but that of this machine needs a token.
         clock: wall moves the arm in real time; tick moves it by --period at each message, so the
             same messages give the same run.
-        period: Simulated time of a message with --clock tick [s].
+        period: Simulated time that one message advances the arm, with --clock tick [s].
         hand: Target of the hand: x y [m]; or x0 y0 x1 y1 and a speed [m/s] for a line; or a CSV
             file with the columns t, x, y. By default the hand rests at the start.
         plane: Plane of the device in which the arm moves.

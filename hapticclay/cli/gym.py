@@ -13,10 +13,11 @@ from .console import text_table
 
 @dataclass(frozen=True)
 class GymCommand:
-    """Run the baselines of a learning environment, or record a data set of Minari with one.
+    """Run the baselines of a learning environment, or record a Minari data set with one.
 
     `gym baselines` prints the mean return of each policy that does not learn. `gym dataset` records
-    episodes of the best of these that sees no more than an agent, with noise on its actions.
+    episodes of the best policy among them that uses only what an agent observes, with noise on its
+    actions.
 
     Attributes:
         action: baselines or dataset.
@@ -24,7 +25,7 @@ class GymCommand:
         seeds: Episodes of each baseline, 2 to 100000.
         episodes: Episodes of a data set, 1 to 100000.
         noise: Standard deviation added to the actions of a data set, 0 to 1.
-        name: Of the data set; by default hapticclay/ENV/baseline-v0.
+        name: Name of the data set; by default hapticclay/ENV/baseline-v0.
         engine: auto, python or native.
     """
 

@@ -52,8 +52,8 @@ class IdentifyCommand:
             signal that drives the experiment; use it if a position or force is noisy or part of a
             loop.
         band: Lowest and highest frequency to fit [Hz].
-        held: The input of the file is held by a computer from sample to sample.
-        paper: Show the equation of the paper beside the file, in table and figure.
+        held: A computer holds the input of the file from sample to sample.
+        paper: Show the paper's equation beside the fit, in the table and the figure.
         figures: Formats and style of the figures.
     """
 

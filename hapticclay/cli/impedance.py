@@ -24,7 +24,7 @@ class ImpedanceCommand:
 
     A multisine muscle force excites the arm of an experiment, or a virtual wall on a bare device,
     with an amplitude so small that it stays linear. The command is drawn as a thin line. An option
-    of a wall, as --K 300 or --mass 0.2, selects a wall.
+    of a wall, such as --K 300 or --mass 0.2, selects a wall.
 
     Attributes:
         source: File of a wall; or experiment, as in hapticclay run, or a scenario file. The clay of

@@ -27,7 +27,7 @@ class LabCommand:
             difference.
         out: Folder for lab.json and the figures.
         quick: Make fewer runs.
-        view: Show a run of it in a window at the end.
+        view: At the end, show a run of the lab in a window.
         figures: Formats and style of the figures.
     """
 

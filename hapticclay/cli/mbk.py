@@ -29,15 +29,15 @@ class MBKCommand:
 
     Attributes:
         source: File of a wall, .toml or .json; options override it.
-        arm: Axis of the arm, instead of a bare device. --Ts none is continuous time; by default the
-            hand is Th (19).
+        arm: Axis of the arm, instead of a bare device. --Ts none is continuous time; the default
+            hand is Th (Eq. 19).
         box: Hands at the arm: least and largest mass, damper, spring; by default 0.1 1 1 10 0 300.
         columns: Number of columns of a plane, or of dampers of the arm, at which runs search for
             the border, 1 to 100.
-        quick: Draw lines with fewer points and two such columns.
+        quick: Draw lines with fewer points, and runs at two columns only.
         out: Folder for mbk.json and the figures.
         wall: The device and its sampling, and the K, B and M that are constant in a plane: by
-            default 1000 N/m, 2 N.s/m and 0, on a damper of 0.5 N.s/m.
+            default 1000 N/m, 2 N.s/m and 0, on a device with a damper of 0.5 N.s/m.
         figures: Format and style of the figures.
     """
 

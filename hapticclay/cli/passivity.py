@@ -37,7 +37,8 @@ class PassivityCommand:
         delays: Delays of the region, in units of Ts.
         out: Folder for passivity.json and the figures.
         quick: Find limits by runs at one Ts only.
-        wall: The wall: by default K = 500 N/m on 0.1 kg and 1 N.s/m, at 1 ms and 0.5 ms late.
+        wall: The wall: by default K = 500 N/m on a device of 0.1 kg and 1 N.s/m, sampled every
+            1 ms, with a delay of 0.5 ms.
         figures: Formats and style of the figures.
     """
 

@@ -25,14 +25,14 @@ QUIET_FIGURES = FigureOptions(format=("svg",))
 class ReproduceCommand:
     """Reproduce the paper: every printed figure and number beside the simulated one, on one page.
 
-    A word behind the command names a classic of haptics instead: colgate1997, hannaford2002,
+    Add the name of a classic of haptics to reproduce that instead: colgate1997, hannaford2002,
     abbott2005, diolaiti2006, hulin2006 or chawda2015. The exit status is 1 if a number that should
     agree does not.
 
     Attributes:
         source: The classic; none for the paper of 2002.
         out: Folder for report.html (self-contained), report.md, ledger.json and figures/.
-        quick: Leave out the map of Sh over the workspace; of a classic, make fewer runs.
+        quick: Omit the map of Sh over the workspace; for a classic, make fewer runs.
         page: Also write the table of numbers alone, as Markdown, to this file; of a classic, with
             its figures beside it.
         figures: Formats and style of figures/; the report itself has SVG figures for a screen.

@@ -35,21 +35,21 @@ class RobustnessCommand:
         b: Damping of the clay [N.s/m], if the grid does not vary it.
         gain: K of the compensator, if nothing varies it.
         Ts: Control sample [s]; None for continuous time.
-        delay: From a measurement to the torque computed from it [s], with --Ts.
+        delay: Latency from a measurement to the torque computed from it [s], with --Ts.
         inertia_shaping: Let the servo shape the inertia, so that Sh is the same at every pose.
         hands: Name of a population; hapticclay robustness --list prints them.
-        variation: Take log-normal hands around the population's hand of medians, with this
-            standard deviation over the mean: an assumption.
+        variation: Draw log-normal hands around the median hand of the population, with this ratio
+            of standard deviation to mean. The spread is then an assumption.
         vary: What else varies, as in "delay=uniform:0:1e-3 pose.x=normal:0:0.02"; the laws are
             normal and log-normal (mean, standard deviation), uniform and log-uniform (low, high).
         grid: One or two parameters with their values, as in "K=1:8:15 b=10:1000:11log"; "" for
             none.
-        runs: Runs per cell of the grid; without a grid, of the study.
+        runs: Runs per cell of the grid; without a grid, runs of the study.
         seed: Seed of the random numbers.
         chunk: Runs that are stored together, which is the most that a killed process loses.
         out: Folder for the runs, robustness.json and the figures.
         workers: Processes on this machine; by default one per core.
-        band: Draw the gain limit over clay as a band, of this many hands; 0 for none.
+        band: Number of hands for the band of gain limits over clay; 0 draws none.
         list: Print the populations and exit.
         figures: Formats and style of the figures.
     """

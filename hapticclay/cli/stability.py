@@ -45,7 +45,7 @@ class StabilityCommand:
         b: Damping of the clay [N.s/m]; by default 90, or 0 with --clay Fy=5.
         gain: K of the compensator; by default 1 on x and 0.5 on y.
         Ts: Control sample [s]; None for runs in continuous time.
-        delay: From a measurement to the torque computed from it [s].
+        delay: Latency from a measurement to the torque computed from it [s].
         num: Numerator of the compensator, descending powers of s.
         den: Denominator of the compensator, descending powers of s.
         G: Gain, damping and stiffness of the position loop G; by default as printed.

@@ -23,7 +23,7 @@ class VideoCommand:
         scenario: The experiment, a scenario file, or the folder of a record.
         out: The file: .mp4, .webp or .gif.
         camera: Point of view.
-        speed: Playing speed: 1 is real time, 2 twice as fast.
+        speed: Playback speed: 1 is real time, 2 twice as fast.
         size: Width and height [pixels].
         plots: Show the running plots on the right, if there is room: from 320 x 100.
         smooth: Soften edges and shadows; takes twice as long without a graphics card.

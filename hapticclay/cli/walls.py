@@ -30,14 +30,14 @@ class DeviceOptions:
 
     Attributes:
         mass: Mass of the device [kg], by default 0.1.
-        damper: Its physical damping b [N.s/m].
-        friction: Its Coulomb friction fc [N], by default 0.
-        quantum: Of the position that its encoder reads [m], by default 0.
+        damper: Physical damping b of the device [N.s/m].
+        friction: Coulomb friction fc of the device [N], by default 0.
+        quantum: Distance per count of the encoder [m], by default 0.
         Ts: Control sample [s], by default 1 ms, and 0.36 ms on the arm.
-        delay: From a sample to the force computed from it [s].
-        velocity: How it is measured, by default the difference of positions.
+        delay: Latency from a sample to the force computed from it [s].
+        velocity: How velocity is measured, by default as the difference of positions.
         velocity_window: Samples that the difference spans, by default 1.
-        filter: Low-pass behind the difference [Hz], or none.
+        filter: Cutoff of a low-pass behind the difference [Hz], or none.
         hand: Mass, damper and spring of a hand at the handle [kg, N.s/m, N/m].
         unilateral: The wall has a surface and never pulls.
     """

@@ -25,8 +25,8 @@ ZWIDTH_SCHEMA = "hapticclay-zwidth-1"
 class ZWidthCommand:
     """Find the virtual walls (K, B) that a device renders stably, by runs and by theory.
 
-    Quantities are in SI units, or have one: --Ts 1ms. With friction, an encoder or a surface the
-    loop is not linear: a wall is then stable if it comes to rest after a push.
+    Quantities are in SI units unless they name another, as in --Ts 1ms. With friction, an encoder
+    or a surface the loop is not linear: a wall is then stable if it comes to rest after a push.
 
     Attributes:
         source: File of a wall, .toml or .json, which the options change; none for the defaults.

@@ -37,7 +37,7 @@ class CutLineTask(Follow):
         **HAND,
         "b": Range(30.0, 120.0, "N.s/m", 0.0, 1e4, True, "damping of the clay"),
         "gain": GAIN_SHARE,
-        "angle": Range(-0.5, 0.5, "rad", -0.5, 0.5, False, "direction of the line at its begin"),
+        "angle": Range(-0.5, 0.5, "rad", -0.5, 0.5, False, "direction of the line at its start"),
         "offset": Range(-3e-3, 3e-3, "m", -0.01, 0.01, False, "start beside the line"),
     }
 

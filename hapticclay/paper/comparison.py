@@ -26,16 +26,16 @@ SVG_COLORS = {  # colours of a figure, and the page variables that replace them,
     "#e69f00": "--amber",
 }
 ABOUT = {
-    True: f"Bare devices with a virtual wall each; the run is a push of {1e3 * PUSHED:g} mm/s.",
-    False: "Controllers, each with its own scenario, which is also its run.",
+    True: f"Bare devices, each with a virtual wall; the run is a push at {1e3 * PUSHED:g} mm/s.",
+    False: "Controllers, each in its own scenario; the run is that of the scenario.",
 }
 NOTES = {
-    True: "Stable and passive stiffness are exact for the linear wall at its own B, M, Ts and "
-    "delay; friction and encoder are left out, but not of the Z-width by runs. The dynamic range "
-    "is the mean from 0.5 to 30 Hz. ",
-    False: "The gain limit and the least mass, that of an admittance 1/(M (s² + 10 s)) without "
-    "clay, have the scenario's sampling and delay; margins, worst hand, passivity, damper and "
-    "effective impedance are of continuous time. ",
+    True: "Stable and passive stiffness are exact for the linear wall with its own B, M, Ts and "
+    "delay; only the Z-width by runs includes friction and encoder. The dynamic range is the mean "
+    "from 0.5 to 30 Hz. ",
+    False: "The gain limit and the least mass (of an admittance 1/(M (s² + 10 s)) without clay) "
+    "include the scenario's sampling and delay; margins, worst hand, passivity, damper and "
+    "effective impedance are those of the continuous loop. ",
 }
 
 

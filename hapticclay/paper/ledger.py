@@ -15,11 +15,11 @@ from ..studies.identification import Identified, identify
 from ..theory import loops
 
 STATUSES = {
-    "given": "printed, and reproduced",
-    "inferred": "not printed, but it follows from what is",
-    "corrected": "printed otherwise; the reading we take, and why",
-    "not recoverable": "not printed, and nothing printed tells it",
-    "contradicted": "printed, and at odds with the printed model",
+    "given": "printed in the paper, and reproduced",
+    "inferred": "not printed, but follows from printed numbers",
+    "corrected": "printed differently; the reading we use, and why",
+    "not recoverable": "neither printed nor derivable from what is printed",
+    "contradicted": "printed, but at odds with the printed model",
 }
 
 

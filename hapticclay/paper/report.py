@@ -82,22 +82,22 @@ PICTURES = (
         "Fig. 4: closed position loop G",
         "Response of the simulated arm to position commands, and Eqs. 15 and 16.",
         lambda r: _identified(r, "G"),
-        "its fitted curve, Eqs. 15 and 16, is drawn; its measured points are lost.",
+        "the fitted curve, Eqs. 15 and 16, is drawn; the measured points are not available.",
     ),
     Picture(
         "fig05",
         "Fig. 5: sensitivity Sh",
         "Response of the simulated arm to forces at the handle, and Eqs. 17 and 18.",
         lambda r: _identified(r, "S"),
-        "its fitted curve, Eqs. 17 and 18, is drawn; its measured points are lost.",
+        "the fitted curve, Eqs. 17 and 18, is drawn; the measured points are not available.",
     ),
     Picture(
         "fig06",
         "Fig. 6: operator's arm Th",
         "Hand force over handle position, and Eq. 19.",
         lambda r: _identified(r, "Th"),
-        "its fitted curve, Eq. 19, is drawn, and its crossover near 3 rad/s is in the table; the "
-        "points measured on three operators are lost.",
+        "the fitted curve, Eq. 19, is drawn, and its crossover near 3 rad/s is in the table; the "
+        "points measured on three operators are not available.",
     ),
     Picture(
         "fig07",
@@ -105,16 +105,15 @@ PICTURES = (
         "Straight through the slab. Without inertia shaping the arm pulls the handle aside by less "
         "than a millimetre.",
         lambda r: views.path_plots.path_plot(r.constant()),
-        "the place and the length of the slab, 5 cm and 10 cm, are drawn as printed; its path is "
-        "lost.",
+        "the slab is drawn as printed, 10 cm long from 5 cm on; the path is not available.",
     ),
     Picture(
         "fig08a",
         "Fig. 8, top: velocity over position",
         "The speed is K f/(10 + K b) in the clay and ten times that outside.",
         lambda r: views.run_plots.velocity_plot(r.constant()),
-        "no speed is printed, only that it is about constant; its curve is lost. The level drawn "
-        "follows from the printed K, b and force.",
+        "the speed is called approximately constant, without a number; the curve is not available. "
+        "The level drawn follows from the printed K, b and force.",
     ),
     Picture(
         "fig08b",
@@ -122,54 +121,54 @@ PICTURES = (
         "The clay's share is b inside the slab and zero outside; the operator also feels 10/K, the "
         "compensator's own damping.",
         lambda r: views.run_plots.force_ratio_plot(r.constant()),
-        "90 N·s/m in the clay and about zero outside, both printed, are in the table and in the "
-        "levels drawn; its curve is lost.",
+        "the table and the levels drawn have the printed 90 N·s/m in the clay and about zero "
+        "outside; the curve is not available.",
     ),
     Picture(
         "fig09",
         "Fig. 9: path of the variable cut",
         "Clay of 50 N·s/m up to 5 cm on each axis and of 100 N·s/m beyond, growing in x.",
         lambda r: views.path_plots.path_plot(r.variable()),
-        "the contours of the clay are drawn as printed: 5 cm on both axes, 50 and 100 N·s/m; its "
-        "path is lost.",
+        "the borders of the clay are drawn as printed: 5 cm on both axes, 50 and 100 N·s/m; the "
+        "path is not available.",
     ),
     Picture(
         "fig10",
         "Fig. 10: velocity of the variable cut",
-        "Constant up to 5 cm, then an abrupt drop, then a slow decrease in x as the clay grows by "
-        "30 N·s/m each second.",
+        "The velocity is constant up to 5 cm, drops abruptly there, and then decreases slowly in x "
+        "while the clay grows by 30 N·s/m each second.",
         lambda r: views.run_plots.velocity_plot(r.variable(), "xy"),
-        "its words are constant, an abrupt drop at 5 cm and a slow decrease: the table has each as "
-        "a number; its curve is lost.",
+        "the text says constant, an abrupt drop at 5 cm and a slow decrease; the table puts a "
+        "number on each. The curve is not available.",
     ),
     Picture(
         "fig10_printed",
         "Fig. 10 with K = 1 on both axes, as printed",
         "The printed model is unstable in y. The run ends once the instability is certain.",
         lambda r: views.run_plots.velocity_plot(r.variable(as_printed=True), "xy"),
-        "it shows a steady cut with these gains, which its own Eqs. 16 and 18 rule out.",
+        "the figure shows a steady cut with these gains, which Eqs. 16 and 18 rule out.",
     ),
     Picture(
         "readings",
         "Readings of the growth",
-        "The paper prints the growth of the clay in three ways; each gives a different speed in x.",
+        "The printed growth of the clay can be read in three ways. Each gives another speed in x.",
         _readings,
     ),
     Picture(
         "fig11a",
         "Fig. 11: force during a maneuver, over time",
-        "Below the gain limit the hand feels its own muscle. Far above it the motors swing between "
-        "their limits.",
+        "Below the gain limit the force follows the muscle. Far above it the motor torques swing "
+        "between their limits.",
         lambda r: _maneuver(r, "time"),
-        "the gains, K = 3 and 25 in the text, 2 and 25 in the caption, and the words irregular and "
-        "much smaller are in the table as numbers; its curves are lost.",
+        "the gains are 3 and 25 in the text, 2 and 25 in the caption. The table puts numbers on "
+        "the words irregular and much smaller; the curves are not available.",
     ),
     Picture(
         "fig11b",
         "Fig. 11: force during a maneuver, over position",
         "The same runs.",
         lambda r: _maneuver(r, "position"),
-        "its caption names a position as the second axis, its text the time: both are drawn.",
+        "the caption has a position on the horizontal axis, the text has time; we draw both.",
     ),
     Picture(
         "nyquist_x",
@@ -180,7 +179,7 @@ PICTURES = (
     Picture(
         "nyquist_y",
         "Nyquist diagram of y",
-        "K = 1, as printed, encloses -1; K = 0.5 does not.",
+        "The curve of K = 1, as printed, encloses -1; that of K = 0.5 does not.",
         lambda r: _nyquist("y", (0.5, 1.0), None),
     ),
     Picture(
@@ -192,13 +191,13 @@ PICTURES = (
     Picture(
         "small_gain_y",
         "Inequality (13) on y",
-        "The paper's sufficient condition fails in the shaded band for every K.",
+        "The sufficient condition of the paper fails in the shaded band for every K.",
         lambda r: views.theory_plots.small_gain_plot("y", 1.0, B_STABILITY, operator=Operator()),
     ),
     Picture(
         "map",
         "Drift of Sh over the workspace",
-        "Without inertia shaping the printed Sh holds at the nominal pose only.",
+        "Without inertia shaping, the printed Sh holds only at the nominal pose.",
         lambda r: views.workspace_plots.workspace_plot(workspace.drift_map()),
         quick=False,
     ),

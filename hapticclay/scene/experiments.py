@@ -192,7 +192,7 @@ class PathExperiment(Experiment):
 @named
 @dataclass(frozen=True)
 class ConstantCut(PathExperiment):
-    """Cutting with constant volume (Sec. 4.1, Figs. 7, 8): along +x through a slab of clay.
+    """The cut with constant volume (Sec. 4.1, Figs. 7, 8): along +x through a slab of clay.
 
     With the default gain the linear loop of the y axis is unstable for 219 < b < 1043 N.s/m
     (251 < b < 1004 with the hand Th); that of the x axis is stable for every b.
@@ -232,7 +232,7 @@ class ConstantCut(PathExperiment):
 @named
 @dataclass(frozen=True)
 class VariableCut(PathExperiment):
-    """Cutting with variable volume (Sec. 4.2, Figs. 9, 10): along x and y at the same time.
+    """The cut with variable volume (Sec. 4.2, Figs. 9, 10): along x and y at the same time.
 
     The clay of each axis depends on the coordinate of that axis.
 
@@ -276,8 +276,8 @@ class VariableCut(PathExperiment):
 class StabilityTest(Experiment):
     """The stability test (Sec. 4.3, Fig. 11): an arbitrary maneuver through clay.
 
-    The maneuver is a muscle force of 0.1 to 2 Hz with random phases; the clay is everywhere. An
-    unstable run goes on to the end, bounded by the motors' torque alone.
+    The maneuver is a muscle force of 0.1 to 2 Hz with random phases, and clay is everywhere. An
+    unstable run continues to its end; only the torque limits of the motors bound it.
 
     Attributes:
         gain: K of the compensator on the axis [1/kg], > 0 (1 in Eq. 27; 2 or 3, and 25 in

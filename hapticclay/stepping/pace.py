@@ -149,7 +149,7 @@ def check_explicit(scenario: Scenario) -> None:
     if parts > SUBSTEPS:
         bound = f"would take {parts:.4g} steps a sample in so stiff a scene"
     elif scenario.clay and scenario.clay.yields and (creep := creep_limit(scenario)) > CREEP_MOST:
-        bound = f"would take a creep of {creep:.2g} m/s in this clay for rest"
+        bound = f"would treat creep below {creep:.2g} m/s in this clay as rest"
     if bound:
         bound = f"explicit: {bound}; choose 'fast'"
         raise ParameterError("integrator", scenario.integrator, bound)

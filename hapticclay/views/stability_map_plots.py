@@ -16,6 +16,7 @@ from .style import (
     BLACK,
     CURVE_STYLES,
     GREY,
+    LIGHT_GREY,
     UNSTABLE,
     VERMILION,
     WHITE,
@@ -72,14 +73,15 @@ def stability_map_plot(chart: StabilityMap) -> Figure:
         if chart.limit:
             x, y = chart.lines[chart.limit]
             beyond = np.clip(y, low, high)
-            ax.fill_between(factor * np.array(x), beyond, high, zorder=0, **UNSTABLE)
+            hatched = UNSTABLE | {"edgecolor": LIGHT_GREY}  # behind marks and lines
+            ax.fill_between(factor * np.array(x), beyond, high, zorder=0, **hatched)
         for name, look in CELL_MARKS.items():
             if mine := [c for c in chart.cells if c.simulated == name]:
-                look = dict(look, color=GREY, ms=stroke(6), mew=stroke(1.2), label=f"a run: {name}")
+                look = dict(look, color=GREY, ms=stroke(6), mew=stroke(1.2), label=f"run: {name}")
                 mark([c.x for c in mine], [c.y for c in mine], **look)
         if wrong := [c for c in chart.cells if c.cause]:
             look = dict(marker="o", mfc="none", color=VERMILION, ms=stroke(13), mew=stroke(1.5))
-            label = "unlike continuous time, no delay, nominal pose"
+            label = "differs from the nominal continuous loop"
             mark([c.x for c in wrong], [c.y for c in wrong], label=label, **look)
         for (name, (x, y)), look in zip(chart.found.items(), BOUNDARY_MARKS, strict=False):
             label = name.replace("runs", "boundary found by runs")

@@ -315,7 +315,7 @@ def test_a_creep_too_slow_for_explicit_steps_counts_as_rest():
         way = r.p[-1, 0] - r.p[0, 0]
         assert (way > 0.0) == moves
         assert abs(way - speed * span) <= (0.02 if moves else 1.0) * speed * span
-    with pytest.raises(ParameterError, match="creep of .* choose 'fast'"):
+    with pytest.raises(ParameterError, match="creep below .* choose 'fast'"):
         hc.simulate(slider(hc.Flow(K=300.0, n=0.23), 1e-2, 0.3))
 
 

@@ -238,7 +238,7 @@ def test_picture_shows_the_map_with_units(poses, tmp_path):
     shown = {line.get_label(): line for line in ax.lines}
     np.testing.assert_allclose(shown["boundary found by runs"].get_ydata(), poses.found["runs"][1])
     np.testing.assert_allclose(shown["boundary found by runs"].get_xdata(), [-10.0, 10.0])
-    ringed = shown["unlike continuous time, no delay, nominal pose"]
+    ringed = shown["differs from the nominal continuous loop"]
     assert len(ringed.get_xdata()) == sum(bool(c.cause) for c in poses.cells)
     figure.savefig(tmp_path / "a.png")
 

@@ -1,0 +1,116 @@
+"""Makes the four pictures of the first page and of README.md: docs/home_*.png, all of one size.
+
+python docs/home_pictures.py [cut wall map film]
+"""
+
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+os.environ.setdefault("MPLBACKEND", "agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from PIL import Image
+
+import hapticclay as hc
+from hapticclay.views import film
+
+DOCS = Path(__file__).parent
+SIZE, DPI = (4.4, 3.3), 160  # [inch], [1/inch]: letters stay legible at half of a page's width
+
+
+def cut(ax: Axes) -> None:
+    """Velocity over position in the constant cut.
+
+    Args:
+        ax: where it is drawn.
+    """
+    record = hc.simulate(hc.constant_cut())
+    ax.axvspan(5.0, 15.0, ymax=0.8, color="#e5c7b8", lw=0)
+    ax.plot(100.0 * record.p[:, 0], 100.0 * record.v[:, 0], label="run")
+    for first, last, b in ((0.0, 5.0, 0.0), (5.0, 15.0, 90.0), (15.0, 20.0, 0.0)):
+        label = "steady speed, K f/(10 + K b)" if b else None
+        ax.plot((first, last), 2 * (100.0 / (10.0 + b),), "--", color="#d55e00", label=label)
+    ax.text(10.0, 5.0, "clay", ha="center")
+    ax.set(xlabel="position [cm]", ylabel="velocity [cm/s]", xlim=(0.0, 20.0), ylim=(-0.6, 13.6))
+    ax.set_xticks((0, 5, 10, 15, 20))
+    ax.legend(loc="upper left")
+
+
+def wall(ax: Axes) -> None:
+    """A hand that presses on a wall which vibrates, and on the same wall with damping.
+
+    Args:
+        ax: where it is drawn.
+    """
+    hand = hc.Operator(mass=0.0, damper=2.0, spring=0.0)
+    device = hc.Device(mass=0.1, damper=0.5)
+    stiff = hc.VirtualWall(K=6000.0, device=device, operator=hand, Ts=1e-3, unilateral=True)
+    ax.axhspan(0.0, 4.0, color="0.92", lw=0)
+    for each, color in ((stiff, "#d55e00"), (replace(stiff, B=5.0), "#0072b2")):
+        press = each.scenario(0.4, push=0.05, start=-0.005, muscle=hc.Constant((2.0, 0.0)))
+        record = hc.simulate(press, engine="python")
+        label = f"6000 N/m, B = {each.B:g} N·s/m"
+        ax.plot(1e3 * record.t, 1e3 * record.p[:, 0], color=color, label=label)
+    ax.text(395.0, 3.3, "in the wall", ha="right")
+    ax.set(xlabel="time [ms]", ylabel="position [mm]", xlim=(0.0, 400.0), ylim=(-5.4, 4.0))
+    ax.set_xticks((0, 100, 200, 300, 400))
+    ax.legend(loc="lower right")
+
+
+def region(ax: Axes) -> None:
+    """The Z-width of a device, by theory and by runs.
+
+    Args:
+        ax: where it is drawn.
+    """
+    wall = hc.VirtualWall(device=hc.Device(mass=0.1, damper=0.5), Ts=1e-3)
+    B = (0.0, 5.0, 15.0, 30.0, 60.0, 90.0, 120.0, 150.0, 180.0)
+    (found,) = hc.walls.zwidth(wall, B=B).regions
+    exact = next(x for x in found.limits if x.name.startswith("exact"))
+    K = 1e-3 * np.asarray(exact.K)
+    ax.fill_between(exact.B, K, color="#56b4e9", alpha=0.22, lw=0)
+    ax.plot(exact.B, K, label="exact limit")
+    ax.plot(found.B, 1e-3 * np.asarray(found.K), "ko", label="limit by runs", clip_on=False)
+    ax.text(85.0, 22.0, "stable walls", ha="center")
+    ax.set(xlabel="virtual damping [N·s/m]", ylabel="virtual stiffness [kN/m]")
+    ax.set(xlim=(0.0, 180.0), ylim=(0.0, 90.0), xticks=(0, 60, 120, 180))
+    ax.legend(loc="upper left")
+
+
+def frame() -> np.ndarray:
+    """The last frame of a film of the variable cut, without plots."""
+    record = hc.simulate(hc.variable_cut())
+    width, height = (round(DPI * x) for x in SIZE)
+    options = film.FilmOptions(size=(width, height), plots=False, smooth=True, speed=1000.0)
+    for image in film.frames(record, options):
+        last = image
+    return last
+
+
+DRAWN: dict[str, Callable[[Axes], None]] = {"cut": cut, "wall": wall, "map": region}
+
+
+def main(names: list[str]) -> None:
+    """Makes pictures.
+
+    Args:
+        names: of the pictures; none for all.
+    """
+    plt.style.use("hapticclay.views.figure")
+    for name, draw in DRAWN.items():
+        if not names or name in names:
+            figure, ax = plt.subplots(figsize=SIZE)
+            draw(ax)
+            figure.savefig(DOCS / f"home_{name}.png", dpi=DPI)
+            plt.close(figure)
+    if not names or "film" in names:
+        Image.fromarray(frame()).save(DOCS / "home_film.png", optimize=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
