@@ -518,7 +518,10 @@ def function(name: str, *more: Any) -> Any:
 
 STEP, RESET = map(function, ("mj_step", "mj_resetData"))
 DYNAMICS = engine_step.Dynamics(
-    *map(function, ("mj_kinematics", "mj_comPos", "mj_makeM", "mj_comVel")),
+    function("mj_kinematics"),
+    function("mj_comPos"),
+    function("mj_makeM"),
+    function("mj_comVel"),
     function("mj_rne", ctypes.c_int, ctypes.c_size_t),
 )
 
