@@ -78,11 +78,11 @@ def lasting(scenario: hc.Scenario, steps: int) -> hc.Scenario:
     return dataclasses.replace(scenario, t_max=(steps + 0.5) * scenario.dt, length=None)
 
 
-def timed(function, *args, **kw) -> np.ndarray:
-    """Seconds that function(*args, **kw) takes, and processor seconds, on all cores together."""
+def timed(function, *args, **kw) -> tuple[np.ndarray, Any]:
+    """Seconds that function(*args, **kw) takes and processor seconds on all cores; its result."""
     begin = time.perf_counter(), time.process_time()
-    function(*args, **kw)
-    return np.array((time.perf_counter() - begin[0], time.process_time() - begin[1]))
+    found = function(*args, **kw)
+    return np.array((time.perf_counter() - begin[0], time.process_time() - begin[1])), found
 
 
 def warm(todo: list[hc.Scenario]) -> None:
@@ -112,10 +112,10 @@ def native(scenario: hc.Scenario, steps: int) -> tuple[float, float, float]:
         return steps * floor(scenario, steps, time.process_time)
 
     s, pool = lasting(scenario, steps), batch.BatchPool(1)
-    first, short, then = bare(), timed(pool.brief, s, KERNEL)[1], bare()
-    whole = timed(hc.simulate, s, engine="native")[1]
+    first, short, then = bare(), timed(pool.brief, s, KERNEL)[0][1], bare()
+    whole = timed(hc.simulate, s, engine="native")[0][1]
     between = bare()
-    thin = timed(hc.simulate, s, engine="native", every=1_000_000)[1]
+    thin = timed(hc.simulate, s, engine="native", every=1_000_000)[0][1]
     return (
         short / (0.5 * (first + then)),
         whole / (0.5 * (then + between)),
@@ -204,7 +204,7 @@ def beside(
 
     usual, batch.BatchPool = batch.BatchPool, Turns
     try:
-        took = timed(hc.simulate_batch, todo, keep=keep) * (common.CORES, 1.0)
+        took = timed(hc.simulate_batch, todo, keep=keep)[0] * (common.CORES, 1.0)
     finally:
         batch.BatchPool = usual
     return (took - sum(aside)) / len(todo), np.mean(bare, axis=0)
@@ -344,19 +344,17 @@ def column_runs(sizes: list[int], control: str) -> list[dict[str, Any]]:
     for n in sizes:
         base, columns = drawn_columns(n, control)
         before = floor(base, 20_000, time.process_time)
-        begin = time.perf_counter(), time.process_time()
-        found = hc.simulate_columns(base, columns)
-        wall, spent = time.perf_counter() - begin[0], time.process_time() - begin[1]
+        (wall, spent), found = timed(hc.simulate_columns, base, columns)
         steps = int(found["steps"].sum())  # late torques add some between the samples
         bare = 0.5 * (before + floor(base, 20_000, time.process_time)) * steps
         rows.append(
             {
                 "runs": n,
                 "control": control,
-                "runs_a_second": n / wall,
-                "over_floor_cpu": spent / bare,
+                "runs_a_second": n / float(wall),
+                "over_floor_cpu": float(spent) / bare,
                 "floor_us_a_run": 1e6 * bare / n,
-                "us_a_run": 1e6 * spent / n,
+                "us_a_run": 1e6 * float(spent) / n,
                 "peak_MiB": memory(),
             }
         )
@@ -364,7 +362,7 @@ def column_runs(sizes: list[int], control: str) -> list[dict[str, Any]]:
 
 
 def draw(rows: list[dict[str, Any]], out: Path) -> None:
-    """Processor time of a run over the number of runs, beside the floor."""
+    """Runs per second of one processor over the number of runs, beside the floor."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.0, 4.0), layout="constrained")
@@ -372,11 +370,13 @@ def draw(rows: list[dict[str, Any]], out: Path) -> None:
     for control, color in (("continuous", "#0072B2"), ("sampled", "#D55E00")):
         some = [r for r in rows if r["control"] == control]
         n = [r["runs"] for r in some]
-        ax.plot(n, [r["us_a_run"] for r in some], "o-", color=color, label=f"{control} control")
-        ax.plot(n, [r["floor_us_a_run"] for r in some], "--", color=color, lw=1.0)
-    ax.plot([], [], "--", color="0.4", lw=1.0, label="mj_step alone")
+        made = [1e6 / r["us_a_run"] for r in some]
+        bare = [1e6 / r["floor_us_a_run"] for r in some]
+        ax.plot(n, made, "o-", color=color, label=f"{control} control")
+        ax.plot(n, bare, "--", color=color, lw=1.0)
+    ax.plot([], [], "--", color="0.4", lw=1.0, label="as many steps of mj_step alone")
     ax.set(xscale="log", xlabel="runs in a call [1]", ylim=(0.0, None))
-    ax.set(ylabel=f"processor time of a run of {SHORT_STEPS} steps [µs]")
+    ax.set(ylabel=f"runs of {SHORT_STEPS} steps per processor second [1/s]")
     ax.grid(color="0.9")
     ax.legend(frameon=False, fontsize=9)
     with atomic(out / "throughput.png") as f:

@@ -508,18 +508,26 @@ def library() -> ctypes.CDLL:
     return ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("*mujoco.*"))))
 
 
-def function(name: str) -> Any:
+def function(name: str, *more: Any) -> Any:
     """A function of the engine that takes model and data.
 
     Args:
         name: its name.
+        more: types of further arguments.
     """
     found = getattr(library(), name)
-    found.argtypes, found.restype = [ctypes.c_size_t, ctypes.c_size_t], None
+    found.argtypes, found.restype = [ctypes.c_size_t, ctypes.c_size_t, *more], None
     return found
 
 
-STEP, FORWARD, RESET = map(function, ("mj_step", "mj_forward", "mj_resetData"))
+STEP, RESET = map(function, ("mj_step", "mj_resetData"))
+DYNAMICS = engine_step.Dynamics(
+    function("mj_kinematics"),
+    function("mj_comPos"),
+    function("mj_makeM"),
+    function("mj_comVel"),
+    function("mj_rne", ctypes.c_int, ctypes.c_size_t),
+)
 
 
 # ---- kernels -------------------------------------------------------------------------------------
@@ -693,13 +701,13 @@ def warm(scenario: Scenario) -> None:
 
 
 def calls(model: Any, data: Any) -> tuple[Any, ...]:
-    """mj_step, mj_forward, model and data as compiled code calls them.
+    """mj_step, dynamics, model and data as compiled code calls them.
 
     Args:
         model: of the engine.
         data: of the engine.
     """
-    return STEP, FORWARD, model._address, data._address
+    return STEP, DYNAMICS, model._address, data._address
 
 
 KERNEL = run.Kernel(natively, calls, lambda x: x.ctypes.data, QUIET)

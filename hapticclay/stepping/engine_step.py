@@ -6,29 +6,47 @@ from typing import Any, NamedTuple
 
 from ..model import arm
 
+THREE = 0.0, 0.0, 0.0
+
+
+class Dynamics(NamedTuple):
+    """Functions of the engine that give inertia and bias: what of mj_forward this arm needs.
+
+    Attributes:
+        kinematics: mj_kinematics.
+        com_pos: mj_comPos.
+        inertia: mj_makeM.
+        com_vel: mj_comVel.
+        bias: mj_rne.
+    """
+
+    kinematics: Any
+    com_pos: Any
+    inertia: Any
+    com_vel: Any
+    bias: Any
+
 
 class Probe(NamedTuple):
     """The engine as the accurate method uses it.
 
     Attributes:
-        forward: mj_forward.
+        dynamics: its functions.
         model: the model.
         data: its data.
         q: joint angles [rad].
         w: joint rates [rad/s].
-        acceleration: joint accelerations [rad/s^2].
-        ctrl: torques of the motors [N.m] and dampers [N.s/m].
-        push: applied joint torques [N.m].
+        M: inertia in joint space, M11, M21, M22 [kg.m^2].
+        bias: Coriolis and centripetal torques of the joints [N.m].
     """
 
-    forward: Any
+    dynamics: Dynamics
     model: Any
     data: Any
     q: Any
     w: Any
-    acceleration: Any
-    ctrl: Any
-    push: Any
+    M: Any
+    bias: Any
 
 
 class Engine(NamedTuple):
@@ -132,12 +150,18 @@ def moved_arm(parts, e, before, w, k, h):
     return step_engine(e, parts.clay, tau, push, (0.0, 0.0), h)
 
 
-def accelerations(probe, clay, z, now):
-    """Joint accelerations that the engine gives at a point of a step [rad/s^2]."""
+def accelerations(probe, z, now):
+    """Joint accelerations at a point of a step, by the engine's inertia and bias [rad/s^2]."""
     put(probe.q, 0, z.q)
     put(probe.w, 0, z.w)
-    put(probe.ctrl, 0, now.tau)
-    with_dampers(clay, probe, now.b)
-    put(probe.push, 0, now.push)
-    probe.forward(probe.model, probe.data)
-    return pair(probe.acceleration)
+    x, model, data = probe.dynamics, probe.model, probe.data
+    x.kinematics(model, data)
+    x.com_pos(model, data)
+    x.inertia(model, data)
+    x.com_vel(model, data)
+    x.bias(model, data, 0, probe.bias)
+    (c1, c2), (m11, m21, m22) = pair(probe.bias), numbers_at(THREE, probe.M, 0)
+    n1, n2 = now.tau[0] + now.push[0] - c1, now.tau[1] + now.push[1] - c2
+    share = m21 / m22
+    a1 = (n1 - share * n2) / (m11 - share * m21)
+    return a1, n2 / m22 - share * a1

@@ -120,9 +120,8 @@ def instant(parts, when, z, clay, modes):
     (ddx, ddy), form = servo.rates_now(parts.form, parts.lag, z, f)
     dx, dy = hand.dampers(parts.hand)
     muscle, motors = uh[0] * v[0] + uh[1] * v[1], tau[0] * w[0] + tau[1] * w[1]
-    fx, fy = f[0] + x, f[1] + y  # on the engine's handle, whose dampers take what they do
-    push, r = arm.joint_torques(fx, fy, at.u), (mx + r[0], my + r[1])
-    x, y = x + r[0], y + r[1]
+    fx, fy, r = f[0] + x, f[1] + y, (mx + r[0], my + r[1])
+    push, x, y = arm.joint_torques(f[0], f[1], at.u), x + r[0], y + r[1]
     return Instant(
         at.p, v, b, (x, y), (fx + r[0], fy + r[1]), tau, push,
         (delta[0] + feed[0] * f[0], delta[1] + feed[1] * f[1]),

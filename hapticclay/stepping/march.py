@@ -224,7 +224,7 @@ def march(probe, parts, s, h):
             first = now
             if h == 0.0:
                 break
-        a = accelerations(probe, parts.clay, z, now)
+        a = accelerations(probe, z, now)
         if still:  # except for the engine's rounding
             a = 0.0, 0.0
         sums = with_stage(sums, i, now, a)

@@ -20,7 +20,7 @@ from ..model.sampled_controller import Controller
 from ..scene.scenario import Scenario
 from . import begin, energy, engine, monitor, path, rows, scene, viscous
 from .engine import mujoco
-from .engine_step import Engine, Probe
+from .engine_step import Dynamics, Engine, Probe
 from .machine_code import kind_of
 from .parts import Chance, Parts
 from .state import FINISHED, NOT_FINITE, OPEN, UNRESOLVED, Filled, State
@@ -74,7 +74,7 @@ class Kernel(NamedTuple):
 
     Attributes:
         advance: makes steps, called with (run, room).
-        calls: mj_step, mj_forward, model and data as these steps call them.
+        calls: mj_step, Dynamics, model and data as these steps call them.
         place: an array as they write into it: a memoryview, or its address.
         quiet: monitor.is_quiet, compiled; None calls the monitor itself.
         ahead: tries the next step of a run, called with the run. Returns the row that it would
@@ -117,9 +117,20 @@ def plainly(run: Run, room: int) -> None:
         one_plainly(run, path.step)
 
 
-PLAIN = Kernel(
-    plainly, lambda model, data: (mujoco.mj_step, mujoco.mj_forward, model, data), memoryview
-)
+def bias(model: Any, data: Any, accelerated: int, to: Any) -> None:  # noqa: ARG001
+    """mj_rne, into data.qfrc_bias.
+
+    Args:
+        model: of the engine.
+        data: of the engine.
+        accelerated: 1 to add the torques of the accelerations.
+        to: a view of that array, which mj_rne does not accept.
+    """
+    mujoco.mj_rne(model, data, accelerated, data.qfrc_bias)
+
+
+DYNAMICS = Dynamics(mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_makeM, mujoco.mj_comVel, bias)
+PLAIN = Kernel(plainly, lambda model, data: (mujoco.mj_step, DYNAMICS, model, data), memoryview)
 
 
 def at_rest(model: Any, data: Any, s: Scenario) -> None:
@@ -194,11 +205,11 @@ class EngineStore:
         self.room_for(parts)
         kept: Any = self.rows, self.crossings, self.stops, self.rendered
         own: Any = data.qpos, data.qvel, data.ctrl, data.qfrc_applied, engine.timestep_view(model)
-        probed: Any = data.qpos, data.qvel, data.qacc, data.ctrl, data.qfrc_applied
-        step, forward, *engine_ = kernel.calls(model, data)
+        probed: Any = data.qpos, data.qvel, data.M, data.qfrc_bias
+        step, dynamics, *engine_ = kernel.calls(model, data)
         probe = None
         if parts.accurate is not None:
-            probe = Probe(forward, *engine_, *map(kernel.place, probed))
+            probe = Probe(dynamics, *engine_, *map(kernel.place, probed))
         places = map(kernel.place, [*own, *(x.reshape(-1) for x in kept)])
         rest: Any = *places, CROSSINGS - 3, max(len(self.stops) - 8, 1), probe
         return Engine(step, *engine_, *rest)

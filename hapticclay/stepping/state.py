@@ -818,7 +818,7 @@ class Instant(NamedTuple):
         fe: force of the clay [N].
         fh: force of the hand [N].
         tau: torques [N.m].
-        push: joint torques of the rest of the hand force [N.m].
+        push: joint torques of hand and clay [N.m].
         delta: compensator output [m].
         x: delta'' and y'' of x [m/s^2].
         y: the same of y.

@@ -12,6 +12,7 @@ import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model import arm, controller
 from hapticclay.model.operator import NO_HAND, Operator
+from hapticclay.stepping.engine_step import accelerations
 from hapticclay.stepping.instant import instant
 from hapticclay.stepping.run import Run
 from hapticclay.stepping.state import Axis, Moment, Point
@@ -205,6 +206,30 @@ def test_a_stage_is_what_its_laws_say(name, x, b, held):
     expected = (*p, *v, *fh, *out[6:8], *delta)
     sample = *now.p, *now.v, *now.fh, *now.tau, *now.delta
     np.testing.assert_allclose(sample, expected, rtol=1e-11, atol=1e-11)
+
+
+@given(
+    st.sampled_from([*STAGES]), st.tuples(*[unit] * 4), st.floats(0.0, 100.0), st.floats(0.0, 100.0)
+)
+def test_the_joints_accelerate_as_in_mj_forward(name, x, bx, by):
+    """Its dampers and motors act there; the method applies their torques itself."""
+    s = dataclasses.replace(hc.constant_cut(integrator="accurate"), **STAGES[name])
+    run = Run(s, 1)
+    q = 1.2 + x[0], -1.5 + x[1]
+    still = Axis(0.0, 0.0, 0.0, 0.0)
+    z = Point(q, x[2:], still, still, run.state.loop.form)
+    clay = run.state.clay._replace(b=(bx, by))
+    now = instant(run.views, Moment(0.0, 0.0, -1, 0.0), z, clay, None)
+    found = accelerations(run.e.probe, z, now)
+    model = hc.build(s)
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:], data.ctrl[:] = q, x[2:], (*now.tau, bx, by)
+    u = arm.jacobian(*q, s.arm.links)  # type: ignore[call-arg]
+    data.qfrc_applied[:] = arm.joint_torques(*now.fh, u)
+    mujoco.mj_forward(model, data)
+    scale = np.abs(data.qacc).max() + np.abs(now.fh).max() * 10.0
+    # rounding, 1e-16, times the condition of the inertia, up to 1e2, and the forces that cancel
+    np.testing.assert_allclose(found, data.qacc, rtol=0.0, atol=1e-12 * (1.0 + scale))
 
 
 def test_the_choice_is_checked():

@@ -1,5 +1,8 @@
 """run_columns: what simulate_columns gives, in a folder, whatever interrupts it."""
 
+import signal
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -37,6 +40,24 @@ def test_an_interrupted_call_goes_on(tmp_path):
     assert run_columns(BASE, HANDS, tmp_path, chunk=5, workers=1) == 8
     assert_whole(tmp_path)
     assert run_columns(BASE, HANDS, tmp_path, chunk=5, workers=1) == 0
+
+
+KILLED = """
+import os, signal, sys
+from hapticclay.studies.column_runs import run_columns
+from tests.studies.test_column_runs import BASE, HANDS
+
+end = lambda n: os.kill(os.getpid(), signal.SIGKILL)
+run_columns(BASE, HANDS, sys.argv[1], chunk=5, workers=1, progress=end)
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="POSIX")
+def test_a_killed_process_goes_on_from_its_whole_files(tmp_path):
+    killed = subprocess.run([sys.executable, "-c", KILLED, tmp_path], timeout=120)
+    assert killed.returncode == -signal.SIGKILL
+    assert run_columns(BASE, HANDS, tmp_path, chunk=5, workers=1) == 8
+    assert_whole(tmp_path)
 
 
 def test_two_workers_of_a_cluster(tmp_path):
