@@ -27,6 +27,7 @@ from .engines import ENGINES, kernel_for
 from .vectored import repay
 
 MOST = 1e6  # largest force [N] and torque [N.m] that may be given
+MOST_GAIN = 1e6  # largest K of a scenario [1/kg]
 LOOK = 0.02  # [s] of simulated time between two checks for divergence
 TOLD = 1000  # steps after which to check again whether machine code pays
 COLUMNS = {"q": 0, "p": 2, "v": 4, "fh": 6, "tau": 8, "delta": 10, "b": 12, "qd": 14, "fe": ROW}
@@ -303,14 +304,18 @@ class Simulation:
             ParameterError: a value is out of its bounds, or an operator would be added or removed.
         """
         with self._alone() as run:
-            changes: dict[str, Any] = {} if gain is None else {"gain": gain}
+            gain = None if gain is None else gain_of(gain)
+            changes: dict[str, Any] = {}
             if operator is not None:
                 started_with_operator(run.scenario, operator)
                 changes["operator"] = operator
             if b is not None:
                 factor, clay = number("b", b, 0.0, 1e6), self._given.clay
                 changes["clay"] = clay and clay.scaled(factor)
-            run.change(replace(run.scenario, **changes))
+            if changes:
+                run.change(replace(run.scenario, **changes))
+            if gain is not None:
+                run.change_gain(gain)
             self._state = None
 
     def record(self) -> record.Record:
@@ -392,6 +397,18 @@ def stepwise_kernel(kernel: Kernel) -> Kernel:
     from ..stepping.compiled import BY_ROWS  # where it is loaded
 
     return BY_ROWS
+
+
+def gain_of(value: object) -> tuple[float, float]:
+    """Gains K of x and y [1/kg], checked as those of a scenario.
+
+    Args:
+        value: the gains.
+
+    Raises:
+        ParameterError: there are not two, or one is out of bounds.
+    """
+    return pair("gain", value, 0.0, MOST_GAIN, unit="1/kg")
 
 
 def started_with_operator(scenario: Scenario, operator: object) -> None:

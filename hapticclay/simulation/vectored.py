@@ -35,6 +35,7 @@ class VectoredRuns:
         runs: the runs.
         given: the scenario that each began with.
         force: constant muscle force of each that is in effect [N], shape (n, 2).
+        gain: K of x and y of each that is in effect [1/kg], shape (n, 2).
         over: which have ended.
         common: what is known of each, see vector.Vector.
     """
@@ -45,7 +46,7 @@ class VectoredRuns:
         self.compiled: Any = load_compiled() if engine == "native" else None
         self.common, self.over = Common(n), np.zeros(n, bool)
         self.given, self.changed = list(scenarios), np.zeros(n, bool)
-        self.force, self.steady = np.zeros((n, 2)), np.zeros((n, 2))
+        self.force, self.steady, self.gain = np.zeros((3, n, 2))
         self.looked_at, self.diverging = np.full(n, -np.inf), np.zeros(n, bool)
         self.vectors: dict[Any, RunVector] = {}
         self.of: list[RunVector | None] = [None] * n
@@ -72,7 +73,7 @@ class VectoredRuns:
         """Notes that a run is at its start."""
         c, s = self.common, self.given[k]
         self.over[k], self.changed[k] = False, False
-        self.force[k], self.steady[k] = s.force, scene.steady_force(s)
+        self.force[k], self.steady[k], self.gain[k] = s.force, scene.steady_force(s), s.gain
         self.looked_at[k], self.diverging[k] = -np.inf, False
         c.quiet[k], c.swings[k], c.seen[k] = 1, 0.0, (0, -1, -1, 0)
         c.times[k], c.marks[k], c.looked[k] = 0.0, (0, 0, OPEN, 0, 0, 0), 0
@@ -106,10 +107,13 @@ class VectoredRuns:
         v.advance = self.compiled.advancing(v.kind, v.parts, v.state, v.place(0), v.x, none, STEPS)
 
     def _sync(self, k: int) -> Run:
-        """The run, with its present state and force."""
+        """The run, with its present state, force and gain."""
         run, v = self.runs[k], self.of[k]
         if v is not None:
             v.give(k, run)
+            gain = float(self.gain[k, 0]), float(self.gain[k, 1])
+            if gain != run.scenario.gain:
+                run.change_gain(gain)
             force = float(self.force[k, 0]), float(self.force[k, 1])
             if force != run.scenario.force:
                 run.change_force(force)
@@ -157,6 +161,28 @@ class VectoredRuns:
         self._unshow()
         if self.of[k]:
             self._place(k)
+
+    def set_gain(self, which: np.ndarray, gain: np.ndarray) -> None:
+        """Continues with other gains, in runs that have not ended.
+
+        Args:
+            which: indices of runs.
+            gain: K of x and y of each [1/kg], shape (len(which), 2).
+        """
+        other = (gain != self.gain[which]).any(axis=1) & ~self.over[which]
+        which, gain = which[other], gain[other]
+        if not len(which):
+            return
+        self.gain[which], self.changed[which] = gain, True
+        self._unshow()
+        for v, ks in self._groups(which):
+            if v is not None and scene.takes_gain(v.parts):
+                v.set_gain(ks, self.gain[ks])
+                continue
+            for k in ks.tolist():
+                self._sync(k).change_gain((float(self.gain[k, 0]), float(self.gain[k, 1])))
+                if v is not None:
+                    self._place(k)
 
     # ---- steps
 
@@ -288,7 +314,7 @@ class VectoredRuns:
         run, v = self.runs[k], self.of[k]
         if v is None or self.over[k]:
             return
-        v.give(k, run)
+        self._sync(k)
         run.note_end()
         run.flush()
         v.take_state(k, run)
@@ -328,10 +354,7 @@ class VectoredRuns:
         self.looked_at[due] = self.common.times[due]
         self.diverging[due] = False
         for k in np.flatnonzero(due & (self.common.quiet == 0)).tolist():
-            run = self.runs[k]
-            if (v := self.of[k]) is not None:
-                v.give(k, run)
-            self.diverging[k] = run.is_diverging()
+            self.diverging[k] = self._sync(k).is_diverging()
         onset = [run.watch.onset is not None for run in self.runs]
         return self.diverging | np.array(onset, bool)
 

@@ -575,9 +575,21 @@ class Run:
         Args:
             force: (x, y) [N].
         """
-        self.scenario = copy.copy(self.scenario)  # the rest of it has been checked
-        object.__setattr__(self.scenario, "force", force)
+        self.scenario = with_checked(self.scenario, force=force)
         self.push_evenly((0.0, *scene.steady_force(self.scenario), 0.0, 0.0))
+
+    def change_gain(self, gain: tuple[float, float]) -> None:
+        """Continues with another gain.
+
+        Args:
+            gain: K of x and y [1/kg], within the bounds of a scenario.
+        """
+        changed = with_checked(self.scenario, gain=gain)
+        if scene.takes_gain(self.parts):
+            self.scenario = self.watch.scenario = changed
+            self._renumber(scene.with_gain(self.parts, gain))
+        else:
+            self.change(changed)
 
     def push_evenly(self, steady: tuple[float, ...]) -> None:
         """Continues under a muscle force that changes evenly.
@@ -585,12 +597,16 @@ class Run:
         Args:
             steady: as Push.steady.
         """
+        self._renumber(self.parts._replace(push=self.parts.push._replace(steady=steady)))
+
+    def _renumber(self, parts: Parts) -> None:
+        """Continues with another muscle force or gain in the same parts."""
         row = self.row if self.row is not None and self.row.parts is self.parts else None
         kind, native = self._kind, self._native
-        self.take(self.parts._replace(push=self.parts.push._replace(steady=steady)))
+        self.take(parts)
         self._kind, self._native = kind, native
         if row is not None:
-            row.push(self.parts)
+            row.renumber(parts)
 
     def position(self, h: float = 0.0) -> tuple[float, float]:
         """Handle position after the joints have turned at their present rates, (x, y) [m].
@@ -836,6 +852,18 @@ class Run:
         names = "friction", "passivity_controller", "coupling"
         found = {n: float(each) for n, each, on in zip(names, x, used, strict=True) if on}
         return found | {"residual": out["residual"] - found.get("friction", 0.0)}
+
+
+def with_checked(scenario: Scenario, **fields: Any) -> Scenario:
+    """A scenario with other fields, whose values have been checked, as has all else.
+
+    Args:
+        scenario: the scenario.
+        **fields: the fields.
+    """
+    made = object.__new__(type(scenario))
+    made.__dict__.update(scenario.__dict__, **fields)
+    return made
 
 
 def _drives(scenario: Scenario) -> Any:

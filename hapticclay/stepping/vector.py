@@ -366,6 +366,15 @@ class RunVector:
         at = self.put.push.steady[1:3]
         self.x.numbers[which[:, None], at] = force
 
+    def set_gain(self, which: np.ndarray, gain: np.ndarray) -> None:
+        """Sets gains, where scene.takes_gain.
+
+        Args:
+            which: indices of runs.
+            gain: K of x and y of each [1/kg], shape (n, 2).
+        """
+        self.x.numbers[which[:, None], [lag.K for lag in self.put.lag]] = gain
+
     def place(self, thread: int) -> Place:
         """Where a thread makes steps.
 
@@ -439,14 +448,17 @@ class Row:
         """Notes that the run has another state."""
         self.leads = self.taken = self.shows = False
 
-    def push(self, parts: Parts) -> None:
-        """Takes over another muscle force.
+    def renumber(self, parts: Parts) -> None:
+        """Takes over another muscle force or gain.
 
         Args:
-            parts: with this force, otherwise the same.
+            parts: with these, otherwise the same.
         """
-        at = self.vector.put.push.steady
-        self.vector.x.numbers[0, list(at)] = parts.push.steady
+        at, numbers = self.vector.put, self.vector.x.numbers[0]
+        for i, x in zip(at.push.steady, parts.push.steady, strict=True):
+            numbers[i] = x
+        for place, lag in zip(at.lag or (), parts.lag or (), strict=True):
+            numbers[place.K] = lag.K
         self.parts, self.shows = parts, False
 
     def move(self, room: int) -> None:
