@@ -41,6 +41,7 @@ class SimulationBatch:
         scenarios: what to run, one per run.
         engine: as in `simulate`; "auto" compiles once the requested steps make it worthwhile.
         workers: threads of compiled steps; None for one per core.
+        monitored: as in `Simulation`.
 
     Raises:
         ParameterError: there is no scenario, one is of another type, or is refused as by
@@ -48,7 +49,12 @@ class SimulationBatch:
     """
 
     def __init__(
-        self, scenarios: Sequence[Scenario], *, engine: str = "auto", workers: int | None = None
+        self,
+        scenarios: Sequence[Scenario],
+        *,
+        engine: str = "auto",
+        workers: int | None = None,
+        monitored: bool = True,
     ):
         engine = choice("engine", engine, ENGINES)
         if engine == "native" and not has_numba():
@@ -59,7 +65,7 @@ class SimulationBatch:
         if not given:
             raise ParameterError("scenarios", scenarios, "must hold at least one Scenario")
         self._lock, self._closed = threading.Lock(), False
-        self._runs = VectoredRuns(given, engine, workers)
+        self._runs = VectoredRuns(given, engine, workers, monitored)
 
     @contextlib.contextmanager
     def _alone(self) -> Iterator[VectoredRuns]:
@@ -191,6 +197,11 @@ class SimulationBatch:
         with self._alone() as runs:
             at = COLUMNS[name]
             return runs.show()[:, at : at + 2].copy()
+
+    def numbers(self) -> np.ndarray:
+        """The present samples as rows, see `Simulation.numbers`, shape (N, 18)."""
+        with self._alone() as runs:
+            return runs.show().copy()
 
     @property
     def t(self) -> np.ndarray:

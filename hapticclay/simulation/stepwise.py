@@ -84,18 +84,30 @@ class Simulation:
     Args:
         scenario: what to run.
         engine: as in `simulate`; "auto" compiles once the requested steps make it worthwhile.
+        recorded: whether a record is kept; else at most the last 4095 samples, for the monitor.
+        monitored: whether the run ends when an axis is judged unstable; else it ends only at its
+            limits, out of reach or above 20 m/s, and `diverging` is False. For muscle forces that
+            jump, whose larger swings the monitor would mistake for growth.
 
     Raises:
         ParameterError: scenario is of another type, or refused as by `simulate`.
     """
 
-    def __init__(self, scenario: Scenario, *, engine: str = "auto"):
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        engine: str = "auto",
+        recorded: bool = True,
+        monitored: bool = True,
+    ):
         if not isinstance(scenario, Scenario):
             bound = "must be a Scenario, as constant_cut() returns"
             raise ParameterError("scenario", scenario, bound)
         self._engine = choice("engine", engine, ENGINES)
         self._lock, self._store, self._untold = threading.Lock(), EngineStore(), 0
-        self._closed, self._warned = False, ()
+        self._closed, self._warned, self._recorded = False, (), recorded
+        self._monitored = monitored
         self._begin(scenario)
 
     def _begin(self, scenario: Scenario) -> None:
@@ -106,10 +118,13 @@ class Simulation:
         kernel = PLAIN
         if self._engine == "native":
             kernel = stepwise_kernel(kernel_for(scenario, self._engine))
-        self._run = Run(scenario, 1, kernel, self._store, watched=True)
+        self._run = Run(scenario, 1, kernel, self._store, watched=True, **self._kept())
         self._given, self._wall = scenario, 0.0
         self._torque: tuple[float, float] | None = None
         self._forget()
+
+    def _kept(self) -> dict[str, bool]:
+        return {"recorded": self._recorded, "monitored": self._monitored}
 
     def _forget(self) -> None:
         """Discards cached results of the run, which has changed."""
@@ -130,10 +145,11 @@ class Simulation:
     def __getstate__(self) -> dict[str, Any]:
         with self._alone() as run:
             names = "_engine", "_torque", "_wall", "_given"
-            return {x: getattr(self, x) for x in names} | {"snapshot": run.snapshot()}
+            found = {x: getattr(self, x) for x in names}
+            return found | {"kept": self._kept(), "snapshot": run.snapshot()}
 
     def __setstate__(self, kept: dict[str, Any]) -> None:
-        self.__init__(kept["_given"], engine=kept["_engine"])  # type: ignore[misc]
+        self.__init__(kept["_given"], engine=kept["_engine"], **kept["kept"])  # type: ignore[misc]
         if kept["_torque"] is not None:
             self._take_over(kept["_torque"])
         self._run.return_to(kept["snapshot"])
@@ -141,7 +157,7 @@ class Simulation:
 
     def close(self) -> None:
         """Closes the simulation; no further step can be made."""
-        if not self._closed and (self._run.filled or self._run.looked):
+        if not self._closed and self._recorded and (self._run.filled or self._run.looked):
             self.record()
         self._closed = True
 
@@ -168,13 +184,26 @@ class Simulation:
         that a step from here would record.
         """
         if self._state is None:
-            if self._run.outcome is None:
-                with self._alone() as run:
-                    self._state = sample_of(run.i * run.scenario.dt, run.ahead())
+            run = self._run
+            if run.outcome is None or not self._recorded:
+                self._state = sample_of(run.sample_time(), np.array(self.numbers()))
             else:
                 last = {name: getattr(self.record(), name)[-1] for name in Sample._fields}
                 self._state = Sample(**last)
         return self._state
+
+    def numbers(self) -> list[float]:
+        """The present sample as plain numbers; cheaper than `state`.
+
+        Returns:
+            Pairs of two each, of shoulder and elbow or of x and y: q, p, v, fh, tau, delta, b, qd,
+            fe, as in `Sample`; 18 numbers.
+        """
+        if self._run.outcome is not None and self._recorded:
+            x = self.state
+            return [float(a) for name in COLUMNS for a in getattr(x, name)]
+        with self._alone() as run:
+            return run.numbers_ahead()
 
     def handle(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Place of the handle [m], and its velocity half a step ago [m/s]; cheaper than `state`."""
@@ -244,10 +273,12 @@ class Simulation:
             if torque is not None:
                 self._drive(numbers_of("torque", torque, JOINTS, -MOST, MOST, unit="N.m"))
             self._state, begin = None, time.perf_counter()
-            run.pause = run.i + n
+            goal = run.i + n
             with warnings_caught():
-                self._choose(n)
-                run.go(None)
+                if not run.hop(n):
+                    run.pause = goal
+                    self._choose(n)
+                    run.go(None)
             self._wall += time.perf_counter() - begin
 
     def _choose(self, n: int) -> None:
@@ -324,8 +355,10 @@ class Simulation:
         A run that had not ended gets the outcome "interrupted".
 
         Raises:
-            RuntimeError: no step has been made.
+            RuntimeError: no step has been made, or no record is kept.
         """
+        if not self._recorded:
+            raise RuntimeError("no record is kept: make the simulation with recorded=True")
         if self._record is not None:
             return self._record
         with self._alone() as run:

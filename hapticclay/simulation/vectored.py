@@ -30,6 +30,7 @@ class VectoredRuns:
         scenarios: of the runs.
         engine: as in `simulate`.
         workers: threads of compiled steps.
+        monitored: whether their stability is judged.
 
     Attributes:
         runs: the runs.
@@ -40,8 +41,8 @@ class VectoredRuns:
         common: what is known of each, see vector.Vector.
     """
 
-    def __init__(self, scenarios: Sequence[Scenario], engine: str, workers: int):
-        n = len(scenarios)
+    def __init__(self, scenarios: Sequence[Scenario], engine: str, workers: int, monitored: bool):
+        n, self.monitored = len(scenarios), monitored
         self.engine, self.workers, self.engines = engine, workers, dict[Any, Any]()
         self.compiled: Any = load_compiled() if engine == "native" else None
         self.common, self.over = Common(n), np.zeros(n, bool)
@@ -67,7 +68,8 @@ class VectoredRuns:
 
     def _new(self, s: Scenario, store: EngineStore) -> Run:
         kernel = self.compiled.KERNEL if self.compiled else PLAIN
-        return Run(s, 1, kernel, store, watched=True, recorded=False)
+        kept = dict(watched=True, recorded=False, monitored=self.monitored)
+        return Run(s, 1, kernel, store, **kept)
 
     def _begin(self, k: int) -> None:
         """Notes that a run is at its start."""
@@ -325,11 +327,10 @@ class VectoredRuns:
         """Stores the last sample of a run that has ended."""
         c = self.common
         self.over[k] = True
-        at = run.end_time if run.end_time is not None else (run.looked - 1) * run.scenario.dt
         if run.last_row is None:
             c.times[k], c.shown[k] = np.nan, np.nan
             return
-        c.times[k], c.shown[k, :ROW] = at, run.last_row
+        c.times[k], c.shown[k, :ROW] = run.sample_time(), run.last_row
         c.shown[k, ROW:] = run.last_force()
 
     # ---- results

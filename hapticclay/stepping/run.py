@@ -263,6 +263,7 @@ class Run:
             rows that are not kept.
         recorded: whether judged rows are kept; else only the rows since then and, after the end,
             `last_row`.
+        monitored: whether its stability is judged.
 
     Raises:
         ParameterError: a control callback is installed in the engine, which would interfere.
@@ -283,6 +284,7 @@ class Run:
         brief: bool = False,
         watched: bool = False,
         recorded: bool = True,
+        monitored: bool = True,
     ):
         if mujoco.get_mjcb_control() is not None:
             bound = "the engine must be free of control callbacks"
@@ -298,7 +300,8 @@ class Run:
         self._noise: hardware.SampleNoise | None = None
         self.steps = 0
         self.pause = math.inf
-        self.watch = monitor.StabilityMonitor(scenario)
+        judge = monitor.StabilityMonitor if monitored else monitor.RangeMonitor
+        self.watch = judge(scenario)
         self.looked = 0  # samples judged so far
         self.kept: list[tuple[np.ndarray, np.ndarray]] = []  # index, rows
         self.rendered = scene.tells(self.parts)
@@ -360,6 +363,12 @@ class Run:
         if self._views is None:
             self._views = scene.viewed(self.parts)
         return self._views
+
+    def sample_time(self) -> float:
+        """Time of the present sample [s]; of the last good one after the end."""
+        if self.end_time is not None:
+            return self.end_time
+        return (self.i if self.outcome is None else self.looked - 1) * self.scenario.dt
 
     def b(self) -> tuple[float, float]:
         """Damping of the clay in the present region, (x, y) [N.s/m]."""
@@ -504,7 +513,7 @@ class Run:
         """Restarts without a record; not after `change`, or where signals are prepared ahead."""
         self.restore(self._saved)
         self.steps = self.looked = 0
-        self.watch = monitor.StabilityMonitor(self.scenario)
+        self.watch = type(self.watch)(self.scenario)
         self.outcome, self.end_time = None, None
         self.last_row = self.last_rendered = None
 
@@ -563,6 +572,31 @@ class Run:
                 if progress and progress(self.t, self.position()[0]) and self.outcome is None:
                     self.outcome = monitor.Outcome("interrupted", self.t, self.i)
                 self.flush()
+
+    def hop(self, n: int) -> bool:
+        """Makes n compiled steps where there is nothing to prepare, nor a check among them.
+
+        Args:
+            n: number of steps.
+
+        Returns:
+            Whether it did; else `go` makes those that are left.
+        """
+        row = self.row
+        if row is None or not (row.leads and row.is_plain and row.parts is self.parts):
+            return False
+        room = row.marks[1] + n
+        if room == n or room >= CHUNK - 1:
+            return False
+        row.move(room)
+        _, filled, code, steps, crossings, stops = row.marks
+        self.steps += steps
+        if self.recorded and (crossings or stops):
+            self._note_events(crossings, stops)
+        if code != OPEN:
+            self.note_end()
+            self.flush()
+        return code != OPEN or filled == room
 
     def interrupt(self) -> None:
         """Ends the run at its last sample."""
@@ -664,6 +698,19 @@ class Run:
         finally:
             self.restore(saved)
             self.steps, self.crossings, self.stops = events
+
+    def numbers_ahead(self) -> list[float]:
+        """As `ahead`; the numbers of the last row if the run has ended."""
+        row = self.row
+        if self.outcome is not None:
+            none = [math.nan] * (rows.ROW + 2)
+            return none if self.last_row is None else [*self.last_row, *self.last_force()]
+        if row is None or not (row.shows and row.leads and row.parts is self.parts):
+            return self.ahead().tolist()
+        found = row.numbers()
+        if not self.rendered:
+            found[rows.ROW :] = self._force(*found[12:14], *found[4:6])
+        return found
 
     def _row_and_force(self, n: int) -> np.ndarray:
         """Row n of those since the last check, and the force of the clay in it [N]."""

@@ -415,6 +415,7 @@ class Row:
         parts: of the run, as the row has them.
         leads: whether the row holds the state, and that of the run is outdated.
         shows: whether the present sample is known.
+        is_plain: whether nothing is drawn for the steps ahead of them.
         marks: see Vector.marks.
         t: now [s].
     """
@@ -423,7 +424,7 @@ class Row:
         self.common = Common(1)
         self.vector = RunVector(run, self.common, kernel)
         self.key, self.parts, self.leads, self.taken = kind_key(run), None, False, False
-        self.shows = self.asked = False
+        self.shows = self.asked = self.is_plain = False
         self.marks, self.t, self.which = [0] * 6, 0.0, np.zeros(1, np.int64)
         scratch = np.empty(sum(a.nbytes for a in scene.written(run.parts)) // 8 + 1)
         place = Place(run.native, run.model.actuator_ctrlrange, scratch)
@@ -440,6 +441,8 @@ class Row:
         if self.parts is not run.parts:
             self.vector.take(0, run)
             self.parts, self.shows = run.parts, False
+            sampler = run.parts.sampler
+            self.is_plain = sampler is None or sampler.chance is None
         elif not self.taken:
             self.vector.take_state(0, run)
         self.taken = True
@@ -481,6 +484,11 @@ class Row:
             self.advance(*self.arguments, TRY)
         self.shows = self.asked = True
         return self.common.shown[0].copy()
+
+    def numbers(self) -> list[float]:
+        """The present sample, see Vector.shown, where it is known."""
+        self.asked = True
+        return self.common.shown[0].tolist()
 
     def made(self) -> Filled:
         """What the last call has made, and the rows so far."""

@@ -159,12 +159,12 @@ def test_a_loop_beyond_its_gain_limit_ends_the_episode_within_a_period():
     env = made("hapticclay/AdaptiveGain-v0")
     env.reset(seed=0, options=options)
     inner = env.unwrapped
-    run, m = hc.Simulation(inner.task.scenario(inner._episodes.truth_of(0)), engine="python"), None
+    run, m = hc.Simulation(inner.task.scenario(inner._episode.truth), engine="python"), None
     reached, t = None, 0
     while True:
         _, reward, terminated, _, info = env.step(np.ones(1, np.float32))
-        m = inner._episodes.memory
-        push = m["muscle"][0, t] * min((t + 1) / 20, 1.0)
+        m = inner._episode.memory
+        push = m["muscle"][t] * min((t + 1) / 20, 1.0)
         run.set(gain=(info["K"], 0.2))
         for _ in range(inner.task.steps):
             run.advance(1, force=(push, 0.0))
