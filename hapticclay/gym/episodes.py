@@ -13,7 +13,7 @@ from .columns import columns_of, replaced, shown, value_of
 from .draws import Truth, draw
 from .task import Handle, Memory, Task
 
-PLACES = tuple(COLUMNS[name] for name in ("p", "v", "fh", "fe", "tau"))
+PLACES = tuple(COLUMNS[name] for name in ("p", "v", "fh", "fe"))
 
 
 class Period(NamedTuple):
@@ -73,8 +73,8 @@ class Episode:
         self.handle = self._handle(self._run)
 
     def _handle(self, run: Simulation) -> Handle:
-        x = run.numbers()
-        return self.task.handle([(x[i], x[i + 1]) for i in PLACES], run.outcome is not None)
+        x, peak = run.numbers(), run.peak_torque(self.task.steps)
+        return self.task.handle([(x[i], x[i + 1]) for i in PLACES], peak, run.outcome is not None)
 
     def observe(self) -> np.ndarray:
         """The present observation, clipped to its bounds, shape (m,), float32."""
@@ -157,8 +157,8 @@ class Episodes:
         self.handle = self._handle(self._runs)
 
     def _handle(self, runs: SimulationBatch) -> Handle:
-        x = runs.numbers().T
-        return self.task.handle([(x[i], x[i + 1]) for i in PLACES], runs.ended)
+        x, peak = runs.numbers().T, runs.peak_torque(self.task.steps).T
+        return self.task.handle([(x[i], x[i + 1]) for i in PLACES], peak, runs.ended)
 
     def observe(self) -> np.ndarray:
         """Present observations, clipped to their bounds, shape (n, m), float32."""

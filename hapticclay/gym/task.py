@@ -151,19 +151,20 @@ class Task:
         """
         raise NotImplementedError
 
-    def handle(self, sample: Sequence[Pair], over: Value) -> Handle:
+    def handle(self, sample: Sequence[Pair], peak: Sequence[Value], over: Value) -> Handle:
         """The handle in a sample.
 
         A run counts as diverged if it is over (for example out of reach), if it is faster than
-        SPEED_LIMIT, or if a motor needs a torque that no stable run of the task needs.
+        SPEED_LIMIT, or if a motor needed a torque that no stable run of the task needs.
 
         Args:
-            sample: p, v, fh, fe and torques of the motors.
+            sample: p, v, fh and fe.
+            peak: largest torques of shoulder and elbow motor in the period [N.m].
             over: whether the run is over.
         """
-        p, v, fh, fe, tau = sample
+        p, v, fh, fe = sample
         shoulder, elbow = TORQUE_LIMIT
-        calm = (abs(tau[0]) < self.strain * shoulder) & (abs(tau[1]) < self.strain * elbow)
+        calm = (peak[0] < self.strain * shoulder) & (peak[1] < self.strain * elbow)
         slow = v[0] * v[0] + v[1] * v[1] <= SPEED_LIMIT * SPEED_LIMIT
         return Handle(p, v, fh, fe, over | negated(calm & slow))
 

@@ -203,6 +203,18 @@ class SimulationBatch:
         with self._alone() as runs:
             return runs.show().copy()
 
+    def peak_torque(self, n: int) -> np.ndarray:
+        """Largest |tau| of the motors of each run in its last steps [N.m], shape (N, 2).
+
+        As `Simulation.peak_torque`.
+
+        Args:
+            n: number of steps, at least 1.
+        """
+        n = integer("n", n, 1, 1_000_000_000)
+        with self._alone() as runs:
+            return runs.peak_torque(n)
+
     @property
     def t(self) -> np.ndarray:
         """Time of the present sample of each run [s], shape (N,)."""

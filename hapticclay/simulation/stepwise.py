@@ -205,6 +205,17 @@ class Simulation:
         with self._alone() as run:
             return run.numbers_ahead()
 
+    def peak_torque(self, n: int) -> list[float]:
+        """Largest |tau| of shoulder and elbow motor in the last steps [N.m].
+
+        Every 4095 samples the run is checked, and those before are left out.
+
+        Args:
+            n: number of steps, at least 1.
+        """
+        with self._alone() as run:
+            return run.peak_torque(integer("n", n, 1, 1_000_000_000))
+
     def handle(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Place of the handle [m], and its velocity half a step ago [m/s]; cheaper than `state`."""
         with self._alone() as run:

@@ -349,6 +349,20 @@ class VectoredRuns:
             self.is_shown = self.is_asked = True
         return self.common.shown
 
+    def peak_torque(self, n: int) -> np.ndarray:
+        """Largest |tau| of each run in its last rows, of those not judged yet [N.m], shape (n, 2).
+
+        Args:
+            n: number of rows.
+        """
+        filled = self.common.marks[:, 1].tolist()
+        return np.array(
+            [
+                np.abs(run.store.rows[max(end - n, 0) : end, 8:10]).max(axis=0, initial=0.0)
+                for run, end in zip(self.runs, filled, strict=True)
+            ]
+        )
+
     def look(self) -> np.ndarray:
         """Whether the motion of each run is unstable by now, evaluated again after LOOK."""
         due = ~self.over & (self.common.times >= self.looked_at + LOOK)

@@ -712,6 +712,16 @@ class Run:
             found[rows.ROW :] = self._force(*found[12:14], *found[4:6])
         return found
 
+    def peak_torque(self, n: int) -> list[float]:
+        """Largest |tau| of shoulder and elbow in the last rows, of those not judged yet [N.m].
+
+        Args:
+            n: number of rows.
+        """
+        end = self.filled
+        made = self.store.rows[max(end - n, 0) : end, 8:10]
+        return np.abs(made).max(axis=0, initial=0.0).tolist()
+
     def _row_and_force(self, n: int) -> np.ndarray:
         """Row n of those since the last check, and the force of the clay in it [N]."""
         told = self.store.rendered[n, :2] if self.rendered else (0.0, 0.0)
