@@ -73,8 +73,8 @@ class Episode:
         self.handle = self._handle(self._run)
 
     def _handle(self, run: Simulation) -> Handle:
-        x, peak = run.numbers(), run.peak_torque(self.task.steps)
-        return self.task.handle([(x[i], x[i + 1]) for i in PLACES], peak, run.outcome is not None)
+        x, held = run.numbers(), run.torque_reached(self.task.steps, self.task.held)
+        return self.task.handle([(x[i], x[i + 1]) for i in PLACES], held, run.outcome is not None)
 
     def observe(self) -> np.ndarray:
         """The present observation, clipped to its bounds, shape (m,), float32."""
@@ -157,8 +157,8 @@ class Episodes:
         self.handle = self._handle(self._runs)
 
     def _handle(self, runs: SimulationBatch) -> Handle:
-        x, peak = runs.numbers().T, runs.peak_torque(self.task.steps).T
-        return self.task.handle([(x[i], x[i + 1]) for i in PLACES], peak, runs.ended)
+        x, held = runs.numbers().T, runs.torque_reached(self.task.steps, self.task.held).T
+        return self.task.handle([(x[i], x[i + 1]) for i in PLACES], held, runs.ended)
 
     def observe(self) -> np.ndarray:
         """Present observations, clipped to their bounds, shape (n, m), float32."""

@@ -28,6 +28,7 @@ class ProbeClayTask(Task):
     """Task: identify damping and yield force of clay by moving through it."""
 
     limit: ClassVar[int] = 150
+    share: ClassVar[float] = 0.5
     actions: ClassVar[tuple[Quantity, ...]] = (
         either_way("muscle force along x / 30 N", 1.0),
         either_way("muscle force along y / 30 N", 1.0),

@@ -21,6 +21,9 @@ from .quantities import Quantity
 
 DT = 3.5714286e-4  # [s] 56 steps are 20 ms, and a step is at most the paper's 0.36 ms
 FORCE = 30.0  # [N] muscle force at an action of 1
+HELD = (
+    0.25  # share of a period with a torque, for it to count; after a jump of the force it is less
+)
 SPEED_LIMIT = 20.0  # [m/s] beyond which a run counts as unstable
 Memory = dict[str, Any]  # values, tables, or tuples of them, by name: of one copy, or columns
 
@@ -79,6 +82,8 @@ class Task:
         steps: engine steps per control period.
         limit: control periods after which an episode is truncated.
         strain: share of the torque limit beyond which a run counts as unstable.
+        share: share of a control period in which that torque is needed; after a jump of the muscle
+            force stable runs need it for less.
         actions: quantities of an action.
         observations: quantities of an observation.
         drawn: ranges of the numbers drawn for each episode.
@@ -90,6 +95,7 @@ class Task:
     steps: ClassVar[int] = 56
     limit: ClassVar[int] = 500
     strain: ClassVar[float] = 1.0
+    share: ClassVar[float] = 0.25
     actions: ClassVar[tuple[Quantity, ...]]
     drawn: ClassVar[dict[str, Range]]
 
@@ -100,6 +106,11 @@ class Task:
     def period(self) -> float:
         """Control period [s]."""
         return self.steps * DT
+
+    @property
+    def held(self) -> int:
+        """Samples of a control period in which a torque must be reached to count."""
+        return round(self.share * self.steps)
 
     @property
     def observations(self) -> tuple[Quantity, ...]:
@@ -151,7 +162,7 @@ class Task:
         """
         raise NotImplementedError
 
-    def handle(self, sample: Sequence[Pair], peak: Sequence[Value], over: Value) -> Handle:
+    def handle(self, sample: Sequence[Pair], held: Sequence[Value], over: Value) -> Handle:
         """The handle in a sample.
 
         A run counts as diverged if it is over (for example out of reach), if it is faster than
@@ -159,12 +170,12 @@ class Task:
 
         Args:
             sample: p, v, fh and fe.
-            peak: largest torques of shoulder and elbow motor in the period [N.m].
+            held: torques that each motor reaches in `held` samples of the period [N.m].
             over: whether the run is over.
         """
         p, v, fh, fe = sample
         shoulder, elbow = TORQUE_LIMIT
-        calm = (peak[0] < self.strain * shoulder) & (peak[1] < self.strain * elbow)
+        calm = (held[0] < self.strain * shoulder) & (held[1] < self.strain * elbow)
         slow = v[0] * v[0] + v[1] * v[1] <= SPEED_LIMIT * SPEED_LIMIT
         return Handle(p, v, fh, fe, over | negated(calm & slow))
 

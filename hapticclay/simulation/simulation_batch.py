@@ -203,17 +203,16 @@ class SimulationBatch:
         with self._alone() as runs:
             return runs.show().copy()
 
-    def peak_torque(self, n: int) -> np.ndarray:
-        """Largest |tau| of the motors of each run in its last steps [N.m], shape (N, 2).
-
-        As `Simulation.peak_torque`.
+    def torque_reached(self, n: int, k: int = 1) -> np.ndarray:
+        """As `Simulation.torque_reached`, of each run [N.m], shape (N, 2).
 
         Args:
-            n: number of steps, at least 1.
+            n: number of samples, at least 1.
+            k: how many reach it, at least 1; with 1 it is the largest torque.
         """
-        n = integer("n", n, 1, 1_000_000_000)
+        n, k = integer("n", n, 1, 1_000_000_000), integer("k", k, 1, 1_000_000_000)
         with self._alone() as runs:
-            return runs.peak_torque(n)
+            return runs.torque_reached(n, k)
 
     @property
     def t(self) -> np.ndarray:

@@ -205,16 +205,18 @@ class Simulation:
         with self._alone() as run:
             return run.numbers_ahead()
 
-    def peak_torque(self, n: int) -> list[float]:
-        """Largest |tau| of shoulder and elbow motor in the last steps [N.m].
+    def torque_reached(self, n: int, k: int = 1) -> list[float]:
+        """|tau| of shoulder and elbow motor that at least k of the last n samples reach [N.m].
 
         Every 4095 samples the run is checked, and those before are left out.
 
         Args:
-            n: number of steps, at least 1.
+            n: number of samples, at least 1.
+            k: how many reach it, at least 1; with 1 it is the largest torque.
         """
+        n, k = integer("n", n, 1, 1_000_000_000), integer("k", k, 1, 1_000_000_000)
         with self._alone() as run:
-            return run.peak_torque(integer("n", n, 1, 1_000_000_000))
+            return run.torque_reached(n, k)
 
     def handle(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Place of the handle [m], and its velocity half a step ago [m/s]; cheaper than `state`."""

@@ -12,7 +12,7 @@ from ..scene.scenario import Scenario
 from ..stepping import scene
 from ..stepping.monitor import Outcome
 from ..stepping.rows import ROW
-from ..stepping.run import CHUNK, PLAIN, EngineStore, Run
+from ..stepping.run import CHUNK, PLAIN, EngineStore, Run, torque_reached
 from ..stepping.state import OPEN
 from ..stepping.vector import BOTH, STEPS, TRY, Common, RunVector, is_vectored, kind_key
 from . import engines
@@ -349,19 +349,16 @@ class VectoredRuns:
             self.is_shown = self.is_asked = True
         return self.common.shown
 
-    def peak_torque(self, n: int) -> np.ndarray:
-        """Largest |tau| of each run in its last rows, of those not judged yet [N.m], shape (n, 2).
+    def torque_reached(self, n: int, k: int) -> np.ndarray:
+        """As `run.torque_reached`, in the last rows of each run, shape (runs, 2).
 
         Args:
-            n: number of rows.
+            n: number of rows, of those not judged yet.
+            k: how many reach it.
         """
         filled = self.common.marks[:, 1].tolist()
-        return np.array(
-            [
-                np.abs(run.store.rows[max(end - n, 0) : end, 8:10]).max(axis=0, initial=0.0)
-                for run, end in zip(self.runs, filled, strict=True)
-            ]
-        )
+        pairs = zip(self.runs, filled, strict=True)
+        return np.array([torque_reached(x.store.rows[max(i - n, 0) : i], k) for x, i in pairs])
 
     def look(self) -> np.ndarray:
         """Whether the motion of each run is unstable by now, evaluated again after LOOK."""

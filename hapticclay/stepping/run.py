@@ -712,15 +712,10 @@ class Run:
             found[rows.ROW :] = self._force(*found[12:14], *found[4:6])
         return found
 
-    def peak_torque(self, n: int) -> list[float]:
-        """Largest |tau| of shoulder and elbow in the last rows, of those not judged yet [N.m].
-
-        Args:
-            n: number of rows.
-        """
+    def torque_reached(self, n: int, k: int) -> list[float]:
+        """As `torque_reached`, in the last n rows of those not judged yet."""
         end = self.filled
-        made = self.store.rows[max(end - n, 0) : end, 8:10]
-        return np.abs(made).max(axis=0, initial=0.0).tolist()
+        return torque_reached(self.store.rows[max(end - n, 0) : end], k).tolist()
 
     def _row_and_force(self, n: int) -> np.ndarray:
         """Row n of those since the last check, and the force of the clay in it [N]."""
@@ -909,6 +904,16 @@ class Run:
         names = "friction", "passivity_controller", "coupling"
         found = {n: float(each) for n, each, on in zip(names, x, used, strict=True) if on}
         return found | {"residual": out["residual"] - found.get("friction", 0.0)}
+
+
+def torque_reached(made: np.ndarray, k: int) -> np.ndarray:
+    """|tau| of shoulder and elbow that at least k rows reach [N.m]; 0 if there are fewer rows.
+
+    Args:
+        made: rows of the record, shape (n, rows.ROW).
+        k: how many, at least 1.
+    """
+    return np.sort(np.abs(made[:, 8:10]), axis=0)[-k] if len(made) >= k else np.zeros(2)
 
 
 def with_checked(scenario: Scenario, **fields: Any) -> Scenario:
