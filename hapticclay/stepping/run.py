@@ -713,7 +713,12 @@ class Run:
         return found
 
     def torque_reached(self, n: int, k: int) -> list[float]:
-        """As `torque_reached`, in the last n rows of those not judged yet."""
+        """As `torque_reached`, in the last rows of those not judged yet.
+
+        Args:
+            n: number of rows.
+            k: how many reach it.
+        """
         end = self.filled
         return torque_reached(self.store.rows[max(end - n, 0) : end], k).tolist()
 
