@@ -157,7 +157,7 @@ class Episodes:
         self.handle = self._handle(self._runs)
 
     def _handle(self, runs: SimulationBatch) -> Handle:
-        x, held = runs.numbers().T, runs.torque_reached(self.task.steps, self.task.held).T
+        x, held = runs.numbers().T, tuple(runs.torque_reached(self.task.steps, self.task.held).T)
         return self.task.handle([(x[i], x[i + 1]) for i in PLACES], held, runs.ended)
 
     def observe(self) -> np.ndarray:
