@@ -1,6 +1,6 @@
 """Episodes of random actions with extreme draws: no exception, no NaN, no growth of memory.
 
-    python -m benchmarks.gym_extremes [--out DIR] [--episodes N]
+    python -m benchmarks.gym_extremes [--out DIR] [--episodes N] [--longest N]
 
 Each number of an episode is drawn over all that its option allows, its ends among them; actions
 jump between -1, 0 and 1. Writes gym_extremes.json.
@@ -21,7 +21,7 @@ from hapticclay.gym import registry
 from . import common
 from .gym_speed import memory
 
-EPISODES, COPIES = 10_000, 64
+EPISODES, COPIES = 2500, 64  # of each of the four environments
 LONGEST = 60  # control periods of an episode
 
 
@@ -35,11 +35,11 @@ def extreme(task: Any, rng: np.random.Generator) -> dict[str, float]:
     return found
 
 
-def tried(id: str, engine: str, episodes: int) -> dict[str, Any]:
+def tried(id: str, engine: str, episodes: int, longest: int = LONGEST) -> dict[str, Any]:
     """Return what was seen in an environment's episodes."""
     n = min(COPIES, episodes)
     env: Any = gymnasium.make_vec(
-        id, num_envs=n, engine=engine, autoreset_mode="DISABLED", max_episode_steps=LONGEST
+        id, num_envs=n, engine=engine, autoreset_mode="DISABLED", max_episode_steps=longest
     )
     rng, inner = np.random.default_rng(0), env.unwrapped
     done, refused, bad, steps, lost = 0, 0, 0, 0, 0
@@ -75,6 +75,7 @@ def main(argv: list[str] | None = None) -> dict[str, Any]:
     """Try, print and write."""
     parser = common.parser(__doc__)
     parser.add_argument("--episodes", type=int, default=EPISODES)
+    parser.add_argument("--longest", type=int, default=LONGEST)
     parser.add_argument("--engine", default="native")
     parser.add_argument("--ids", nargs="*", default=list(registry.IDS))
     a = parser.parse_args(argv)
@@ -82,7 +83,7 @@ def main(argv: list[str] | None = None) -> dict[str, Any]:
     for id in a.ids:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", hc.Warning)  # of scenes beyond what a person is
-            rows.append(tried(id, a.engine, a.episodes))
+            rows.append(tried(id, a.engine, a.episodes, a.longest))
         print(", ".join(f"{name} {value}" for name, value in rows[-1].items()), flush=True)
     return common.write(a.out, "gym_extremes", {"environments": rows})
 

@@ -61,8 +61,8 @@ def ratios(env: Any, rounds: int, clock: Clock) -> dict[str, float]:
     rng = np.random.default_rng(0)
     env.reset(seed=0)
     shape = (PERIODS, *env.action_space.shape)
-    truth = {name: x[0] for name, x in inner._episodes.truth.items()}
-    scenario = inner.task.scenario({name: float(x) for name, x in truth.items()})
+    truth = inner.info_of(0) if n > 1 else inner._episode.truth
+    scenario = inner.task.scenario(truth)
     stepped(env, rng.uniform(-0.2, 0.2, shape).astype(np.float32), clock)
     found, spent = [], []
     cores = common.CORES if n > 1 and clock is time.perf_counter else 1

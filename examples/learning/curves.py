@@ -1,4 +1,4 @@
-"""Plots the learning curves of `ppo.py`, a panel for each environment, with the baselines.
+"""Plots the learning curves of `ppo.py` and `sac.py`, a panel for each environment, with the baselines.
 
 python examples/learning/curves.py out/learning/*.csv --out gym_learning.png
 """
@@ -19,10 +19,16 @@ REFERENCES = {  # means over the seeds 0 to 99, of the pages of the environments
 
 
 def curve(file: Path) -> tuple[list[float], list[float]]:
-    """Control periods in thousands, and mean returns, of a file of `ppo.py`."""
+    """Control periods in thousands, and mean returns, of a file of theirs."""
     with file.open(newline="") as f:
         rows = [row for row in csv.DictReader(f) if row["return"] not in ("", "nan")]
     return [float(r["steps"]) / 1000.0 for r in rows], [float(r["return"]) for r in rows]
+
+
+def label_of(file: Path) -> str:
+    """Algorithm and seed of a file."""
+    algorithm, *_, seed = file.stem.split("-")
+    return f"{algorithm.upper()}, seed {seed}"
 
 
 def draw(files: list[Path]) -> Figure:
@@ -33,10 +39,13 @@ def draw(files: list[Path]) -> Figure:
     for name, ax in zip(names, panels, strict=True):
         own = sorted(f for f in files if f"-{name}-" in f.name)
         for file, line in zip(own, LINES, strict=False):
-            ax.plot(*curve(file), line, label=f"PPO, seed {file.stem.rpartition('-')[2]}")
+            ax.plot(*curve(file), line, label=label_of(file))
         for (label, x), line in zip(REFERENCES.get(name, {}).items(), (":", "-."), strict=False):
             ax.axhline(x, color="0.3", ls=line, lw=1.0, label=label)
         ax.set(title=name, xlabel="control periods [thousand]", ylabel="return")
+        worst = min(REFERENCES.get(name, {"": 0.0}).values())
+        if worst < 0.0:  # the first returns would hide the difference from the references
+            ax.set_ylim(bottom=5.0 * worst)
         ax.grid(color="0.9")
         ax.legend(frameon=False, fontsize=8)
     return figure

@@ -44,6 +44,9 @@ class Scale:
         y = (x - self.mean) / np.sqrt(self.var + 1e-8)
         return torch.as_tensor(np.clip(y, -10, 10), dtype=torch.float32)
 
+    def tensors(self) -> dict[str, torch.Tensor]:
+        return {"mean": torch.as_tensor(self.mean), "var": torch.as_tensor(self.var)}
+
 
 def layers(n: int, k: int, last: float) -> nn.Sequential:
     made = nn.Sequential(
@@ -111,7 +114,12 @@ def train(a: argparse.Namespace) -> None:
             told = f"{spent:.0f} s of processor time"
             print(f"{steps} steps, return {recent:.2f}, {told}", flush=True)
     env.close()
-    save(a, agent, scale, rows)
+
+    def policy(raw: np.ndarray) -> np.ndarray:
+        with torch.no_grad():
+            return agent.policy(scale(raw)).clamp(-1, 1).numpy()
+
+    save(a, "ppo", policy, agent.state_dict() | scale.tensors(), rows)
 
 
 def learn(agent: Agent, optimiser, store: dict, after: torch.Tensor) -> None:
@@ -141,17 +149,12 @@ def learn(agent: Agent, optimiser, store: dict, after: torch.Tensor) -> None:
             optimiser.step()
 
 
-def save(a: argparse.Namespace, agent: Agent, scale: Scale, rows: list) -> None:
-    def policy(raw: np.ndarray) -> np.ndarray:
-        with torch.no_grad():
-            return agent.policy(scale(raw)).clamp(-1, 1).numpy()
-
+def save(a: argparse.Namespace, name: str, policy, weights: dict, rows: list) -> None:
     a.out.mkdir(parents=True, exist_ok=True)
-    stem = a.out / f"ppo-{a.env}-{a.seed}"
+    stem = a.out / f"{name}-{a.env}-{a.seed}"
     with stem.with_suffix(".csv").open("w", newline="") as file:
         csv.writer(file).writerows([("steps", "return", "processor seconds"), *rows])
-    kept = {"mean": torch.as_tensor(scale.mean), "var": torch.as_tensor(scale.var)}
-    torch.save(agent.state_dict() | kept, stem.with_suffix(".pt"))
+    torch.save(weights, stem.with_suffix(".pt"))
     from hapticclay.gym import baselines
 
     found = baselines.returns(a.env, lambda *_: policy, range(100), engine=a.engine)
@@ -176,12 +179,16 @@ def film(a: argparse.Namespace, policy, path: Path) -> None:
     env.close()
 
 
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def options(what: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=what.splitlines()[0])
     parser.add_argument("--env", default="CutLine-v0")
     parser.add_argument("--steps", type=int, default=300_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--engine", default="native")
     parser.add_argument("--film", action="store_true")
     parser.add_argument("--out", type=Path, default=Path("out/learning"))
-    train(parser.parse_args())
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    train(options(__doc__))

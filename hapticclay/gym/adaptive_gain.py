@@ -11,10 +11,11 @@ from typing_extensions import override
 
 from ..model.clay import slab
 from ..scene.scenario import Scenario
+from .columns import Value, bounded, mapped, picked, where
 from .draws import HAND, Range, Truth
 from .environment import TaskEnv
 from .quantities import Quantity, either_way
-from .task import DT, Arrays, Command, Handles, Judged, Task, saturated, scene_of
+from .task import DT, Command, Handle, Judged, Memory, Task, saturated, scene_of
 from .vector import TaskVectorEnv
 
 SAMPLES = 16  # seen by the controller
@@ -60,46 +61,38 @@ class AdaptiveGainTask(Task):
         return scene_of(truth, name="adaptive gain", clay=slab(truth["b"]), gain=(FIRST, GAIN_Y))
 
     @override
-    def memory(self, n: int) -> Arrays:
-        return {
-            "muscle": np.zeros((n, CYCLE)), "count": np.zeros(n, np.int64), "K": np.ones(n),
-            "v": np.zeros((n, SAMPLES)), "f": np.zeros((n, SAMPLES)), "b": np.zeros(n),
-            "errors": np.zeros(n),
-        }  # fmt: skip
-
-    @override
-    def begin(self, m: Arrays, i: int, truth: Truth, rng: np.random.Generator) -> None:
+    def begin(self, truth: Truth, rng: np.random.Generator) -> Memory:
         t = np.arange(CYCLE) * (28 * DT)
         phases = rng.uniform(0.0, 2.0 * math.pi, len(TONES))
         tones = [np.sin(2.0 * math.pi * f * t + x) for f, x in zip(TONES, phases, strict=True)]
-        m["muscle"][i] = truth["force"] * sum(tones)
-        m["count"][i], m["K"][i], m["b"][i], m["errors"][i] = 0, FIRST, truth["b"], 0.0
-        m["v"][i] = m["f"][i] = 0.0
+        none = (0.0,) * SAMPLES
+        return {
+            "muscle": (truth["force"] * sum(tones)).tolist(), "count": 0, "K": FIRST,
+            "b": truth["b"], "errors": 0.0, "v": none, "f": none,
+        }  # fmt: skip
 
     @override
-    def command(self, m: Arrays, actions: np.ndarray) -> Command:
-        factors = np.array([math.pow(2.0, RATE * a) for a in actions[:, 0].tolist()])
-        m["K"] = np.minimum(np.maximum(m["K"] * factors, LEAST), MOST)
-        push = m["muscle"][np.arange(len(factors)), m["count"] % CYCLE]
-        push = push * np.minimum((m["count"] + 1) / RAMP, 1.0)
-        nothing = np.zeros(len(push))
-        gain = np.stack((m["K"], nothing + GAIN_Y), axis=1)
-        return Command(np.stack((push, nothing), axis=1), gain)
+    def command(self, m: Memory, action: tuple[Value, ...]) -> Command:
+        factor = mapped(lambda a: math.pow(2.0, RATE * a), action[0])
+        m["K"] = bounded(m["K"] * factor, LEAST, MOST)
+        push = picked(m["muscle"], m["count"] % CYCLE)
+        push = push * bounded((m["count"] + 1) / RAMP, 0.0, 1.0)
+        nothing = 0.0 * m["K"]
+        return Command((push, nothing), (m["K"], nothing + GAIN_Y))
 
     @override
-    def observe(self, m: Arrays, h: Handles) -> np.ndarray:
-        told = np.array([math.log10(x) for x in m["K"].tolist()])
-        return np.concatenate((m["v"], m["f"], told[:, None], m["b"][:, None] / 60.0), axis=1)
+    def observe(self, m: Memory, h: Handle) -> tuple[Value, ...]:
+        return *m["v"], *m["f"], mapped(math.log10, m["K"]), m["b"] / 60.0
 
     @override
-    def judge(self, m: Arrays, h: Handles, actions: np.ndarray) -> Judged:
+    def judge(self, m: Memory, h: Handle, action: tuple[Value, ...]) -> Judged:
         m["count"] = m["count"] + 1
-        for name, now in (("v", 100.0 * h.v[:, :1]), ("f", h.fh[:, :1])):
-            m[name] = np.concatenate((now, m[name][:, :-1]), axis=1)
-        error = (h.fh[:, 0] - h.fe[:, 0]) / WEIGHT
+        m["v"] = 100.0 * h.v[0], *m["v"][:-1]
+        m["f"] = h.fh[0], *m["f"][:-1]
+        error = (h.fh[0] - h.fe[0]) / WEIGHT
         cost = saturated(error * error)
-        left = np.maximum(self.limit - m["count"], 0)
-        reward = np.where(h.diverged, -1.0 - left, -cost)
+        left = bounded(self.limit - m["count"], 0, self.limit)
+        reward = where(h.diverged, -1.0 - left, -cost)
         m["errors"] = m["errors"] + cost
         info = {"K": m["K"], "lost": h.diverged, "mean_cost": m["errors"] / m["count"]}
         return Judged(reward, h.diverged, info)

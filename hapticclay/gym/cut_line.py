@@ -12,11 +12,12 @@ from ..errors import choice
 from ..model.clay import slab
 from ..scene.scenario import Scenario
 from . import lines
+from .columns import Value
 from .draws import HAND, Range, Truth
 from .environment import TaskEnv
 from .follow import MOTION, Follow
 from .quantities import Quantity, either_way
-from .task import Arrays, Handles, scene_of
+from .task import Handle, Memory, scene_of
 from .vector import TaskVectorEnv
 
 LENGTH = 0.10  # [m]
@@ -71,15 +72,14 @@ class CutLineTask(Follow):
         return scene_of(truth, name="cut line", clay=slab(truth["b"]), start=start)
 
     @override
-    def error(self, m: Arrays, at: lines.Place) -> np.ndarray:
+    def error(self, m: Memory, at: lines.Place) -> Value:
         return at.across / TOLERANCE
 
     @override
-    def observe(self, m: Arrays, h: Handles) -> np.ndarray:
+    def observe(self, m: Memory, h: Handle) -> tuple[Value, ...]:
         at = self.beside(m, h)
-        t, u = at.tangent, at.ahead
-        turn = t[:, 0] * u[:, 1] - t[:, 1] * u[:, 0]
-        return np.stack((1000.0 * at.across, *self.motion(m, h, at), turn), axis=1)
+        turn = lines.along_across(at.tangent, at.ahead)[1]
+        return 1000.0 * at.across, *self.motion(m, h, at), turn
 
 
 class CutLine(TaskEnv):

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ..errors import ParameterError, choice
 from ..simulation.engines import ENGINES
-from .episodes import Episodes
+from .episodes import Episode
 from .quantities import box_of
-from .task import DT, Arrays, Task
+from .task import DT, Task
 
 FPS = 50
 MODES = ["human", "rgb_array"]
@@ -46,9 +46,10 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             choice("render_mode", render_mode, MODES)
         self.render_mode = render_mode
         self.task = self.task_type(ranges, **options)
-        self._episodes = Episodes(self.task, 1, choice("engine", engine, ENGINES))
+        self._episode = Episode(self.task, choice("engine", engine, ENGINES))
         self.action_space = box_of(self.task.actions)
         self.observation_space = box_of(self.task.observations)
+        self._shape = self.action_space.shape
         self._picture: Any = None
         self._live = False
 
@@ -65,10 +66,10 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             ParameterError: a name is unknown, or a value out of its bounds.
         """
         super().reset(seed=seed)
-        self._episodes.reset([0], [self.np_random], options)
+        self._episode.reset(self.np_random, options)
         self._live = True
         self._begin_picture()
-        return self._episodes.observe()[0], numbers_of_copy(self._episodes.info(), 0)
+        return self._episode.observe(), dict(self._episode.truth)
 
     def step(
         self, action: NDArray[np.float32]
@@ -85,13 +86,13 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if not self._live:
             raise RuntimeError("reset the environment before its first step")
         action = np.asarray(action)
-        if action.shape != self.action_space.shape:
-            bound = f"must have shape {self.action_space.shape}, has {action.shape}"
+        if action.shape != self._shape:
+            bound = f"must have shape {self._shape}, has {action.shape}"
             raise ParameterError("action", action, bound)
-        found = self._episodes.step(action[None, :], np.ones(1, bool))
-        self._show()
-        info = numbers_of_copy(self._episodes.info() | found.info, 0)
-        return found.observations[0], float(found.rewards[0]), bool(found.ended[0]), False, info
+        observation, reward, ended, info = self._episode.step(action.tolist())
+        if self._picture is not None:
+            self._show()
+        return observation, reward, ended, False, self._episode.truth | info
 
     def render(self) -> Any:
         """A picture of the scene from above, shape (h, w, 3), in mode "rgb_array"."""
@@ -100,7 +101,11 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             return None
         if not self._live:
             raise RuntimeError("reset the environment before it is drawn")
-        return self._picture.drawn(self._episodes) if self.render_mode == "rgb_array" else None
+        return self._drawn() if self.render_mode == "rgb_array" else None
+
+    def _drawn(self) -> Any:
+        now = self._episode
+        return self._picture.drawn(now.truth, now.memory, now.handle)
 
     def _begin_picture(self) -> None:
         if self.render_mode is not None:
@@ -111,28 +116,17 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._show()
 
     def _show(self) -> None:
-        if self._picture is not None:
-            self._picture.note(self._episodes.handles.p[0])
-            if self.render_mode == "human":
-                self._picture.drawn(self._episodes)
+        self._picture.note(self._episode.handle.p)
+        if self.render_mode == "human":
+            self._drawn()
 
     def close(self) -> None:
         """Ends the run and closes the window, if any."""
         if self._picture is not None:
             self._picture.close()
             self._picture = None
-        self._episodes.copies.close()
+        self._episode.close()
         self._live = False
-
-
-def numbers_of_copy(info: Arrays, i: int) -> dict[str, Any]:
-    """Info of one copy, as Python numbers.
-
-    Args:
-        info: numbers by name, shape (n,) each.
-        i: number of the copy.
-    """
-    return {name: x[i].item() for name, x in info.items()}
 
 
 def fps_of(task: type[Task]) -> int:

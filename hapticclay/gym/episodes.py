@@ -1,4 +1,4 @@
-"""Episodes of a task in one or more copies: resets, control periods, observations."""
+"""Episodes of a task: one copy (`Episode`), or many side by side (`Episodes`)."""
 
 from __future__ import annotations
 
@@ -7,25 +7,103 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .copies import Copies
+from ..simulation.simulation_batch import SimulationBatch
+from ..simulation.stepwise import COLUMNS, Simulation
+from .columns import columns_of, replaced, shown, value_of
 from .draws import Truth, draw
-from .task import Arrays, Task
+from .task import Handle, Memory, Task
+
+PLACES = tuple(COLUMNS[name] for name in ("p", "v", "fh", "fe"))
 
 
 class Period(NamedTuple):
-    """Results of a control period of all copies.
+    """Results of a control period, of one copy or of all.
 
     Attributes:
-        observations: shape (n, m), float32.
-        rewards: shape (n,).
-        ended: whether an episode is over, shape (n,).
-        info: numbers by name, shape (n,) each.
+        observation: shape (m,) or (n, m), float32.
+        reward: number or shape (n,).
+        ended: whether the episode is over, bool or shape (n,).
+        info: values by name, numbers or shape (n,) each.
     """
 
-    observations: np.ndarray
-    rewards: np.ndarray
-    ended: np.ndarray
-    info: Arrays
+    observation: np.ndarray
+    reward: Any
+    ended: Any
+    info: Memory
+
+
+class Episode:
+    """Episodes of a task in one copy.
+
+    Args:
+        task: the task.
+        engine: as in `Simulation`.
+
+    Attributes:
+        truth: numbers drawn for the episode.
+        memory: of the task.
+        handle: at the end of the last control period.
+    """
+
+    truth: Truth
+    memory: Memory
+    handle: Handle
+
+    def __init__(self, task: Task, engine: str):
+        self.task, self.engine = task, engine
+        self._ends = [(q.low, q.high) for q in task.observations]
+        self._run: Simulation | None = None
+        self._gain: Any = None
+
+    def reset(self, rng: np.random.Generator, options: Mapping[str, Any] | None) -> None:
+        """Starts an episode.
+
+        Args:
+            rng: generator.
+            options: values to use instead of drawn ones; None for none.
+        """
+        self.truth = draw(self.task.ranges, rng, options)
+        scenario = self.task.scenario(self.truth)
+        if self._run is None:
+            self._run = Simulation(scenario, engine=self.engine, recorded=False, monitored=False)
+        else:
+            self._run.reset(scenario)
+        self._gain = None
+        self.memory = self.task.begin(self.truth, rng)
+        self.handle = self._handle(self._run)
+
+    def _handle(self, run: Simulation) -> Handle:
+        x, held = run.numbers(), run.torque_reached(self.task.steps, self.task.held)
+        return self.task.handle([(x[i], x[i + 1]) for i in PLACES], held, run.outcome is not None)
+
+    def observe(self) -> np.ndarray:
+        """The present observation, clipped to its bounds, shape (m,), float32."""
+        found = zip(self.task.observe(self.memory, self.handle), self._ends, strict=True)
+        return np.array([shown(x, low, high) for x, (low, high) in found], np.float32)
+
+    def step(self, action: Sequence[float]) -> Period:
+        """Advances by one control period.
+
+        Args:
+            action: numbers of the action, clipped to -1 to 1.
+        """
+        run, task = self._run, self.task
+        assert run is not None
+        clipped = tuple([shown(x, -1.0, 1.0) for x in action])
+        force, gain = task.command(self.memory, clipped)
+        if gain != self._gain:
+            run.set(gain=gain)
+            self._gain = gain
+        run.advance(task.steps, force=force)
+        self.handle = self._handle(run)
+        reward, ended, info = task.judge(self.memory, self.handle, clipped)
+        return Period(self.observe(), reward, ended, info)
+
+    def close(self) -> None:
+        """Ends the run."""
+        if self._run is not None:
+            self._run.close()
+        self._run = None
 
 
 class Episodes:
@@ -35,16 +113,21 @@ class Episodes:
         task: the task.
         n: number of copies.
         engine: as in `Simulation`.
+
+    Attributes:
+        truth: numbers drawn for the episodes, by name, shape (n,) each.
+        memory: of the task, in columns.
+        handle: at the end of the last control period, in columns.
     """
 
+    truth: Memory
+    memory: Memory
+    handle: Handle
+
     def __init__(self, task: Task, n: int, engine: str):
-        self.task, self.n = task, n
-        self.copies = Copies(n, engine, task.strain)
-        self.memory = task.memory(n)
-        self.truth = {name: np.zeros(n) for name in task.ranges}
-        bounds = np.array([(q.low, q.high) for q in task.observations])
-        self._low, self._high = bounds.T
-        self.handles = self.copies.handles()
+        self.task, self.n, self.engine = task, n, engine
+        self._low, self._high = np.array([(q.low, q.high) for q in task.observations]).T
+        self._runs: SimulationBatch | None = None
 
     def reset(
         self,
@@ -52,30 +135,35 @@ class Episodes:
         generators: Sequence[np.random.Generator],
         options: Mapping[str, Any] | None,
     ) -> None:
-        """Starts episodes.
+        """Starts episodes; the first call must start all of them.
 
         Args:
             which: numbers of the copies.
-            generators: random generator of each copy.
+            generators: random generator of each of these copies.
             options: values to use instead of drawn ones; None for none.
         """
         drawn = [draw(self.task.ranges, rng, options) for rng in generators]
-        self.copies.reset(which, [self.task.scenario(truth) for truth in drawn])
-        for i, truth, rng in zip(which, drawn, generators, strict=True):
-            self.task.begin(self.memory, i, truth, rng)
-            self._keep(i, truth)
-        self.handles = self.copies.handles()
+        scenarios = [self.task.scenario(truth) for truth in drawn]
+        begun = [self.task.begin(x, rng) for x, rng in zip(drawn, generators, strict=True)]
+        if self._runs is None:
+            self._runs = SimulationBatch(scenarios, engine=self.engine, monitored=False)
+            self.truth = {name: columns_of([x[name] for x in drawn]) for name in drawn[0]}
+            self.memory = {name: columns_of([m[name] for m in begun]) for name in begun[0]}
+        else:
+            self._runs.reset(list(which), scenarios)
+            for kept, rows in ((self.truth, drawn), (self.memory, begun)):
+                for name in kept:
+                    kept[name] = replaced(kept[name], which, [x[name] for x in rows])
+        self.handle = self._handle(self._runs)
 
-    def _keep(self, i: int, truth: Truth) -> None:
-        for name, value in truth.items():
-            self.truth[name][i] = value
+    def _handle(self, runs: SimulationBatch) -> Handle:
+        x, held = runs.numbers().T, tuple(runs.torque_reached(self.task.steps, self.task.held).T)
+        return self.task.handle([(x[i], x[i + 1]) for i in PLACES], held, runs.ended)
 
     def observe(self) -> np.ndarray:
         """Present observations, clipped to their bounds, shape (n, m), float32."""
-        found = self.task.observe(self.memory, self.handles)
-        found = np.minimum(np.maximum(found, self._low), self._high).astype(np.float32)
-        found[np.isnan(found)] = 0.0
-        return found
+        found = self.task.observe(self.memory, self.handle)
+        return shown(np.stack(found, axis=1), self._low, self._high).astype(np.float32)
 
     def step(self, actions: np.ndarray, live: np.ndarray) -> Period:
         """Advances by one control period.
@@ -84,13 +172,26 @@ class Episodes:
             actions: actions, shape (n, k), clipped to -1 to 1.
             live: which copies advance, shape (n,); results of the others are meaningless.
         """
-        clipped = np.minimum(np.maximum(np.asarray(actions, np.float64), -1.0), 1.0)
-        clipped[np.isnan(clipped)] = 0.0
-        command = self.task.command(self.memory, clipped)
-        self.copies.advance(self.task.steps, command, live)
-        self.handles = self.copies.handles()
-        rewards, ended, info = self.task.judge(self.memory, self.handles, clipped)
-        return Period(self.observe(), rewards, ended, info)
+        runs, task = self._runs, self.task
+        assert runs is not None
+        action = tuple(shown(np.asarray(actions, np.float64), -1.0, 1.0).T)
+        force, gain = task.command(self.memory, action)
+        if live.any():
+            if gain is not None:
+                runs.set(live, gain=np.stack(gain, axis=1)[live])
+            runs.advance(task.steps, force=np.stack(force, axis=1), mask=live)
+        self.handle = self._handle(runs)
+        reward, ended, info = task.judge(self.memory, self.handle, action)
+        return Period(self.observe(), reward, ended, info)
+
+    def copy(self, i: int) -> tuple[Truth, Memory, Handle]:
+        """Numbers drawn, memory and handle of one copy.
+
+        Args:
+            i: number of the copy.
+        """
+        memory = {name: value_of(x, i) for name, x in self.memory.items() if name != "at"}
+        return self.truth_of(i), memory, Handle(*value_of(tuple(self.handle), i))
 
     def truth_of(self, i: int) -> Truth:
         """The numbers drawn for a copy, by name.
@@ -100,6 +201,8 @@ class Episodes:
         """
         return {name: float(x[i]) for name, x in self.truth.items()}
 
-    def info(self) -> Arrays:
-        """The numbers drawn, by name, shape (n,) each."""
-        return {name: x.copy() for name, x in self.truth.items()}
+    def close(self) -> None:
+        """Ends the runs."""
+        if self._runs is not None:
+            self._runs.close()
+        self._runs = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -9,9 +10,10 @@ import numpy as np
 from typing_extensions import override
 
 from . import lines
+from .columns import Value, bounded, negated, root, where
 from .draws import Truth
 from .quantities import Quantity, either_way
-from .task import FORCE, Arrays, Command, Handles, Judged, Task, saturated
+from .task import FORCE, Command, Handle, Judged, Memory, Task, saturated
 
 SPEED = 0.05  # [m/s] along the line
 AHEAD = 5e-3  # [m]
@@ -40,7 +42,6 @@ class Follow(Task):
     """Task: follow a line at constant speed.
 
     Attributes:
-        pieces: number of straight pieces of the line.
         far: distance from the line at which an episode ends [m].
         most: muscle force at an action of 1 [N].
     """
@@ -48,11 +49,6 @@ class Follow(Task):
     actions: ClassVar[tuple[Quantity, ...]] = PUSH
     far: ClassVar[float] = 0.02
     most: ClassVar[float] = FORCE
-
-    @property
-    def pieces(self) -> int:
-        """Straight pieces of the line."""
-        return len(self.line({"angle": 0.0, "depth": 0.0, "depth_at_end": 0.0})) - 1
 
     def line(self, truth: Truth) -> np.ndarray:
         """Nodes of the line of an episode [m], shape (pieces + 1, 2).
@@ -62,93 +58,84 @@ class Follow(Task):
         """
         raise NotImplementedError
 
-    def error(self, m: Arrays, at: lines.Place) -> np.ndarray:
-        """Deviation from the line, in tolerances, shape (n,).
+    def error(self, m: Memory, at: lines.Place) -> Value:
+        """Deviation from the line, in tolerances.
 
         Args:
             m: memory of the task.
-            at: positions of the handles along their lines.
+            at: position of the handle along its line.
         """
         raise NotImplementedError
 
     @override
-    def memory(self, n: int) -> Arrays:
-        sums = {name: np.zeros(n) for name in ("errors", "speeds", "squares")}
+    def begin(self, truth: Truth, rng: np.random.Generator) -> Memory:
+        nodes = self.line(truth)
+        pieces = lines.pieces_of(nodes)
+        zero = dict.fromkeys(("errors", "speeds", "squares", "s", "count"), 0.0)
+        drawn = {name: truth.get(name, 1.0) for name in ("gain", "depth", "depth_at_end")}
         return {
-            **lines.empty(n, self.pieces), **sums, "s": np.zeros(n), "action": np.zeros((n, 2)),
-            "count": np.zeros(n), "gain": np.ones(n), "depth": np.ones(n),
-            "depth_at_end": np.ones(n), "tangent": np.zeros((n, 2)),
+            **zero, **drawn, "nodes": nodes, "pieces": pieces, "length": lines.length_of(nodes),
+            "tangent": pieces[0][2:4], "action": (0.0, 0.0), "at": None,
         }  # fmt: skip
 
     @override
-    def begin(self, m: Arrays, i: int, truth: Truth, rng: np.random.Generator) -> None:
-        for name in ("errors", "speeds", "squares", "s", "action", "count"):
-            m[name][i] = 0.0
-        for name in ("gain", "depth", "depth_at_end"):
-            m[name][i] = truth.get(name, 1.0)
-        lines.lay(m, i, self.line(truth))
-        m["at"] = None
-        m["tangent"][i] = m["tangents"][i, 0]
+    def command(self, m: Memory, action: tuple[Value, ...]) -> Command:
+        x, y = m["tangent"]
+        a, b = self.most * action[0], self.most * action[1]
+        return Command((x * a - y * b, y * a + x * b))
 
-    @override
-    def command(self, m: Arrays, actions: np.ndarray) -> Command:
-        t = m["tangent"]
-        a, b = self.most * actions[:, 0], self.most * actions[:, 1]
-        return Command(np.stack((t[:, 0] * a - t[:, 1] * b, t[:, 1] * a + t[:, 0] * b), axis=1))
-
-    def beside(self, m: Arrays, h: Handles) -> lines.Place:
-        """Positions of the handles along their lines, as found by `judge`; computed after a reset.
+    def beside(self, m: Memory, h: Handle) -> lines.Place:
+        """Position of the handle along its line, as found by `judge`; computed after a reset.
 
         Args:
             m: memory of the task.
-            h: handles.
+            h: handle.
         """
         if m["at"] is None:
-            m["at"] = lines.place(m, h.p, AHEAD)
+            m["at"] = lines.place(m["pieces"], h.p, AHEAD)
         return m["at"]
 
-    def motion(self, m: Arrays, h: Handles, at: lines.Place) -> list[np.ndarray]:
+    def motion(self, m: Memory, h: Handle, at: lines.Place) -> tuple[Value, ...]:
         """The observations listed in MOTION.
 
         Args:
             m: memory of the task.
-            h: handles.
-            at: positions of the handles along their lines.
+            h: handle.
+            at: position of the handle along its line.
         """
         v, w = lines.along_across(at.tangent, h.v)
         f, g = lines.along_across(at.tangent, h.fh)
-        last = m["action"]
         left = m["length"] - at.s
-        return [100.0 * v, 100.0 * w, f, g, last[:, 0], last[:, 1], 100.0 * left, m["gain"]]
+        return 100.0 * v, 100.0 * w, f, g, *m["action"], 100.0 * left, m["gain"]
 
     @override
-    def judge(self, m: Arrays, h: Handles, actions: np.ndarray) -> Judged:
-        at = m["at"] = lines.place(m, h.p, AHEAD)
+    def judge(self, m: Memory, h: Handle, action: tuple[Value, ...]) -> Judged:
+        at = m["at"] = lines.place(m["pieces"], h.p, AHEAD)
         error = self.error(m, at)
         speed = lines.along_across(at.tangent, h.v)[0]
-        change = actions - m["action"]
+        a, b = action[0] - m["action"][0], action[1] - m["action"][1]
         late = speed / SPEED - 1.0
         cost = 0.5 * saturated(error * error) + 0.5 * SLOW * saturated(late * late / SLOW)
-        cost += 0.01 * (change[:, 0] * change[:, 0] + change[:, 1] * change[:, 1])
+        cost = cost + 0.01 * (a * a + b * b)
         reward = 100.0 * (at.s - m["s"]) - cost
-        lost = h.diverged | ~(at.distance <= self.far)
-        done = ~lost & (at.s >= m["length"])
-        reward = np.where(lost, LOST, reward + np.where(done, END, 0.0))
-        m["s"], m["tangent"], m["action"] = at.s, at.tangent, actions.copy()
-        self._count(m, np.abs(error), speed)
+        lost = h.diverged | negated(at.distance <= self.far)
+        done = negated(lost) & (at.s >= m["length"])
+        reward = where(lost, LOST, reward + where(done, END, 0.0))
+        m["s"], m["tangent"], m["action"] = at.s, at.tangent, action
+        self._count(m, abs(error), speed)
         return Judged(reward, lost | done, self._told(m, done, lost))
 
-    def _count(self, m: Arrays, error: np.ndarray, speed: np.ndarray) -> None:
+    def _count(self, m: Memory, error: Value, speed: Value) -> None:
         m["count"] = m["count"] + 1.0
         on = m["count"] > SETTLING
-        m["errors"] = m["errors"] + np.where(on, error, 0.0)
-        m["speeds"] = m["speeds"] + np.where(on, speed, 0.0)
-        m["squares"] = m["squares"] + np.where(on, speed * speed, 0.0)
+        m["errors"] = m["errors"] + where(on, error, 0.0)
+        m["speeds"] = m["speeds"] + where(on, speed, 0.0)
+        m["squares"] = m["squares"] + where(on, speed * speed, 0.0)
 
-    def _told(self, m: Arrays, done: np.ndarray, lost: np.ndarray) -> Arrays:
-        n = np.maximum(m["count"] - SETTLING, 1.0)
+    def _told(self, m: Memory, done: Value, lost: Value) -> Memory:
+        n = bounded(m["count"] - SETTLING, 1.0, math.inf)
         error, mean = m["errors"] / n, m["speeds"] / n
-        spread = np.sqrt(np.maximum(m["squares"] / n - mean * mean, 0.0)) / SPEED
+        spread = root(bounded(m["squares"] / n - mean * mean, 0.0, math.inf)) / SPEED
         success = done & (error < 0.5) & (spread < 0.2)
         return {
             "progress": m["s"] / m["length"], "mean_error": error, "speed_spread": spread,

@@ -1,4 +1,7 @@
-"""Lines in the plane, made of straight pieces, and positions along them."""
+"""Lines in the plane, made of straight pieces, and positions along them.
+
+Positions are numbers or columns, see `columns`.
+"""
 
 from __future__ import annotations
 
@@ -7,25 +10,27 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .columns import Pair, Value, bounded, root, where
+
 PIECES = 24  # pieces of an arc
 
 
 class Place(NamedTuple):
-    """Position of a handle relative to its line; arrays over copies.
+    """Position of a handle relative to its line; numbers or columns.
 
     Attributes:
-        s: arc length of the nearest point of the line [m], shape (n,).
-        across: distance from the line, positive to its left [m], shape (n,).
-        distance: distance from the nearest point [m], shape (n,).
-        tangent: direction of the line there, shape (n, 2).
-        ahead: direction of the line further on, shape (n, 2).
+        s: arc length of the nearest point of the line [m].
+        across: distance from the line, positive to its left [m].
+        distance: distance from the nearest point [m].
+        tangent: direction of the line there, (x, y).
+        ahead: direction of the line further on, (x, y).
     """
 
-    s: np.ndarray
-    across: np.ndarray
-    distance: np.ndarray
-    tangent: np.ndarray
-    ahead: np.ndarray
+    s: Value
+    across: Value
+    distance: Value
+    tangent: Pair
+    ahead: Pair
 
 
 def straight(length: float) -> list[tuple[float, float]]:
@@ -75,63 +80,72 @@ def turned(nodes: list[tuple[float, float]], angle: float) -> np.ndarray:
     return np.array([(c * x - s * y, s * x + c * y) for x, y in nodes])
 
 
-def empty(n: int, pieces: int) -> dict[str, np.ndarray]:
-    """Allocates a line for each copy.
+def pieces_of(nodes: np.ndarray) -> tuple[tuple[float, ...], ...]:
+    """The pieces of a line: x and y of its begin [m], of its direction, length and start [m].
 
     Args:
-        n: number of copies.
-        pieces: number of pieces of a line.
-    """
-    return {
-        "nodes": np.zeros((n, pieces + 1, 2)), "tangents": np.zeros((n, pieces, 2)),
-        "lengths": np.ones((n, pieces)), "starts": np.zeros((n, pieces)), "length": np.ones(n),
-    }  # fmt: skip
-
-
-def lay(m: dict[str, np.ndarray], i: int, nodes: np.ndarray) -> None:
-    """Sets the line of a copy.
-
-    Args:
-        m: memory from `empty`.
-        i: number of the copy.
         nodes: nodes of the line [m], shape (pieces + 1, 2).
     """
     d = np.diff(nodes, axis=0)
     lengths = np.sqrt(d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1])
-    m["nodes"][i], m["tangents"][i], m["lengths"][i] = nodes, d / lengths[:, None], lengths
-    ends = np.cumsum(lengths)
-    m["starts"][i], m["length"][i] = ends - lengths, ends[-1]
+    starts = np.cumsum(lengths) - lengths
+    rows = np.column_stack((nodes[:-1], d / lengths[:, None], lengths, starts))
+    return tuple(map(tuple, rows.tolist()))
 
 
-def place(m: dict[str, np.ndarray], p: np.ndarray, ahead: float) -> Place:
-    """Positions of handles relative to their lines.
+def length_of(nodes: np.ndarray) -> float:
+    """Length of a line [m].
 
     Args:
-        m: memory from `empty`.
-        p: positions of the handles [m], shape (n, 2).
+        nodes: nodes of the line [m], shape (pieces + 1, 2).
+    """
+    d = np.diff(nodes, axis=0)
+    return float(np.cumsum(np.sqrt(d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1]))[-1])
+
+
+def place(pieces: tuple[tuple[Value, ...], ...], p: Pair, ahead: float) -> Place:
+    """Position of a handle relative to its line.
+
+    Args:
+        pieces: from `pieces_of`.
+        p: position of the handle [m].
         ahead: look-ahead distance along the line [m].
     """
-    tx, ty = m["tangents"][:, :, 0], m["tangents"][:, :, 1]
-    dx = p[:, None, 0] - m["nodes"][:, :-1, 0]
-    dy = p[:, None, 1] - m["nodes"][:, :-1, 1]
-    along = np.minimum(np.maximum(dx * tx + dy * ty, 0.0), m["lengths"])
-    ox, oy = dx - along * tx, dy - along * ty
-    square = ox * ox + oy * oy
-    rows = np.arange(len(p))
-    k = square.argmin(axis=1)
-    s = m["starts"][rows, k] + along[rows, k]
-    on = (m["starts"] <= (s + ahead)[:, None]).sum(axis=1) - 1
-    across = tx[rows, k] * dy[rows, k] - ty[rows, k] * dx[rows, k]
-    distance = np.sqrt(square[rows, k])
-    return Place(s, across, distance, m["tangents"][rows, k], m["tangents"][rows, on])
+    square, s, across, tx, ty = beside(pieces[0], p)
+    for piece in pieces[1:]:
+        found = beside(piece, p)
+        near = found[0] < square
+        square, s, across = (
+            where(near, x, y) for x, y in zip(found[:3], (square, s, across), strict=True)
+        )
+        tx, ty = where(near, found[3], tx), where(near, found[4], ty)
+    _, _, ux, uy, _, _ = pieces[0]
+    for piece in pieces[1:]:
+        on = piece[5] <= s + ahead
+        ux, uy = where(on, piece[2], ux), where(on, piece[3], uy)
+    return Place(s, across, root(square), (tx, ty), (ux, uy))
 
 
-def along_across(tangent: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Components of vectors along and across a line.
+def beside(piece: tuple[Value, ...], p: Pair) -> tuple[Value, ...]:
+    """Squared distance from a piece, arc length, distance to its left, and its direction.
 
     Args:
-        tangent: direction of the line, shape (n, 2).
-        x: the vectors, shape (n, 2).
+        piece: from `pieces_of`.
+        p: position of the handle [m].
     """
-    along = tangent[:, 0] * x[:, 0] + tangent[:, 1] * x[:, 1]
-    return along, tangent[:, 0] * x[:, 1] - tangent[:, 1] * x[:, 0]
+    x, y, tx, ty, length, start = piece
+    dx, dy = p[0] - x, p[1] - y
+    along = bounded(dx * tx + dy * ty, 0.0, length)
+    ox, oy = dx - along * tx, dy - along * ty
+    return ox * ox + oy * oy, start + along, tx * dy - ty * dx, tx, ty
+
+
+def along_across(tangent: Pair, x: Pair) -> Pair:
+    """Components of a vector along and across a line.
+
+    Args:
+        tangent: direction of the line.
+        x: the vector.
+    """
+    (a, b), (u, v) = tangent, x
+    return a * u + b * v, a * v - b * u

@@ -13,12 +13,13 @@ from ..model.groove import Groove
 from ..model.tool import Tool
 from ..scene.scenario import Scenario
 from . import lines
+from .columns import Value, bounded
 from .cut_line import GAIN_SHARE
 from .draws import HAND, Range, Truth
 from .environment import TaskEnv
 from .follow import AHEAD, MOTION, Follow
 from .quantities import Quantity, either_way
-from .task import Arrays, Handles, scene_of
+from .task import Handle, Memory, scene_of
 from .vector import TaskVectorEnv
 
 TOOL = Tool(0.010, 0.010)
@@ -77,33 +78,32 @@ class PareEdgeTask(Follow):
         start = 0.0, truth["offset"]
         return scene_of(truth, name="pare edge", clay=Clay.of_groove(groove), start=start)
 
-    def depths(self, m: Arrays, at: lines.Place) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Depth of the tool edge, its target, and the target ahead [m], shape (n,) each.
+    def depths(self, m: Memory, at: lines.Place) -> tuple[Value, Value, Value]:
+        """Depth of the tool edge, its target, and the target ahead [m].
 
         Args:
             m: memory of the task.
-            at: positions of the handles along their lines.
+            at: position of the handle along its line.
         """
-        along = m["lengths"][:, 1]
+        along = m["pieces"][1][4]
         step = m["depth_at_end"] - m["depth"]
 
-        def target(s: np.ndarray) -> np.ndarray:
-            share = np.minimum(np.maximum((s - APPROACH) / along, 0.0), 1.0)
-            return m["depth"] + step * share
+        def target(s: Value) -> Value:
+            return m["depth"] + step * bounded((s - APPROACH) / along, 0.0, 1.0)
 
         here = target(at.s)
         return here - at.across, here, target(at.s + AHEAD)
 
     @override
-    def error(self, m: Arrays, at: lines.Place) -> np.ndarray:
+    def error(self, m: Memory, at: lines.Place) -> Value:
         depth, target, _ = self.depths(m, at)
         return (depth - target) / (SHARE * target)
 
     @override
-    def observe(self, m: Arrays, h: Handles) -> np.ndarray:
+    def observe(self, m: Memory, h: Handle) -> tuple[Value, ...]:
         at = self.beside(m, h)
-        depths = (1000.0 * d for d in self.depths(m, at))
-        return np.stack((*depths, *self.motion(m, h, at)), axis=1)
+        depth, target, ahead = self.depths(m, at)
+        return 1000.0 * depth, 1000.0 * target, 1000.0 * ahead, *self.motion(m, h, at)
 
 
 class PareEdge(TaskEnv):

@@ -9,8 +9,8 @@ import numpy as np
 from ..model.arm import inverse_kinematics
 from ..scene.scenario import Scenario
 from ..views.plan_picture import Plan, PlanPicture
-from .episodes import Episodes
-from .task import Task
+from .draws import Truth
+from .task import Handle, Memory, Task
 
 RADIUS = 0.005  # [m] of the tool where a task has none
 PATH = 2000  # points of the path to keep
@@ -32,38 +32,36 @@ class Picture:
         """Starts a new path."""
         self._path = []
 
-    def note(self, p: np.ndarray) -> None:
+    def note(self, p: tuple[float, float]) -> None:
         """Adds a point to the path.
 
         Args:
-            p: position of the handle [m], shape (2,).
+            p: position of the handle [m].
         """
         point = float(p[0]), float(p[1])
         if not self._path or self._path[-1] != point:
             self._path.append(point)
         del self._path[:-PATH]
 
-    def drawn(self, episodes: Episodes, i: int = 0) -> np.ndarray | None:
+    def drawn(self, truth: Truth, m: Memory, h: Handle) -> np.ndarray | None:
         """The present picture, shape (height, width, 3), uint8; None if a window shows it.
 
         Args:
-            episodes: episodes of the task.
-            i: number of the copy.
+            truth: numbers drawn for the episode.
+            m: memory of the task.
+            h: handle.
         """
-        p = episodes.handles.p[i]
-        scenario = self._task.scenario(episodes.truth_of(i))
-        nodes = episodes.memory["nodes"][i] if "nodes" in episodes.memory else None
+        x, y = map(float, h.p)
+        scenario, nodes = self._task.scenario(truth), m.get("nodes")
         plan = Plan(
-            joints_at(scenario, float(p[0]), float(p[1])), np.array(self._path), nodes,
-            blocks_of(scenario), RADIUS, view_of(nodes, p), self._title(episodes, i),
+            joints_at(scenario, x, y), np.array(self._path), nodes, blocks_of(scenario), RADIUS,
+            view_of(nodes, np.array((x, y))), self._title(m, h),
         )  # fmt: skip
         return self._plan.draw(plan)
 
-    def _title(self, episodes: Episodes, i: int) -> str:
-        m, h = episodes.memory, episodes.handles
-        speed = 100.0 * math.hypot(*h.v[i].tolist())
-        told = f"{speed:.1f} cm/s"
-        return f"K = {m['K'][i]:.2f} 1/kg, {told}" if "K" in m else told
+    def _title(self, m: Memory, h: Handle) -> str:
+        told = f"{100.0 * math.hypot(*h.v):.1f} cm/s"
+        return f"K = {m['K']:.2f} 1/kg, {told}" if "K" in m else told
 
     def close(self) -> None:
         """Closes the window, if any."""

@@ -12,10 +12,11 @@ from typing_extensions import override
 from ..model.clay import slab
 from ..model.flow import Flow
 from ..scene.scenario import Scenario
+from .columns import Value, mapped, where
 from .draws import HAND, Range, Truth
 from .environment import TaskEnv
 from .quantities import Quantity, either_way
-from .task import DT, FORCE, Arrays, Command, Handles, Judged, Task, scene_of
+from .task import DT, FORCE, Command, Handle, Judged, Memory, Task, scene_of
 from .vector import TaskVectorEnv
 
 MIDDLE, DECADES = (50.0, 1.5), 0.8  # b [N.s/m] and Fy [N] that an answer of 0 names; at 1, above
@@ -27,6 +28,7 @@ class ProbeClayTask(Task):
     """Task: identify damping and yield force of clay by moving through it."""
 
     limit: ClassVar[int] = 150
+    share: ClassVar[float] = 0.5
     actions: ClassVar[tuple[Quantity, ...]] = (
         either_way("muscle force along x / 30 N", 1.0),
         either_way("muscle force along y / 30 N", 1.0),
@@ -60,38 +62,28 @@ class ProbeClayTask(Task):
         return scene_of(truth, name="probe clay", clay=clay)
 
     @override
-    def memory(self, n: int) -> Arrays:
-        return {
-            "count": np.zeros(n, np.int64), "action": np.zeros((n, 2)), "b": np.ones(n),
-            "Fy": np.ones(n),
-        }  # fmt: skip
+    def begin(self, truth: Truth, rng: np.random.Generator) -> Memory:
+        return {"count": 0, "action": (0.0, 0.0), "b": truth["b"], "Fy": truth["Fy"]}
 
     @override
-    def begin(self, m: Arrays, i: int, truth: Truth, rng: np.random.Generator) -> None:
-        m["count"][i], m["action"][i] = 0, 0.0
-        m["b"][i], m["Fy"][i] = truth["b"], truth["Fy"]
+    def command(self, m: Memory, action: tuple[Value, ...]) -> Command:
+        return Command((FORCE * action[0], FORCE * action[1]))
 
     @override
-    def command(self, m: Arrays, actions: np.ndarray) -> Command:
-        return Command(FORCE * actions[:, :2])
-
-    @override
-    def observe(self, m: Arrays, h: Handles) -> np.ndarray:
+    def observe(self, m: Memory, h: Handle) -> tuple[Value, ...]:
         left = (self.limit - m["count"]) * (self.steps * DT)
-        return np.concatenate((1000.0 * h.p, 100.0 * h.v, h.fh, m["action"], left[:, None]), axis=1)
+        x, y = h.p
+        vx, vy = h.v
+        return 1000.0 * x, 1000.0 * y, 100.0 * vx, 100.0 * vy, *h.fh, *m["action"], left
 
     @override
-    def judge(self, m: Arrays, h: Handles, actions: np.ndarray) -> Judged:
+    def judge(self, m: Memory, h: Handle, action: tuple[Value, ...]) -> Judged:
         m["count"] = m["count"] + 1
-        m["action"] = actions[:, :2].copy()
+        m["action"] = action[:2]
         over = m["count"] >= self.limit
-        errors = [
-            _error(actions[:, 2], m["b"], MIDDLE[0]),
-            _error(actions[:, 3], m["Fy"], MIDDLE[1]),
-        ]
-        answer = np.where(over, -(errors[0] + errors[1]), 0.0)
-        reward = np.where(h.diverged, LOST, answer)
-        info = {"error_b": errors[0], "error_Fy": errors[1], "lost": h.diverged}
+        b, Fy = _error(action[2], m["b"], MIDDLE[0]), _error(action[3], m["Fy"], MIDDLE[1])
+        reward = where(h.diverged, LOST, where(over, -(b + Fy), 0.0))
+        info = {"error_b": b, "error_Fy": Fy, "lost": h.diverged}
         return Judged(reward, over | h.diverged, info)
 
 
@@ -109,10 +101,10 @@ def answer_of(b: float, Fy: float) -> tuple[float, float]:
     return x, y
 
 
-def _error(answer: np.ndarray, truth: np.ndarray, middle: float) -> np.ndarray:
+def _error(answer: Value, truth: Value, middle: float) -> Value:
     """|ln(answer/truth)|."""
-    pairs = zip(answer.tolist(), truth.tolist(), strict=True)
-    return np.array([abs(DECADES * math.log(10.0) * a - math.log(x / middle)) for a, x in pairs])
+    named = DECADES * math.log(10.0) * answer
+    return abs(named - mapped(math.log, truth / middle))
 
 
 class ProbeClay(TaskEnv):

@@ -1,71 +1,75 @@
-"""Tasks: random scenes, actions, observations and rewards, for many copies at once.
+"""Tasks: random scenes, actions, observations and rewards.
 
-The functions of a task work on arrays with one row per copy. Array operations are limited to +, -,
-*, / and square roots; all others use `math`, number by number. So a row depends only on its own
-copy, bit for bit, for any number of copies.
+The functions of a task work on the numbers of one copy, or on columns with one value per copy, see
+`columns`. So each formula stands once, and a copy has the same numbers alone and among others.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ..model.constants import GAIN
+from ..model.constants import GAIN, TORQUE_LIMIT
 from ..model.operator import Operator
 from ..scene.scenario import Scenario
+from .columns import Pair, Value, negated
 from .draws import Range, Truth, with_ranges
 from .quantities import Quantity
 
 DT = 3.5714286e-4  # [s] 56 steps are 20 ms, and a step is at most the paper's 0.36 ms
 FORCE = 30.0  # [N] muscle force at an action of 1
-Arrays = dict[str, Any]  # one row per copy
+HELD = (
+    0.25  # share of a period with a torque, for it to count; after a jump of the force it is less
+)
+SPEED_LIMIT = 20.0  # [m/s] beyond which a run counts as unstable
+Memory = dict[str, Any]  # values, tables, or tuples of them, by name: of one copy, or columns
 
 
-class Handles(NamedTuple):
-    """State of the handles at the end of a control period, one row per copy.
+class Handle(NamedTuple):
+    """State of the handle at the end of a control period; pairs (x, y) of numbers or columns.
 
     Attributes:
-        p: position [m], shape (n, 2).
-        v: velocity [m/s], shape (n, 2).
-        fh: force of the hand on the handle [N], shape (n, 2).
-        fe: resisting force of the clay [N], shape (n, 2).
-        diverged: whether the run is unstable or over, shape (n,).
+        p: position [m].
+        v: velocity [m/s].
+        fh: force of the hand on the handle [N].
+        fe: resisting force of the clay [N].
+        diverged: whether the run is unstable or over.
     """
 
-    p: np.ndarray
-    v: np.ndarray
-    fh: np.ndarray
-    fe: np.ndarray
-    diverged: np.ndarray
+    p: Pair
+    v: Pair
+    fh: Pair
+    fe: Pair
+    diverged: Value
 
 
 class Command(NamedTuple):
-    """Command for a control period.
+    """Command for a control period; pairs (x, y) of numbers or columns.
 
     Attributes:
-        force: muscle force on the handle [N], shape (n, 2).
-        gain: K of the compensator [1/kg], shape (n, 2); None to keep it.
+        force: muscle force on the handle [N].
+        gain: K of the compensator [1/kg]; None to keep it.
     """
 
-    force: np.ndarray
-    gain: np.ndarray | None = None
+    force: Pair
+    gain: Pair | None = None
 
 
 class Judged(NamedTuple):
-    """Reward of a control period.
+    """Reward of a control period; numbers or columns.
 
     Attributes:
-        reward: reward, shape (n,).
-        ended: whether the episode is over, shape (n,).
-        info: numbers by name, shape (n,) each.
+        reward: reward.
+        ended: whether the episode is over.
+        info: values by name.
     """
 
-    reward: np.ndarray
-    ended: np.ndarray
-    info: Arrays
+    reward: Value
+    ended: Value
+    info: Memory
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,8 @@ class Task:
         steps: engine steps per control period.
         limit: control periods after which an episode is truncated.
         strain: share of the torque limit beyond which a run counts as unstable.
+        share: share of a control period in which that torque is needed; after a jump of the muscle
+            force stable runs need it for less.
         actions: quantities of an action.
         observations: quantities of an observation.
         drawn: ranges of the numbers drawn for each episode.
@@ -89,6 +95,7 @@ class Task:
     steps: ClassVar[int] = 56
     limit: ClassVar[int] = 500
     strain: ClassVar[float] = 1.0
+    share: ClassVar[float] = 0.25
     actions: ClassVar[tuple[Quantity, ...]]
     drawn: ClassVar[dict[str, Range]]
 
@@ -99,6 +106,11 @@ class Task:
     def period(self) -> float:
         """Control period [s]."""
         return self.steps * DT
+
+    @property
+    def held(self) -> int:
+        """Samples of a control period in which a torque must be reached to count."""
+        return round(self.share * self.steps)
 
     @property
     def observations(self) -> tuple[Quantity, ...]:
@@ -113,52 +125,59 @@ class Task:
         """
         raise NotImplementedError
 
-    def memory(self, n: int) -> Arrays:
-        """State of the task for n copies, one row per copy.
+    def begin(self, truth: Truth, rng: np.random.Generator) -> Memory:
+        """Memory of the task at the start of an episode.
 
         Args:
-            n: number of copies.
-        """
-        raise NotImplementedError
-
-    def begin(self, m: Arrays, i: int, truth: Truth, rng: np.random.Generator) -> None:
-        """Starts an episode of one copy.
-
-        Args:
-            m: memory of the task.
-            i: number of the copy.
             truth: numbers drawn, by name.
             rng: generator for further random numbers.
         """
         raise NotImplementedError
 
-    def command(self, m: Arrays, actions: np.ndarray) -> Command:
+    def command(self, m: Memory, action: tuple[Value, ...]) -> Command:
         """Command of an action for a control period.
 
         Args:
             m: memory of the task.
-            actions: actions within -1 to 1, shape (n, number of actions).
+            action: numbers of the action, within -1 to 1.
         """
         raise NotImplementedError
 
-    def observe(self, m: Arrays, h: Handles) -> np.ndarray:
-        """Observations, shape (n, number of observations).
+    def observe(self, m: Memory, h: Handle) -> tuple[Value, ...]:
+        """The quantities of an observation.
 
         Args:
             m: memory of the task.
-            h: handles.
+            h: handle.
         """
         raise NotImplementedError
 
-    def judge(self, m: Arrays, h: Handles, actions: np.ndarray) -> Judged:
-        """Rewards of a control period.
+    def judge(self, m: Memory, h: Handle, action: tuple[Value, ...]) -> Judged:
+        """Reward of a control period.
 
         Args:
             m: memory of the task; it is updated.
-            h: handles at the end of the period.
-            actions: actions of the period.
+            h: handle at the end of the period.
+            action: numbers of the action of the period.
         """
         raise NotImplementedError
+
+    def handle(self, sample: Sequence[Pair], held: Sequence[Value], over: Value) -> Handle:
+        """The handle in a sample.
+
+        A run counts as diverged if it is over (for example out of reach), if it is faster than
+        SPEED_LIMIT, or if a motor needed a torque that no stable run of the task needs.
+
+        Args:
+            sample: p, v, fh and fe.
+            held: torques that each motor reaches in `held` samples of the period [N.m].
+            over: whether the run is over.
+        """
+        p, v, fh, fe = sample
+        shoulder, elbow = TORQUE_LIMIT
+        calm = (held[0] < self.strain * shoulder) & (held[1] < self.strain * elbow)
+        slow = v[0] * v[0] + v[1] * v[1] <= SPEED_LIMIT * SPEED_LIMIT
+        return Handle(p, v, fh, fe, over | negated(calm & slow))
 
 
 def hand_of(truth: Truth) -> Operator:
@@ -185,7 +204,7 @@ def scene_of(truth: Truth, **parts: Any) -> Scenario:
     return Scenario(**(shared | parts))  # type: ignore[arg-type]
 
 
-def saturated(x: np.ndarray) -> np.ndarray:
+def saturated(x: Value) -> Value:
     """x/(1 + x): a cost that grows like x for small x and stays below 1.
 
     Args:

@@ -13,10 +13,10 @@ from gymnasium.vector.utils import batch_space
 
 from ..errors import ParameterError, choice, integer
 from ..simulation.engines import ENGINES
-from .environment import FPS, MODES, numbers_of_copy
+from .environment import FPS, MODES
 from .episodes import Episodes
 from .quantities import box_of
-from .task import Arrays, Task
+from .task import Memory, Task
 
 MOST_COPIES = 100_000
 
@@ -107,7 +107,7 @@ class TaskVectorEnv(VectorEnv):
         mask = self._mask(given.pop("reset_mask", None))
         self._seed(seed, mask)
         self._begin(mask, given)
-        return self._episodes.observe(), _masked(self._episodes.info(), mask)
+        return self._episodes.observe(), _masked(self._episodes.truth, mask)
 
     def _mask(self, given: Any) -> np.ndarray:
         n = self.num_envs
@@ -116,6 +116,8 @@ class TaskVectorEnv(VectorEnv):
         mask = np.asarray(given)
         if mask.shape != (n,) or mask.dtype != bool or not mask.any():
             raise ParameterError("reset_mask", given, f"must be {n} bools, one of them True")
+        if not self._generators and not mask.all():
+            raise ParameterError("reset_mask", given, "must be True for all at the first reset")
         return mask
 
     def _seed(self, seed: int | Sequence[int | None] | None, mask: np.ndarray) -> None:
@@ -167,19 +169,19 @@ class TaskVectorEnv(VectorEnv):
         self._count += live
         ended = found.ended & live
         cut_off = (self._count >= self._most) & live
-        rewards = np.where(live, found.rewards, 0.0)
+        rewards = np.where(live, found.reward, 0.0)
         if not live.all():  # with NEXT_STEP: the episode ended before this step
             self._begin(~live, None)
         self._over = ended | cut_off
         infos = self._infos(found.info, live)
-        observations = found.observations if live.all() else self._episodes.observe()
+        observations = found.observation if live.all() else self._episodes.observe()
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
-            observations = self._next_episodes(found.observations, infos)
+            observations = self._next_episodes(found.observation, infos)
         return observations, rewards, ended, cut_off, infos
 
-    def _infos(self, info: Arrays, live: np.ndarray) -> dict[str, Any]:
+    def _infos(self, info: Memory, live: np.ndarray) -> dict[str, Any]:
         everywhere = np.ones(self.num_envs, bool)
-        return _masked(self._episodes.info(), everywhere) | _masked(info, live)
+        return _masked(self._episodes.truth, everywhere) | _masked(info, live)
 
     def _next_episodes(self, last: np.ndarray, infos: dict[str, Any]) -> np.ndarray:
         """Starts the next episode where one is over; its final values go into infos."""
@@ -199,7 +201,7 @@ class TaskVectorEnv(VectorEnv):
             if not name.startswith("final"):
                 infos[f"_{name}"] = infos[f"_{name}"] & ~over
         self._begin(over, None)
-        infos |= self._episodes.info()
+        infos |= {name: x.copy() for name, x in self._episodes.truth.items()}
         return self._episodes.observe()
 
     def render(self) -> tuple[Any, ...] | None:
@@ -207,14 +209,17 @@ class TaskVectorEnv(VectorEnv):
         if self.render_mode is None:
             gymnasium.logger.warn("give render_mode to gymnasium.make_vec to see pictures")
             return None
+        if not self._generators:
+            raise RuntimeError("reset the environments before they are drawn")
         from .picture import Picture
 
         if not self._pictures:
             self._pictures = [Picture(self.task, False) for _ in range(self.num_envs)]
         frames = []
         for i, picture in enumerate(self._pictures):
-            picture.note(self._episodes.handles.p[i])
-            frames.append(picture.drawn(self._episodes, i))
+            truth, memory, handle = self._episodes.copy(i)
+            picture.note(handle.p)
+            frames.append(picture.drawn(truth, memory, handle))
         return tuple(frames)
 
     def info_of(self, i: int) -> dict[str, Any]:
@@ -223,14 +228,14 @@ class TaskVectorEnv(VectorEnv):
         Args:
             i: number of the copy.
         """
-        return numbers_of_copy(self._episodes.info(), i)
+        return self._episodes.truth_of(i)
 
     def close_extras(self, **_: Any) -> None:
         """Ends the runs."""
         for picture in self._pictures:
             picture.close()
         self._pictures = []
-        self._episodes.copies.close()
+        self._episodes.close()
 
 
 def mode_of(given: str | AutoresetMode) -> AutoresetMode:
@@ -247,7 +252,7 @@ def mode_of(given: str | AutoresetMode) -> AutoresetMode:
     return AutoresetMode[choice("autoreset_mode", given, [x.name for x in AutoresetMode])]
 
 
-def _masked(info: Arrays, mask: np.ndarray) -> dict[str, Any]:
+def _masked(info: Memory, mask: np.ndarray) -> dict[str, Any]:
     """Info in the form of Gymnasium: arrays, with masks of the copies that have a value."""
     found: dict[str, Any] = {}
     for name, x in info.items():

@@ -18,7 +18,7 @@ from ..stepping.engine import warnings_caught
 from ..stepping.monitor import Outcome
 from .batch import checked_scenarios, cores
 from .engines import ENGINES, NUMBA, has_numba
-from .stepwise import COLUMNS, MOST, started_with_operator
+from .stepwise import COLUMNS, MOST, MOST_GAIN, gain_of, started_with_operator
 from .vectored import VectoredRuns
 
 
@@ -41,6 +41,7 @@ class SimulationBatch:
         scenarios: what to run, one per run.
         engine: as in `simulate`; "auto" compiles once the requested steps make it worthwhile.
         workers: threads of compiled steps; None for one per core.
+        monitored: as in `Simulation`.
 
     Raises:
         ParameterError: there is no scenario, one is of another type, or is refused as by
@@ -48,7 +49,12 @@ class SimulationBatch:
     """
 
     def __init__(
-        self, scenarios: Sequence[Scenario], *, engine: str = "auto", workers: int | None = None
+        self,
+        scenarios: Sequence[Scenario],
+        *,
+        engine: str = "auto",
+        workers: int | None = None,
+        monitored: bool = True,
     ):
         engine = choice("engine", engine, ENGINES)
         if engine == "native" and not has_numba():
@@ -59,7 +65,7 @@ class SimulationBatch:
         if not given:
             raise ParameterError("scenarios", scenarios, "must hold at least one Scenario")
         self._lock, self._closed = threading.Lock(), False
-        self._runs = VectoredRuns(given, engine, workers)
+        self._runs = VectoredRuns(given, engine, workers, monitored)
 
     @contextlib.contextmanager
     def _alone(self) -> Iterator[VectoredRuns]:
@@ -164,20 +170,22 @@ class SimulationBatch:
         n = len(which)
         one = operator is None or isinstance(operator, Operator | tuple)
         operators = _each("operator", operator, n, not one)
-        gains = _each("gain", gain, n, gain is not None and np.ndim(gain) == 2)
+        gains = None if gain is None else self._gains(gain, n)
         factors = _each("b", b, n, np.ndim(b) == 1)
         with self._alone() as all_:
-            for k, K, hand, factor in zip(which, gains, operators, factors, strict=True):
-                changes = self._changes(all_, k, K, hand)
+            for k, hand, factor in zip(which, operators, factors, strict=True):
+                changes = self._changes(all_, k, hand)
                 if factor is not None:
                     factor, clay = number(f"b[{k}]", factor, 0.0, 1e6), all_.given[k].clay
                     changes["clay"] = clay and clay.scaled(factor)
                 if changes:
                     all_.change(k, lambda s, changes=changes: replace(s, **changes))
+            if gains is not None:
+                all_.set_gain(np.array(which, np.int64), gains)
 
     @staticmethod
-    def _changes(runs: VectoredRuns, k: int, gain: Any, operator: Any) -> dict[str, Any]:
-        changes: dict[str, Any] = {} if gain is None else {"gain": gain}
+    def _changes(runs: VectoredRuns, k: int, operator: Any) -> dict[str, Any]:
+        changes: dict[str, Any] = {}
         if operator is not None:
             started_with_operator(runs.given[k], operator)
             changes["operator"] = operator
@@ -189,6 +197,22 @@ class SimulationBatch:
         with self._alone() as runs:
             at = COLUMNS[name]
             return runs.show()[:, at : at + 2].copy()
+
+    def numbers(self) -> np.ndarray:
+        """The present samples as rows, see `Simulation.numbers`, shape (N, 18)."""
+        with self._alone() as runs:
+            return runs.show().copy()
+
+    def torque_reached(self, n: int, k: int = 1) -> np.ndarray:
+        """As `Simulation.torque_reached`, of each run [N.m], shape (N, 2).
+
+        Args:
+            n: number of samples, at least 1.
+            k: how many reach it, at least 1; with 1 it is the largest torque.
+        """
+        n, k = integer("n", n, 1, 1_000_000_000), integer("k", k, 1, 1_000_000_000)
+        with self._alone() as runs:
+            return runs.torque_reached(n, k)
 
     @property
     def t(self) -> np.ndarray:
@@ -282,6 +306,14 @@ class SimulationBatch:
         if given.dtype == bool and given.ndim:
             return np.flatnonzero(self._mask(field, value)).tolist()
         return [integer(field, x, 0, n - 1) for x in np.atleast_1d(given).tolist()]
+
+    def _gains(self, value: Any, n: int) -> np.ndarray:
+        """Gains of n runs [1/kg], shape (n, 2): one for all, or one each."""
+        given = array_of("gain", value)
+        if given.shape == (n, 2) and ((given >= 0.0) & (given <= MOST_GAIN)).all():
+            return given
+        each = _each("gain", value, n, np.ndim(value) == 2)
+        return np.array([gain_of(x) for x in each]).reshape(n, 2)
 
     def _forces(self, value: Any, mask: np.ndarray) -> np.ndarray:
         force, n = array_of("force", value), len(self)

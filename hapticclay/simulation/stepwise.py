@@ -27,6 +27,7 @@ from .engines import ENGINES, kernel_for
 from .vectored import repay
 
 MOST = 1e6  # largest force [N] and torque [N.m] that may be given
+MOST_GAIN = 1e6  # largest K of a scenario [1/kg]
 LOOK = 0.02  # [s] of simulated time between two checks for divergence
 TOLD = 1000  # steps after which to check again whether machine code pays
 COLUMNS = {"q": 0, "p": 2, "v": 4, "fh": 6, "tau": 8, "delta": 10, "b": 12, "qd": 14, "fe": ROW}
@@ -83,18 +84,30 @@ class Simulation:
     Args:
         scenario: what to run.
         engine: as in `simulate`; "auto" compiles once the requested steps make it worthwhile.
+        recorded: whether a record is kept; else at most the last 4095 samples, for the monitor.
+        monitored: whether the run ends when an axis is judged unstable; else it ends only at its
+            limits, out of reach or above 20 m/s, and `diverging` is False. For muscle forces that
+            jump, whose larger swings the monitor would mistake for growth.
 
     Raises:
         ParameterError: scenario is of another type, or refused as by `simulate`.
     """
 
-    def __init__(self, scenario: Scenario, *, engine: str = "auto"):
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        engine: str = "auto",
+        recorded: bool = True,
+        monitored: bool = True,
+    ):
         if not isinstance(scenario, Scenario):
             bound = "must be a Scenario, as constant_cut() returns"
             raise ParameterError("scenario", scenario, bound)
         self._engine = choice("engine", engine, ENGINES)
         self._lock, self._store, self._untold = threading.Lock(), EngineStore(), 0
-        self._closed, self._warned = False, ()
+        self._closed, self._warned, self._recorded = False, (), recorded
+        self._monitored = monitored
         self._begin(scenario)
 
     def _begin(self, scenario: Scenario) -> None:
@@ -105,10 +118,13 @@ class Simulation:
         kernel = PLAIN
         if self._engine == "native":
             kernel = stepwise_kernel(kernel_for(scenario, self._engine))
-        self._run = Run(scenario, 1, kernel, self._store, watched=True)
+        self._run = Run(scenario, 1, kernel, self._store, watched=True, **self._kept())
         self._given, self._wall = scenario, 0.0
         self._torque: tuple[float, float] | None = None
         self._forget()
+
+    def _kept(self) -> dict[str, bool]:
+        return {"recorded": self._recorded, "monitored": self._monitored}
 
     def _forget(self) -> None:
         """Discards cached results of the run, which has changed."""
@@ -129,10 +145,11 @@ class Simulation:
     def __getstate__(self) -> dict[str, Any]:
         with self._alone() as run:
             names = "_engine", "_torque", "_wall", "_given"
-            return {x: getattr(self, x) for x in names} | {"snapshot": run.snapshot()}
+            found = {x: getattr(self, x) for x in names}
+            return found | {"kept": self._kept(), "snapshot": run.snapshot()}
 
     def __setstate__(self, kept: dict[str, Any]) -> None:
-        self.__init__(kept["_given"], engine=kept["_engine"])  # type: ignore[misc]
+        self.__init__(kept["_given"], engine=kept["_engine"], **kept["kept"])  # type: ignore[misc]
         if kept["_torque"] is not None:
             self._take_over(kept["_torque"])
         self._run.return_to(kept["snapshot"])
@@ -140,7 +157,7 @@ class Simulation:
 
     def close(self) -> None:
         """Closes the simulation; no further step can be made."""
-        if not self._closed and (self._run.filled or self._run.looked):
+        if not self._closed and self._recorded and (self._run.filled or self._run.looked):
             self.record()
         self._closed = True
 
@@ -167,13 +184,39 @@ class Simulation:
         that a step from here would record.
         """
         if self._state is None:
-            if self._run.outcome is None:
-                with self._alone() as run:
-                    self._state = sample_of(run.i * run.scenario.dt, run.ahead())
+            run = self._run
+            if run.outcome is None or not self._recorded:
+                self._state = sample_of(run.sample_time(), np.array(self.numbers()))
             else:
                 last = {name: getattr(self.record(), name)[-1] for name in Sample._fields}
                 self._state = Sample(**last)
         return self._state
+
+    def numbers(self) -> list[float]:
+        """The present sample as plain numbers; cheaper than `state`.
+
+        Returns:
+            Pairs of two each, of shoulder and elbow or of x and y: q, p, v, fh, tau, delta, b, qd,
+            fe, as in `Sample`; 18 numbers.
+        """
+        if self._run.outcome is not None and self._recorded:
+            x = self.state
+            return [float(a) for name in COLUMNS for a in getattr(x, name)]
+        with self._alone() as run:
+            return run.numbers_ahead()
+
+    def torque_reached(self, n: int, k: int = 1) -> list[float]:
+        """|tau| of shoulder and elbow motor that at least k of the last n samples reach [N.m].
+
+        Every 4095 samples the run is checked, and those before are left out.
+
+        Args:
+            n: number of samples, at least 1.
+            k: how many reach it, at least 1; with 1 it is the largest torque.
+        """
+        n, k = integer("n", n, 1, 1_000_000_000), integer("k", k, 1, 1_000_000_000)
+        with self._alone() as run:
+            return run.torque_reached(n, k)
 
     def handle(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Place of the handle [m], and its velocity half a step ago [m/s]; cheaper than `state`."""
@@ -243,10 +286,12 @@ class Simulation:
             if torque is not None:
                 self._drive(numbers_of("torque", torque, JOINTS, -MOST, MOST, unit="N.m"))
             self._state, begin = None, time.perf_counter()
-            run.pause = run.i + n
+            goal = run.i + n
             with warnings_caught():
-                self._choose(n)
-                run.go(None)
+                if not run.hop(n):
+                    run.pause = goal
+                    self._choose(n)
+                    run.go(None)
             self._wall += time.perf_counter() - begin
 
     def _choose(self, n: int) -> None:
@@ -303,14 +348,18 @@ class Simulation:
             ParameterError: a value is out of its bounds, or an operator would be added or removed.
         """
         with self._alone() as run:
-            changes: dict[str, Any] = {} if gain is None else {"gain": gain}
+            gain = None if gain is None else gain_of(gain)
+            changes: dict[str, Any] = {}
             if operator is not None:
                 started_with_operator(run.scenario, operator)
                 changes["operator"] = operator
             if b is not None:
                 factor, clay = number("b", b, 0.0, 1e6), self._given.clay
                 changes["clay"] = clay and clay.scaled(factor)
-            run.change(replace(run.scenario, **changes))
+            if changes:
+                run.change(replace(run.scenario, **changes))
+            if gain is not None:
+                run.change_gain(gain)
             self._state = None
 
     def record(self) -> record.Record:
@@ -319,8 +368,10 @@ class Simulation:
         A run that had not ended gets the outcome "interrupted".
 
         Raises:
-            RuntimeError: no step has been made.
+            RuntimeError: no step has been made, or no record is kept.
         """
+        if not self._recorded:
+            raise RuntimeError("no record is kept: make the simulation with recorded=True")
         if self._record is not None:
             return self._record
         with self._alone() as run:
@@ -392,6 +443,18 @@ def stepwise_kernel(kernel: Kernel) -> Kernel:
     from ..stepping.compiled import BY_ROWS  # where it is loaded
 
     return BY_ROWS
+
+
+def gain_of(value: object) -> tuple[float, float]:
+    """Gains K of x and y [1/kg], checked as those of a scenario.
+
+    Args:
+        value: the gains.
+
+    Raises:
+        ParameterError: there are not two, or one is out of bounds.
+    """
+    return pair("gain", value, 0.0, MOST_GAIN, unit="1/kg")
 
 
 def started_with_operator(scenario: Scenario, operator: object) -> None:

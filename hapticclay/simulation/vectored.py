@@ -12,7 +12,7 @@ from ..scene.scenario import Scenario
 from ..stepping import scene
 from ..stepping.monitor import Outcome
 from ..stepping.rows import ROW
-from ..stepping.run import CHUNK, PLAIN, EngineStore, Run
+from ..stepping.run import CHUNK, PLAIN, EngineStore, Run, torque_reached
 from ..stepping.state import OPEN
 from ..stepping.vector import BOTH, STEPS, TRY, Common, RunVector, is_vectored, kind_key
 from . import engines
@@ -30,22 +30,24 @@ class VectoredRuns:
         scenarios: of the runs.
         engine: as in `simulate`.
         workers: threads of compiled steps.
+        monitored: whether their stability is judged.
 
     Attributes:
         runs: the runs.
         given: the scenario that each began with.
         force: constant muscle force of each that is in effect [N], shape (n, 2).
+        gain: K of x and y of each that is in effect [1/kg], shape (n, 2).
         over: which have ended.
         common: what is known of each, see vector.Vector.
     """
 
-    def __init__(self, scenarios: Sequence[Scenario], engine: str, workers: int):
-        n = len(scenarios)
+    def __init__(self, scenarios: Sequence[Scenario], engine: str, workers: int, monitored: bool):
+        n, self.monitored = len(scenarios), monitored
         self.engine, self.workers, self.engines = engine, workers, dict[Any, Any]()
         self.compiled: Any = load_compiled() if engine == "native" else None
         self.common, self.over = Common(n), np.zeros(n, bool)
         self.given, self.changed = list(scenarios), np.zeros(n, bool)
-        self.force, self.steady = np.zeros((n, 2)), np.zeros((n, 2))
+        self.force, self.steady, self.gain = np.zeros((3, n, 2))
         self.looked_at, self.diverging = np.full(n, -np.inf), np.zeros(n, bool)
         self.vectors: dict[Any, RunVector] = {}
         self.of: list[RunVector | None] = [None] * n
@@ -66,13 +68,14 @@ class VectoredRuns:
 
     def _new(self, s: Scenario, store: EngineStore) -> Run:
         kernel = self.compiled.KERNEL if self.compiled else PLAIN
-        return Run(s, 1, kernel, store, watched=True, recorded=False)
+        kept = dict(watched=True, recorded=False, monitored=self.monitored)
+        return Run(s, 1, kernel, store, **kept)
 
     def _begin(self, k: int) -> None:
         """Notes that a run is at its start."""
         c, s = self.common, self.given[k]
         self.over[k], self.changed[k] = False, False
-        self.force[k], self.steady[k] = s.force, scene.steady_force(s)
+        self.force[k], self.steady[k], self.gain[k] = s.force, scene.steady_force(s), s.gain
         self.looked_at[k], self.diverging[k] = -np.inf, False
         c.quiet[k], c.swings[k], c.seen[k] = 1, 0.0, (0, -1, -1, 0)
         c.times[k], c.marks[k], c.looked[k] = 0.0, (0, 0, OPEN, 0, 0, 0), 0
@@ -106,10 +109,13 @@ class VectoredRuns:
         v.advance = self.compiled.advancing(v.kind, v.parts, v.state, v.place(0), v.x, none, STEPS)
 
     def _sync(self, k: int) -> Run:
-        """The run, with its present state and force."""
+        """The run, with its present state, force and gain."""
         run, v = self.runs[k], self.of[k]
         if v is not None:
             v.give(k, run)
+            gain = float(self.gain[k, 0]), float(self.gain[k, 1])
+            if gain != run.scenario.gain:
+                run.change_gain(gain)
             force = float(self.force[k, 0]), float(self.force[k, 1])
             if force != run.scenario.force:
                 run.change_force(force)
@@ -157,6 +163,28 @@ class VectoredRuns:
         self._unshow()
         if self.of[k]:
             self._place(k)
+
+    def set_gain(self, which: np.ndarray, gain: np.ndarray) -> None:
+        """Continues with other gains, in runs that have not ended.
+
+        Args:
+            which: indices of runs.
+            gain: K of x and y of each [1/kg], shape (len(which), 2).
+        """
+        other = (gain != self.gain[which]).any(axis=1) & ~self.over[which]
+        which, gain = which[other], gain[other]
+        if not len(which):
+            return
+        self.gain[which], self.changed[which] = gain, True
+        self._unshow()
+        for v, ks in self._groups(which):
+            if v is not None and scene.takes_gain(v.parts):
+                v.set_gain(ks, self.gain[ks])
+                continue
+            for k in ks.tolist():
+                self._sync(k).change_gain((float(self.gain[k, 0]), float(self.gain[k, 1])))
+                if v is not None:
+                    self._place(k)
 
     # ---- steps
 
@@ -288,7 +316,7 @@ class VectoredRuns:
         run, v = self.runs[k], self.of[k]
         if v is None or self.over[k]:
             return
-        v.give(k, run)
+        self._sync(k)
         run.note_end()
         run.flush()
         v.take_state(k, run)
@@ -299,11 +327,10 @@ class VectoredRuns:
         """Stores the last sample of a run that has ended."""
         c = self.common
         self.over[k] = True
-        at = run.end_time if run.end_time is not None else (run.looked - 1) * run.scenario.dt
         if run.last_row is None:
             c.times[k], c.shown[k] = np.nan, np.nan
             return
-        c.times[k], c.shown[k, :ROW] = at, run.last_row
+        c.times[k], c.shown[k, :ROW] = run.sample_time(), run.last_row
         c.shown[k, ROW:] = run.last_force()
 
     # ---- results
@@ -322,16 +349,24 @@ class VectoredRuns:
             self.is_shown = self.is_asked = True
         return self.common.shown
 
+    def torque_reached(self, n: int, k: int) -> np.ndarray:
+        """As `run.torque_reached`, in the last rows of each run, shape (runs, 2).
+
+        Args:
+            n: number of rows, of those not judged yet.
+            k: how many reach it.
+        """
+        filled = self.common.marks[:, 1].tolist()
+        pairs = zip(self.runs, filled, strict=True)
+        return np.array([torque_reached(x.store.rows[max(i - n, 0) : i], k) for x, i in pairs])
+
     def look(self) -> np.ndarray:
         """Whether the motion of each run is unstable by now, evaluated again after LOOK."""
         due = ~self.over & (self.common.times >= self.looked_at + LOOK)
         self.looked_at[due] = self.common.times[due]
         self.diverging[due] = False
         for k in np.flatnonzero(due & (self.common.quiet == 0)).tolist():
-            run = self.runs[k]
-            if (v := self.of[k]) is not None:
-                v.give(k, run)
-            self.diverging[k] = run.is_diverging()
+            self.diverging[k] = self._sync(k).is_diverging()
         onset = [run.watch.onset is not None for run in self.runs]
         return self.diverging | np.array(onset, bool)
 

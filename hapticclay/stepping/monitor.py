@@ -321,6 +321,13 @@ class StabilityMonitor:
         return f"lower dt from {s.dt:g} s, or gain[{axis}] from {s.gain[i]:g}"
 
 
+class RangeMonitor(StabilityMonitor):
+    """Ends a run only out of reach or above the largest speed; gives no verdict on stability."""
+
+    def _unstable(self, rows: np.ndarray) -> None:
+        return None
+
+
 def _within(clay: Clay, i: int, low: list[float], high: list[float]) -> np.ndarray:
     """Dampings that may resist axis i in a box [N.s/m], ascending."""
     laws = clay.laws_on(i)

@@ -274,6 +274,7 @@ class Run:
             rows that are not kept.
         recorded: whether judged rows are kept; else only the rows since then and, after the end,
             `last_row`.
+        monitored: whether its stability is judged.
 
     Raises:
         ParameterError: a control callback is installed in the engine, which would interfere.
@@ -294,6 +295,7 @@ class Run:
         brief: bool = False,
         watched: bool = False,
         recorded: bool = True,
+        monitored: bool = True,
     ):
         if mujoco.get_mjcb_control() is not None:
             bound = "the engine must be free of control callbacks"
@@ -309,7 +311,8 @@ class Run:
         self._noise: hardware.SampleNoise | None = None
         self.steps = 0
         self.pause = math.inf
-        self.watch = monitor.StabilityMonitor(scenario)
+        judge = monitor.StabilityMonitor if monitored else monitor.RangeMonitor
+        self.watch = judge(scenario)
         self.looked = 0  # samples judged so far
         self.kept: list[tuple[np.ndarray, np.ndarray]] = []  # index, rows
         self.rendered = scene.tells(self.parts)
@@ -371,6 +374,12 @@ class Run:
         if self._views is None:
             self._views = scene.viewed(self.parts)
         return self._views
+
+    def sample_time(self) -> float:
+        """Time of the present sample [s]; of the last good one after the end."""
+        if self.end_time is not None:
+            return self.end_time
+        return (self.i if self.outcome is None else self.looked - 1) * self.scenario.dt
 
     def b(self) -> tuple[float, float]:
         """Damping of the clay in the present region, (x, y) [N.s/m]."""
@@ -515,7 +524,7 @@ class Run:
         """Restarts without a record; not after `change`, or where signals are prepared ahead."""
         self.restore(self._saved)
         self.steps = self.looked = 0
-        self.watch = monitor.StabilityMonitor(self.scenario)
+        self.watch = type(self.watch)(self.scenario)
         self.outcome, self.end_time = None, None
         self.last_row = self.last_rendered = None
 
@@ -575,6 +584,31 @@ class Run:
                     self.outcome = monitor.Outcome("interrupted", self.t, self.i)
                 self.flush()
 
+    def hop(self, n: int) -> bool:
+        """Makes n compiled steps where there is nothing to prepare, nor a check among them.
+
+        Args:
+            n: number of steps.
+
+        Returns:
+            Whether it did; else `go` makes those that are left.
+        """
+        row = self.row
+        if row is None or not (row.leads and row.is_plain and row.parts is self.parts):
+            return False
+        room = row.marks[1] + n
+        if room == n or room >= CHUNK - 1:
+            return False
+        row.move(room)
+        _, filled, code, steps, crossings, stops = row.marks
+        self.steps += steps
+        if self.recorded and (crossings or stops):
+            self._note_events(crossings, stops)
+        if code != OPEN:
+            self.note_end()
+            self.flush()
+        return code != OPEN or filled == room
+
     def interrupt(self) -> None:
         """Ends the run at its last sample."""
         self.outcome = monitor.Outcome("interrupted", self.t, self.i)
@@ -586,9 +620,21 @@ class Run:
         Args:
             force: (x, y) [N].
         """
-        self.scenario = copy.copy(self.scenario)  # the rest of it has been checked
-        object.__setattr__(self.scenario, "force", force)
+        self.scenario = with_checked(self.scenario, force=force)
         self.push_evenly((0.0, *scene.steady_force(self.scenario), 0.0, 0.0))
+
+    def change_gain(self, gain: tuple[float, float]) -> None:
+        """Continues with another gain.
+
+        Args:
+            gain: K of x and y [1/kg], within the bounds of a scenario.
+        """
+        changed = with_checked(self.scenario, gain=gain)
+        if scene.takes_gain(self.parts):
+            self.scenario = self.watch.scenario = changed
+            self._renumber(scene.with_gain(self.parts, gain))
+        else:
+            self.change(changed)
 
     def push_evenly(self, steady: tuple[float, ...]) -> None:
         """Continues under a muscle force that changes evenly.
@@ -596,12 +642,16 @@ class Run:
         Args:
             steady: as Push.steady.
         """
+        self._renumber(self.parts._replace(push=self.parts.push._replace(steady=steady)))
+
+    def _renumber(self, parts: Parts) -> None:
+        """Continues with another muscle force or gain in the same parts."""
         row = self.row if self.row is not None and self.row.parts is self.parts else None
         kind, native = self._kind, self._native
-        self.take(self.parts._replace(push=self.parts.push._replace(steady=steady)))
+        self.take(parts)
         self._kind, self._native = kind, native
         if row is not None:
-            row.push(self.parts)
+            row.renumber(parts)
 
     def position(self, h: float = 0.0) -> tuple[float, float]:
         """Handle position after the joints have turned at their present rates, (x, y) [m].
@@ -659,6 +709,29 @@ class Run:
         finally:
             self.restore(saved)
             self.steps, self.crossings, self.stops = events
+
+    def numbers_ahead(self) -> list[float]:
+        """As `ahead`; the numbers of the last row if the run has ended."""
+        row = self.row
+        if self.outcome is not None:
+            none = [math.nan] * (rows.ROW + 2)
+            return none if self.last_row is None else [*self.last_row, *self.last_force()]
+        if row is None or not (row.shows and row.leads and row.parts is self.parts):
+            return self.ahead().tolist()
+        found = row.numbers()
+        if not self.rendered:
+            found[rows.ROW :] = self._force(*found[12:14], *found[4:6])
+        return found
+
+    def torque_reached(self, n: int, k: int) -> list[float]:
+        """As `torque_reached`, in the last rows of those not judged yet.
+
+        Args:
+            n: number of rows.
+            k: how many reach it.
+        """
+        end = self.filled
+        return torque_reached(self.store.rows[max(end - n, 0) : end], k).tolist()
 
     def _row_and_force(self, n: int) -> np.ndarray:
         """Row n of those since the last check, and the force of the clay in it [N]."""
@@ -847,6 +920,28 @@ class Run:
         names = "friction", "passivity_controller", "coupling"
         found = {n: float(each) for n, each, on in zip(names, x, used, strict=True) if on}
         return found | {"residual": out["residual"] - found.get("friction", 0.0)}
+
+
+def torque_reached(made: np.ndarray, k: int) -> np.ndarray:
+    """|tau| of shoulder and elbow that at least k rows reach [N.m]; 0 if there are fewer rows.
+
+    Args:
+        made: rows of the record, shape (n, rows.ROW).
+        k: how many, at least 1.
+    """
+    return np.sort(np.abs(made[:, 8:10]), axis=0)[-k] if len(made) >= k else np.zeros(2)
+
+
+def with_checked(scenario: Scenario, **fields: Any) -> Scenario:
+    """A scenario with other fields, whose values have been checked, as has all else.
+
+    Args:
+        scenario: the scenario.
+        **fields: the fields.
+    """
+    made = object.__new__(type(scenario))
+    made.__dict__.update(scenario.__dict__, **fields)
+    return made
 
 
 def _drives(scenario: Scenario) -> Any:

@@ -365,6 +365,21 @@ def keep_written(parts, before):
         new[:] = old
 
 
+def takes_gain(parts) -> bool:
+    """Whether another gain changes nothing but the numbers K of the compensators."""
+    return parts.lag is not None and parts.sampler is None and parts.accurate is None
+
+
+def with_gain(parts, gain: tuple[float, float]):
+    """The parts with another gain, where `takes_gain`.
+
+    Args:
+        gain: K of x and y [1/kg].
+    """
+    lag = tuple(x._replace(K=K) for x, K in zip(parts.lag, gain, strict=True))
+    return parts._replace(lag=lag)
+
+
 def rings(sampler):
     """Arrays in which the hardware keeps past samples."""
     parts = sampler.difference, sampler.delay, sampler.passivity

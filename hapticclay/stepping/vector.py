@@ -366,6 +366,15 @@ class RunVector:
         at = self.put.push.steady[1:3]
         self.x.numbers[which[:, None], at] = force
 
+    def set_gain(self, which: np.ndarray, gain: np.ndarray) -> None:
+        """Sets gains, where scene.takes_gain.
+
+        Args:
+            which: indices of runs.
+            gain: K of x and y of each [1/kg], shape (n, 2).
+        """
+        self.x.numbers[which[:, None], [lag.K for lag in self.put.lag]] = gain
+
     def place(self, thread: int) -> Place:
         """Where a thread makes steps.
 
@@ -406,6 +415,7 @@ class Row:
         parts: of the run, as the row has them.
         leads: whether the row holds the state, and that of the run is outdated.
         shows: whether the present sample is known.
+        is_plain: whether nothing is drawn for the steps ahead of them.
         marks: see Vector.marks.
         t: now [s].
     """
@@ -414,7 +424,7 @@ class Row:
         self.common = Common(1)
         self.vector = RunVector(run, self.common, kernel)
         self.key, self.parts, self.leads, self.taken = kind_key(run), None, False, False
-        self.shows = self.asked = False
+        self.shows = self.asked = self.is_plain = False
         self.marks, self.t, self.which = [0] * 6, 0.0, np.zeros(1, np.int64)
         scratch = np.empty(sum(a.nbytes for a in scene.written(run.parts)) // 8 + 1)
         place = Place(run.native, run.model.actuator_ctrlrange, scratch)
@@ -431,6 +441,8 @@ class Row:
         if self.parts is not run.parts:
             self.vector.take(0, run)
             self.parts, self.shows = run.parts, False
+            sampler = run.parts.sampler
+            self.is_plain = sampler is None or sampler.chance is None
         elif not self.taken:
             self.vector.take_state(0, run)
         self.taken = True
@@ -439,14 +451,17 @@ class Row:
         """Notes that the run has another state."""
         self.leads = self.taken = self.shows = False
 
-    def push(self, parts: Parts) -> None:
-        """Takes over another muscle force.
+    def renumber(self, parts: Parts) -> None:
+        """Takes over another muscle force or gain.
 
         Args:
-            parts: with this force, otherwise the same.
+            parts: with these, otherwise the same.
         """
-        at = self.vector.put.push.steady
-        self.vector.x.numbers[0, list(at)] = parts.push.steady
+        at, numbers = self.vector.put, self.vector.x.numbers[0]
+        for i, x in zip(at.push.steady, parts.push.steady, strict=True):
+            numbers[i] = x
+        for place, lag in zip(at.lag or (), parts.lag or (), strict=True):
+            numbers[place.K] = lag.K
         self.parts, self.shows = parts, False
 
     def move(self, room: int) -> None:
@@ -469,6 +484,11 @@ class Row:
             self.advance(*self.arguments, TRY)
         self.shows = self.asked = True
         return self.common.shown[0].copy()
+
+    def numbers(self) -> list[float]:
+        """The present sample, see Vector.shown, where it is known."""
+        self.asked = True
+        return self.common.shown[0].tolist()
 
     def made(self) -> Filled:
         """What the last call has made, and the rows so far."""

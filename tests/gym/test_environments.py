@@ -10,7 +10,7 @@ from gymnasium.utils.env_checker import check_env
 
 import hapticclay as hc
 import hapticclay.gym  # noqa: F401, registers
-from hapticclay.gym import draws, registry
+from hapticclay.gym import draws, registry, task
 from hapticclay.gym.quantities import Quantity, box_of
 
 IDS = registry.IDS
@@ -159,12 +159,12 @@ def test_a_loop_beyond_its_gain_limit_ends_the_episode_within_a_period():
     env = made("hapticclay/AdaptiveGain-v0")
     env.reset(seed=0, options=options)
     inner = env.unwrapped
-    run, m = hc.Simulation(inner.task.scenario(inner._episodes.truth_of(0)), engine="python"), None
+    run, m = hc.Simulation(inner.task.scenario(inner._episode.truth), engine="python"), None
     reached, t = None, 0
     while True:
         _, reward, terminated, _, info = env.step(np.ones(1, np.float32))
-        m = inner._episodes.memory
-        push = m["muscle"][0, t] * min((t + 1) / 20, 1.0)
+        m = inner._episode.memory
+        push = m["muscle"][t] * min((t + 1) / 20, 1.0)
         run.set(gain=(info["K"], 0.2))
         for _ in range(inner.task.steps):
             run.advance(1, force=(push, 0.0))
@@ -177,6 +177,41 @@ def test_a_loop_beyond_its_gain_limit_ends_the_episode_within_a_period():
     assert info["lost"] and info["K"] == 30.0
     assert reached is None or run.t <= reached + 0.02
     assert reward == -1.0 - (500 - t)  # what the largest error would have cost
+
+
+STIFF_HAND = {"mass": 0.3, "damper": 0.0, "spring": 1e5}
+DIVERGING = {  # K of y is above its limit with this hand, 0.41 to 0.45 1/kg
+    "CutLine-v0": {**STIFF_HAND, "b": 60.0, "gain": 2.0, "angle": 0.0, "offset": 0.0},
+    "PareEdge-v0": {
+        **STIFF_HAND, "gain": 2.0, "offset": 0.0, "depth": 3e-3, "depth_at_end": 3e-3,
+        "pressure": 1e5, "damping": 1e6,
+    },
+    "ProbeClay-v0": {**STIFF_HAND, "b": 315.0, "Fy": 0.24},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DIVERGING)
+def test_a_diverging_run_ends_its_episode_within_20_ms(name):
+    """A constant action is a constant force along a straight line, so `simulate` makes the run.
+
+    Its record tells the first sample with a motor at its limit or faster than 20 m/s.
+    """
+    env = made(f"hapticclay/{name}")
+    env.reset(seed=0, options=DIVERGING[name])
+    inner, action, ended, n = env.unwrapped, np.zeros(env.action_space.shape, np.float32), False, 0
+    action[:2] = 0.5, 1.0
+    while not ended:
+        _, _, ended, cut_off, info = env.step(action)
+        n += 1
+        assert not cut_off
+    scene = inner.task.scenario(inner._episode.truth)
+    force = tuple(getattr(inner.task, "most", task.FORCE) * x for x in (0.5, 1.0))
+    end = n * inner.task.steps * scene.dt
+    fields = {"force": force, "t_max": end + 0.1, "stop_when_unstable": False}
+    record = hc.simulate(hc.with_fields(scene, fields), engine="python")
+    bad = (np.abs(record.tau) >= 40.0).any(axis=1) | (np.hypot(*record.v.T) > 20.0)
+    assert info["lost"] and bad.any()
+    assert 0.0 <= end - record.t[bad.argmax()] <= 0.02
 
 
 def test_a_picture_is_drawn_of_what_moves():

@@ -78,10 +78,11 @@ def test_the_command_records_a_data_set(tmp_path, monkeypatch, capsys):
 
 def test_extreme_episodes_are_finite(tmp_path):
     """The quick version of the benchmark's 10,000 episodes."""
-    line = ["--episodes", "12", "--engine", "python", "--ids", "hapticclay/CutLine-v0"]
-    found = gym_extremes.main([*line, "--out", str(tmp_path)])
-    (row,) = found["environments"]
-    assert row["episodes"] >= 12 and row["bad"] == 0
+    line = ["--episodes", "6", "--longest", "8", "--engine", "python", "--out", str(tmp_path)]
+    found = gym_extremes.main(line)
+    assert [row["id"] for row in found["environments"]] == list(registry.IDS)
+    for row in found["environments"]:
+        assert row["episodes"] >= 6 and row["bad"] == 0
     assert (tmp_path / "gym_extremes.json").is_file()
 
 

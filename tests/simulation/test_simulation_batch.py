@@ -53,6 +53,11 @@ def go_on(batch, single, seed, calls, most):
         if call % 6 == 2:
             batch.set([0], gain=(2.0, 1.5), b=1.7)
             single[0].set(gain=(2.0, 1.5), b=1.7)
+        if call % 4 == 1:  # the gain alone
+            gains = rng.uniform(0.3, 1.5, (len(batch), 2))
+            batch.set(gain=gains)
+            for k in np.flatnonzero(~batch.ended):
+                single[k].set(gain=tuple(gains[k].tolist()))
     assert_alike(batch, single)
 
 

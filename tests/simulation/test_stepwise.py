@@ -344,3 +344,37 @@ def test_a_thread_of_its_own_is_asked_for():
             found.append(str(e))
     thread.join()
     assert found and set(found) == {"another thread uses this simulation: give each thread its own"}
+
+
+def test_a_simulation_without_record_makes_the_same_steps_and_keeps_none():
+    """Two checks of the monitor and the end lie within."""
+    s = replace(CUT, t_max=1.6, dt=2e-4)
+    with hc.Simulation(s, engine="python") as kept:
+        bare = hc.Simulation(s, engine="python", recorded=False)
+        for _ in range(4):
+            for sim in (kept, bare):
+                sim.advance(2300, force=(0.5, 0.1))
+            assert kept.numbers() == bare.numbers()
+        assert kept.outcome == bare.outcome
+        assert kept.outcome.code == "time limit"
+        assert bare.state.t == kept.state.t
+    with pytest.raises(RuntimeError, match="recorded=True"):
+        bare.record()
+    bare.close()
+
+
+def test_the_numbers_of_a_sample_are_those_of_its_state():
+    with hc.Simulation(CUT, engine="python") as sim:
+        sim.advance(50, force=(1.0, 0.2))
+        x = sim.state
+        names = "q", "p", "v", "fh", "tau", "delta", "b", "qd", "fe"
+        assert sim.numbers() == [float(a) for name in names for a in getattr(x, name)]
+
+
+def test_an_unmonitored_run_goes_on_where_the_monitor_would_end_it():
+    s = hc.constant_cut(gain=(1.0, 1.0))
+    end = hc.simulate(s, engine="python").outcome
+    assert end.code in ("diverged", "limit cycle")
+    with hc.Simulation(s, engine="python", recorded=False, monitored=False) as sim:
+        sim.advance(end.step + 200)
+        assert sim.outcome is None and not sim.diverging
