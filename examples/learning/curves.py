@@ -1,4 +1,4 @@
-"""Plots the learning curves of `ppo.py` and `sac.py`, a panel for each environment, with the baselines.
+"""Learning curves of `ppo.py` and `sac.py`: a panel for each environment, with the baselines.
 
 python examples/learning/curves.py out/learning/*.csv --out gym_learning.png
 """
