@@ -66,6 +66,7 @@ nitpick_ignore_regex = [
     ("py:class", r"hapticclay\.model\.traits\.\w+|.*\.Ladder|Service"),  # of no public name
     ("py:class", r".*\.Exchanged|Chart"),  # what logs and labs hold
     ("py:class", r".*\.(StabilityMap|YieldMap)"),  # made by the command line
+    ("py:class", r"gymnasium\..*"),  # by their private modules
 ]
 linkcheck_timeout = 20
 
