@@ -378,3 +378,29 @@ def test_an_unmonitored_run_goes_on_where_the_monitor_would_end_it():
     with hc.Simulation(s, engine="python", recorded=False, monitored=False) as sim:
         sim.advance(end.step + 200)
         assert sim.outcome is None and not sim.diverging
+
+
+@pytest.mark.parametrize("many", [False, True])
+def test_the_torque_that_k_samples_reach_is_the_kth_largest(many):
+    """Against the torques of the samples themselves, read one by one."""
+    runs = [CUT, SCENES["sampled"]]
+    with hc.SimulationBatch(runs, engine="python") if many else hc.Simulation(CUT) as sim:
+        taus = []
+        for _ in range(12):
+            sim.advance(1, force=[[2.0, 1.0], [0.5, 3.0]] if many else (2.0, 1.0))
+            taus.append(np.abs(np.atleast_2d(sim.tau if many else sim.state.tau)))
+        sim.advance(1)
+        last = np.sort(np.stack(taus)[-8:], axis=0)
+        for k in (1, 3, 8):
+            assert np.array_equal(np.atleast_2d(sim.torque_reached(8, k)), last[-k])
+        assert not np.any(sim.torque_reached(8, 9))  # 9 of 8 samples reach nothing
+
+
+def test_runs_of_an_unmonitored_batch_go_on_too():
+    s = hc.constant_cut(gain=(1.0, 1.0), start=(0.06, 0.0))
+    end = hc.simulate(s, engine="python").outcome
+    assert end.code in ("diverged", "limit cycle")
+    for monitored in (True, False):
+        with hc.SimulationBatch([s], engine="python", monitored=monitored) as batch:
+            batch.advance(end.step + 4200)
+            assert batch.ended.all() == monitored
