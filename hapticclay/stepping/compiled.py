@@ -535,6 +535,7 @@ DYNAMICS = engine_step.Dynamics(
 QUIET = entry(monitor.is_quiet)
 ready: set[Any] = set()  # kinds of scene whose whole steps are compiled or loaded in this process
 complete: set[Any] = set()  # those whose careful steps are, too
+advances: dict[Any, Callable[..., None]] = {}  # vector.advance by the types of its arguments
 met: dict[Any, int] = {}  # careful steps that CPython has made, by kind of scene
 
 
@@ -568,7 +569,10 @@ def row_of(r: run.Run) -> vector.Row:
     if row is None or (row.parts is not r.parts and row.key != vector.kind_key(r)):
         r.state, r.row = r.state, None
         row = vector.Row(r, KERNEL)
-        row.advance = advancing(row.vector.kind, *row.arguments, vector.STEPS)
+        types_ = row.key[:3]  # of the arguments; numba takes a millisecond to find them
+        if types_ not in advances:
+            advances[types_] = advancing(row.vector.kind, *row.arguments, vector.STEPS)
+        row.advance = advances[types_]
         r.row = row
     row.take(r)
     return row
