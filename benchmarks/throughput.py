@@ -96,7 +96,8 @@ def warm(todo: list[hc.Scenario]) -> None:
             batch.carried.add(pool.lane().patterns.of(key, s).kind)
     for s in {scene.traits(s): s for s in todo}.values():
         compiled.warm(s)
-        compiled.met[machine_code.kind_of(scene.parts_of(s))] = compiled.CAREFUL + 1
+        kind = machine_code.kind_of(scene.parts_of(s))
+        compiled.met[kind] = int(compiled.enough(kind)) + 1
         compiled.warm(s)
 
 
