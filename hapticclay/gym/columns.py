@@ -60,9 +60,7 @@ def shown(x: Value, low: Value, high: Value) -> Value:
         low: smallest value.
         high: largest value.
     """
-    if isinstance(x, np.ndarray):
-        return np.where(x == x, bounded(x, low, high), 0.0)
-    return low if x < low else high if x > high else x if x == x else 0.0
+    return where(x == x, bounded(x, low, high), 0.0)
 
 
 def root(x: Value) -> Value:
