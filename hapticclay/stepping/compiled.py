@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import functools
+import gc
 import inspect
 import itertools
 import signal
@@ -77,7 +78,7 @@ from . import (
 )
 from . import hardware as wires
 from .engine import mujoco
-from .inlining import InlinedCompiler
+from .inlining import EntryCompiler, InlinedCompiler
 from .machine_code import COMPLETE, cache_folder, compile_time, is_kept, mark
 from .notice import Notice
 
@@ -92,7 +93,9 @@ LAW: Any = {
     "error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False,
     "pipeline_class": InlinedCompiler,
 }  # fmt: skip
-ENTRY: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
+ENTRY: Any = {
+    "nogil": True, "error_model": "numpy", "_nrt": False, "pipeline_class": EntryCompiler,
+}  # fmt: skip
 SIGNALS = [getattr(signal, x) for x in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, x)]
 # measured: time that machine code saves in a careful step, and that it takes to load [s]
 CAREFUL, LOADING = 2.5e-4, 0.8
@@ -640,11 +643,14 @@ def compiling(kinds: set[Any], kind: Any, what: str) -> Iterator[None]:
     with Notice(what, compile_time(kind)) as notice, signals_held():
         if not isinstance(WHOLE_STEPS._cache, cache.FileCache):  # without a home none can miss it
             notice.begin()
-        before = cache.on_miss.set(notice.begin)
+        before, collects = cache.on_miss.set(notice.begin), gc.isenabled()
+        gc.disable()  # numba makes millions of objects, and to search them for cycles takes long
         try:
             yield
         finally:
             cache.on_miss.reset(before)
+            if collects:
+                gc.enable()
         kinds.add(kind)
         keep_mark(kind)
 
