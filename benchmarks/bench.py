@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from tabulate import tabulate
 from tqdm import tqdm
 
 from hapticclay import files
@@ -24,6 +25,7 @@ from . import (
     hits,
     parts,
     provenance,
+    ranking,
     scaling,
     stiffness,
     throughput,
@@ -112,7 +114,7 @@ def recommended(data: dict[str, dict[str, Any]]) -> str:
     good for every job of hapticclay's, hits among them.
     """
     rows = data["work_precision"]["rows"] + data["hits"]["rows"]
-    return work_precision.table_of_settings(work_precision.recommend(rows, {"hapticclay"}))
+    return ranking.table_of_settings(ranking.recommend(rows, {"hapticclay"}))
 
 
 def publish(out: Path, readme: Path | None = None) -> None:
@@ -184,11 +186,7 @@ def main(
     publish(out, readme)
     data = load(out)
     print(f"\n{recommended(data)}\n")
-    print(
-        work_precision.tabulate(
-            work_precision.dominance(data["work_precision"]["rows"]), headers="keys"
-        )
-    )
+    print(tabulate(ranking.dominance(data["work_precision"]["rows"]), headers="keys"))
     rows = data["extremes"]["rows"]
     print(
         f"\nextreme scenes: {sum(r['agree'] for r in rows)} of {len(rows)} verdicts are those of "
