@@ -26,14 +26,18 @@ from . import (
     parts,
     provenance,
     ranking,
+    sampled_loop,
     scaling,
     stiffness,
     throughput,
     work_precision,
+    yielding_clay,
 )
 
 PARTS: dict[str, Any] = {
     "work_precision": work_precision,
+    "sampled_loop": sampled_loop,
+    "yielding_clay": yielding_clay,
     "hits": hits,
     "stiffness": stiffness,
     "extremes": extremes,
@@ -49,7 +53,8 @@ LIMITATIONS = (
     "model was not measured.",
     "In single runs hapticclay makes the steps that cross a border or stop in Python, until a "
     "process has made some 18,000 of one kind of scene; from then on they are compiled. The tables "
-    "of cuts and hits are those of single runs; those of throughput are compiled throughout.",
+    "of cuts, hits and sampled loops are those of single runs; those of throughput are compiled "
+    "throughout; that of yielding clay has both.",
     "The programs for the other packages are ours, written from the same equations "
     "(`benchmarks/peers`). Their authors might tune them better; a corrected program is welcome.",
     "Settings are a ladder of steps or tolerances. The best setting between two of them may be "

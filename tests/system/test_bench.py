@@ -331,12 +331,17 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
         "extremes.json",
         "hits.json",
         "parts.json",
+        "sampled_loop.json",
+        "sampled_loop_with_held_clay.png",
+        "sampled_loop_with_physical_clay.png",
         "scaling.json",
         "scaling.png",
         "stiffness.json",
         "throughput.json",
         "throughput.png",
         "work_precision.json",
+        "yielding_clay.json",
+        "yielding_clay.png",
     ]
     data = bench.load(tmp_path / "o")
     methods = {r["method"] for r in data["work_precision"]["rows"]}
@@ -416,9 +421,12 @@ def test_published_page_was_made_from_the_published_data():
     assert set(data) == set(bench.PARTS)
     assert (folder / "bench.md").read_text() == bench.page(data)
     assert bench.recommended(data) in (folder.parents[1] / "README.md").read_text()
-    drawn = [data["work_precision"]["rows"]]
+    drawn = [data[x]["rows"] for x in ("work_precision", "sampled_loop", "yielding_clay")]
     for problem in {r["problem"] for rows in drawn for r in rows}:
         assert (folder / study.figure_name(problem)).is_file()
+    text = (folder / "bench.md").read_text()
+    assert "rounds all 7506 numbers" in text  # both references, of held and of physical clay
+    assert "all but" not in text and "stops otherwise" not in text
 
 
 def test_stiffness_sweep_tells_where_each_breaks_down(tmp_path, monkeypatch):
