@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from tabulate import tabulate
 from tqdm import tqdm
 
 from hapticclay import files
@@ -24,14 +25,19 @@ from . import (
     hits,
     parts,
     provenance,
+    ranking,
+    sampled_loop,
     scaling,
     stiffness,
     throughput,
     work_precision,
+    yielding_clay,
 )
 
 PARTS: dict[str, Any] = {
     "work_precision": work_precision,
+    "sampled_loop": sampled_loop,
+    "yielding_clay": yielding_clay,
     "hits": hits,
     "stiffness": stiffness,
     "extremes": extremes,
@@ -47,7 +53,8 @@ LIMITATIONS = (
     "model was not measured.",
     "In single runs hapticclay makes the steps that cross a border or stop in Python, until a "
     "process has made some 18,000 of one kind of scene; from then on they are compiled. The tables "
-    "of cuts and hits are those of single runs; those of throughput are compiled throughout.",
+    "of cuts, hits and sampled loops are those of single runs; those of throughput are compiled "
+    "throughout; that of yielding clay has both.",
     "The programs for the other packages are ours, written from the same equations "
     "(`benchmarks/peers`). Their authors might tune them better; a corrected program is welcome.",
     "Settings are a ladder of steps or tolerances. The best setting between two of them may be "
@@ -112,7 +119,7 @@ def recommended(data: dict[str, dict[str, Any]]) -> str:
     good for every job of hapticclay's, hits among them.
     """
     rows = data["work_precision"]["rows"] + data["hits"]["rows"]
-    return work_precision.table_of_settings(work_precision.recommend(rows, {"hapticclay"}))
+    return ranking.table_of_settings(ranking.recommend(rows, {"hapticclay"}))
 
 
 def publish(out: Path, readme: Path | None = None) -> None:
@@ -184,11 +191,7 @@ def main(
     publish(out, readme)
     data = load(out)
     print(f"\n{recommended(data)}\n")
-    print(
-        work_precision.tabulate(
-            work_precision.dominance(data["work_precision"]["rows"]), headers="keys"
-        )
-    )
+    print(tabulate(ranking.dominance(data["work_precision"]["rows"]), headers="keys"))
     rows = data["extremes"]["rows"]
     print(
         f"\nextreme scenes: {sum(r['agree'] for r in rows)} of {len(rows)} verdicts are those of "

@@ -87,7 +87,7 @@ def timed(function, *args, **kw) -> tuple[np.ndarray, Any]:
 
 def warm(todo: list[hc.Scenario]) -> None:
     """Compiles all that runs like these may need, so that no timing has it in it."""
-    from hapticclay.stepping import compiled, machine_code, many, scene
+    from hapticclay.stepping import many, scene
 
     pool = batch.BatchPool(1)
     for key, s in {many.kind_key(s): s for s in todo}.items():
@@ -95,10 +95,7 @@ def warm(todo: list[hc.Scenario]) -> None:
             pool.many([s] * many.FEWEST, [key] * many.FEWEST)
             batch.carried.add(pool.lane().patterns.of(key, s).kind)
     for s in {scene.traits(s): s for s in todo}.values():
-        compiled.warm(s)
-        kind = machine_code.kind_of(scene.parts_of(s))
-        compiled.met[kind] = int(compiled.enough(kind)) + 1
-        compiled.warm(s)
+        common.warm_throughout(s)
 
 
 def native(scenario: hc.Scenario, steps: int) -> tuple[float, float, float]:

@@ -8,22 +8,30 @@ Writes work_precision.json and one PNG a job; benchmarks.bench makes the page.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import importlib
-import math
-import statistics
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from tabulate import tabulate
-from tqdm import tqdm
 
 import hapticclay as hc
 from hapticclay import files
 
-from . import common
+from . import common, diagrams
 from . import reference as hybrid
 from .problems import EDGES, PROBLEMS, Result, reference
+from .ranking import (
+    dominance,
+    leaders,
+    recommend,
+    table_of_leaders,
+    table_of_rows,
+    table_of_settings,
+    who_leads,
+)
+from .turns import take_turns
 
 PEERS = (
     "ours",
@@ -40,19 +48,12 @@ ERRORS = {
     "force": "root mean square error of the clay force along x [N]",
     "b": "error of b fitted to the cut's speed [N.s/m]",
 }
-ASKED = (
-    1e-2,
-    1e-3,
-    1e-4,
-    1e-5,
-    1e-6,
-    1e-7,
-    1e-8,
-)  # errors in crossing time [s] of the `recommend` table
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222")
-MARKERS = "osD^v<>P"
-# methods that model hardware; their error is the hold's, no matter how well they are computed
-SAMPLED = "sampled"
+HEADS = {
+    "crossing": "crossing [s]",
+    "position": "position [m]",
+    "force": "force [N]",
+    "b": "b [N.s/m]",
+}
 HYBRID_END = 0.9  # [s] end of the runs against the hybrid system, beyond the first border
 
 
@@ -103,18 +104,11 @@ def measure(
         for m in modules:
             for method, settings in m.methods().items():
                 jobs += [(problem, m, method, x) for x in (settings[: 3 if quick else None])]
-    first: list[Result] = []
-    walls: list[list[float]] = [[] for _ in jobs]
-    with tqdm(total=rounds * len(jobs), delay=2.0, disable=None, leave=False) as bar:
-        for n in range(rounds):
-            for i, (problem, m, method, setting) in enumerate(jobs):
-                bar.set_description(f"{m.NAME} {method}")
-                if n == 0 or statistics.median(walls[i]) < 5.0:
-                    r = m.solve(problem, method, setting)
-                    walls[i].append(r.wall)
-                    if n == 0:
-                        first.append(r)
-                bar.update()
+    runs = [
+        (f"{m.NAME} {method}", functools.partial(m.solve, problem, method, x))
+        for problem, m, method, x in jobs
+    ]
+    first, walls = take_turns(runs, rounds)
     rows = []
     for (problem, m, method, setting), r, wall in zip(jobs, first, walls, strict=True):
         simulated = (
@@ -129,188 +123,16 @@ def measure(
                 "method": method,
                 "setting": setting,
                 **errors(problem, r),
-                "wall": statistics.median(wall) / simulated if simulated else None,
+                "wall": wall / simulated if simulated else None,
                 "note": r.note,
             }
         )
     return rows, omissions
 
 
-def recommend(rows: list[dict], packages: set[str] | None = None) -> list[dict[str, Any]]:
-    """For each asked error in crossing time, over all jobs:
-
-    the fastest setting that keeps it in every one.
-    """
-    groups: dict[tuple, list[dict]] = {}
-    for r in rows:
-        if (packages is None or r["package"] in packages) and not r["method"].startswith(SAMPLED):
-            groups.setdefault((r["package"], r["method"], r["setting"]), []).append(r)
-    most = {
-        package: max(len(g) for key, g in groups.items() if key[0] == package)
-        for package, *_ in groups
-    }
-    out = []
-    for asked in ASKED:
-        fit = {
-            key: (max(r["crossing"] for r in g), statistics.mean(r["wall"] for r in g))
-            for key, g in groups.items()
-            if len(g) == most[key[0]]
-            and all(r["crossing"] is not None and r["crossing"] <= asked for r in g)
-        }
-        if fit:
-            key = min(fit, key=lambda k: fit[k][1])
-            out.append(
-                {
-                    "asked": asked,
-                    "package": key[0],
-                    "method": key[1],
-                    "setting": key[2],
-                    "error": fit[key][0],
-                    "wall": fit[key][1],
-                }
-            )
-    return out
-
-
-def leaders(rows: list[dict]) -> list[dict[str, Any]]:
-    """For each asked error:
-
-    the package that keeps it in the least time, the next one, and how much longer it takes.
-    """
-    packages = dict.fromkeys(r["package"] for r in rows)
-    best = [x for package in packages for x in recommend(rows, {package})]
-    out = []
-    for asked in ASKED:
-        order = sorted((x for x in best if x["asked"] == asked), key=lambda x: x["wall"])
-        if order:
-            named = [f"{x['package']}, {x['method']}" for x in order[:2]]
-            out.append(
-                {
-                    "asked": asked,
-                    "first": named[0],
-                    "package": order[0]["package"],
-                    "next": named[1] if len(order) > 1 else "none",
-                    "factor": order[1]["wall"] / order[0]["wall"] if len(order) > 1 else None,
-                }
-            )
-    return out
-
-
-def who_leads(found: list[dict[str, Any]]) -> str:
-    """One line on which package leads in which span of errors."""
-    spans: list[list[dict[str, Any]]] = []
-    for x in found:
-        if spans and spans[-1][0]["package"] == x["package"]:
-            spans[-1].append(x)
-        else:
-            spans.append([x])
-    told = [
-        f"{s[0]['package']} at {s[0]['asked']:.0e}"
-        + (f" to {s[-1]['asked']:.0e} s" if s[1:] else " s")
-        for s in spans
-    ]
-    return "Fastest, by requested error: " + "; ".join(told) + "."
-
-
-def table_of_leaders(found: list[dict[str, Any]]) -> str:
-    cells = [
-        [
-            format(x["asked"], ".0e"),
-            x["first"],
-            x["next"],
-            "-" if x["factor"] is None else f"{x['factor']:.1f}",
-        ]
-        for x in found
-    ]
-    head = [
-        "requested error [s]",
-        "fastest",
-        "fastest of another package",
-        "run time over that of the fastest",
-    ]
-    return tabulate(cells, head, tablefmt="github", disable_numparse=True)
-
-
-def dominance(rows: list[dict]) -> list[dict[str, Any]]:
-    """For each other package:
-
-    how many of its points hapticclay beats in both error and time, with one setting.
-    """
-    ours = [
-        r
-        for r in rows
-        if r["package"] == "hapticclay"
-        and r["crossing"] is not None
-        and not r["method"].startswith(SAMPLED)
-    ]
-    out = []
-    for package in dict.fromkeys(r["package"] for r in rows if r["package"] != "hapticclay"):
-        points = [r for r in rows if r["package"] == package]
-        failed = sum(r["crossing"] is None for r in points)
-        beaten = sum(
-            any(
-                o["problem"] == r["problem"]
-                and o["crossing"] <= r["crossing"]
-                and o["wall"] <= r["wall"]
-                for o in ours
-            )
-            for r in points
-            if r["crossing"] is not None
-        )
-        out.append(
-            {
-                "package": package,
-                "points": len(points),
-                "failed": failed,
-                "behind hapticclay in both": beaten,
-            }
-        )
-    return out
-
-
 def draw(rows: list[dict], problem: str):
     """The four work-precision diagrams of a job."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    from hapticclay.views.style import STYLE
-
-    mine = [r for r in rows if r["problem"] == problem]
-    kinds = [k for k in ERRORS if any(r[k] is not None for r in mine)]
-    packages = list(dict.fromkeys(r["package"] for r in rows))
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.6, 3.9 * math.ceil(len(kinds) / 2)))
-        axes = figure.subplots(math.ceil(len(kinds) / 2), 2, squeeze=False).ravel()
-        for ax, kind in zip(axes, kinds, strict=False):
-            for package, method in dict.fromkeys((r["package"], r["method"]) for r in mine):
-                methods = list(dict.fromkeys(r["method"] for r in mine if r["package"] == package))
-                points = [
-                    r for r in mine if (r["package"], r["method"]) == (package, method) and r[kind]
-                ]
-                if not points:
-                    continue
-                label = package if len(methods) == 1 else f"{package}, {method}"
-                ax.plot(
-                    [r["wall"] for r in points],
-                    [r[kind] for r in points],
-                    color=COLORS[packages.index(package) % len(COLORS)],
-                    marker=MARKERS[methods.index(method) % 8],
-                    ls=("-", "--", ":", "-.")[methods.index(method) % 4],
-                    ms=4,
-                    label=label,
-                    lw=2.6 if package == "hapticclay" else 1.1,
-                    zorder=5 if package == "hapticclay" else 2,
-                )
-            ax.set(xscale="log", yscale="log", xlabel="run time per simulated second [s]")
-            ax.set_ylabel(ERRORS[kind].replace(" [", "\n["), fontsize=9)
-        for ax in axes[len(kinds) :]:
-            ax.remove()
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(
-            handles, labels, loc="outside lower center", ncols=4, fontsize=8, handlelength=4.0
-        )
-        figure.suptitle(f"{problem}: down and left is better", fontsize=11)
-    return figure
+    return diagrams.draw(rows, problem, ERRORS)
 
 
 def sections(data: dict[str, Any]) -> list[str]:
@@ -347,30 +169,8 @@ def sections(data: dict[str, Any]) -> list[str]:
     for problem in dict.fromkeys(r["problem"] for r in rows):
         mine = [r for r in rows if r["problem"] == problem]
         name = problem.replace(" ", "_")
-        cells = [
-            [
-                r["package"],
-                r["method"],
-                format(r["setting"], "g"),
-                *(common.number(r[k]) for k in ERRORS),
-                common.number(r["wall"]),
-                r["note"],
-            ]
-            for r in mine
-        ]
-        head = [
-            "package",
-            "method",
-            "setting",
-            "crossing [s]",
-            "position [m]",
-            "force [N]",
-            "b [N.s/m]",
-            "time per simulated s",
-            "note",
-        ]
         parts += [f"### {problem.capitalize()}", f"![work-precision diagrams]({name}.png)"]
-        parts.append(tabulate(cells, head, tablefmt="github", disable_numparse=True))
+        parts.append(table_of_rows(mine, HEADS))
     return parts
 
 
@@ -411,29 +211,6 @@ def table_of_hybrid(rows: list[dict[str, Any]]) -> str:
         for x in rows
     ]
     head = ["render", "Ts [s]", "against the hybrid system [m]", "against continuous time [m]"]
-    return tabulate(cells, head, tablefmt="github", disable_numparse=True)
-
-
-def table_of_settings(found: list[dict[str, Any]]) -> str:
-    cells = [
-        [
-            format(x["asked"], ".0e"),
-            x["package"],
-            x["method"],
-            format(x["setting"], "g"),
-            common.number(x["error"]),
-            common.number(x["wall"]),
-        ]
-        for x in found
-    ]
-    head = [
-        "requested error [s]",
-        "package",
-        "method",
-        "setting",
-        "error [s]",
-        "time per simulated s",
-    ]
     return tabulate(cells, head, tablefmt="github", disable_numparse=True)
 
 

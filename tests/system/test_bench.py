@@ -10,18 +10,27 @@ import pytest
 from benchmarks import (
     bench,
     common,
+    diagrams,
     extremes,
     hits,
     parts,
     problems,
     provenance,
+    ranking,
+    sampled_loop,
+    sampled_reference,
     scaling,
     stiffness,
+    study,
     throughput,
+    turns,
+    yielding_clay,
 )
 from benchmarks import work_precision as wp
 from benchmarks.peers import common as peers
-from benchmarks.peers import scipy_ivp
+from benchmarks.peers import handle, scipy_ivp
+from benchmarks.peers import sampled_loop as sampled_peers
+from benchmarks.peers import yielding_clay as yielding_peers
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +46,14 @@ def scaled():
     """What a sweep on worker processes took."""
     pytest.importorskip("distributed", reason="pip install 'hapticclay[cluster]'")
     return scaling.measure(True, 1)
+
+
+@pytest.fixture(scope="module")
+def studied(tmp_path_factory):
+    """The data of the studies of one problem, measured quickly."""
+    out = tmp_path_factory.mktemp("studies")
+    both = {"sampled_loop": sampled_loop, "yielding_clay": yielding_clay}
+    return {name: x.main(out, True) for name, x in both.items()}
 
 
 def of(rows, package, **kw):
@@ -105,7 +122,7 @@ def test_leaders_are_said_by_the_figures():
         for k, x in times.items()
         for e, w in x.items()
     ]
-    found = wp.leaders(rows)
+    found = ranking.leaders(rows)
     assert [x["package"] for x in found] == ["a"] * 4 + ["b"] * 3  # from 1e-2 to 1e-5, from 1e-6 on
     assert (
         found[0]["factor"] == 3.0
@@ -113,14 +130,14 @@ def test_leaders_are_said_by_the_figures():
         and found[-1]["factor"] == pytest.approx(4 / 3)
     )
     assert (
-        wp.who_leads(found)
+        ranking.who_leads(found)
         == "Fastest, by requested error: a at 1e-02 to 1e-05 s; b at 1e-06 to 1e-08 s."
     )
-    assert wp.who_leads(wp.leaders(rows[:2])).endswith("a at 1e-02 to 1e-08 s.")
+    assert ranking.who_leads(ranking.leaders(rows[:2])).endswith("a at 1e-02 to 1e-08 s.")
 
 
 def test_recommendation_is_the_fastest_row_that_keeps_the_error(rows):
-    for x in wp.recommend(rows):
+    for x in ranking.recommend(rows):
         fit = [r for r in rows if r["crossing"] is not None and r["crossing"] <= x["asked"]]
         assert x["wall"] == min(r["wall"] for r in fit) and x["error"] <= x["asked"]
 
@@ -175,13 +192,121 @@ def test_sampled_rows_recommend_nothing(rows):
     cheap = [
         {**r, "crossing": 0.0, "wall": 0.0} for r in of(rows, "hapticclay", method="sampled, held")
     ]
-    assert cheap and wp.recommend(rows + cheap) == wp.recommend(rows)
+    assert cheap and ranking.recommend(rows + cheap) == ranking.recommend(rows)
+
+
+# ---- studies of one problem ----------------------------------------------------------------------
+
+
+def test_the_sampled_reference_and_scipy_agree_to_rounding_and_ours_to_its_first_order(studied):
+    for problem in ("sampled loop with held clay", "sampled loop with physical clay"):
+        rows = [r for r in studied["sampled_loop"]["rows"] if r["problem"] == problem]
+        # two programs in other coordinates: rounding of 150 samples, a place of 1e-2 m
+        assert max(r["position"] for r in of(rows, "SciPy", method="DOP853")) < 1e-14
+        # all counts the same: within the way that the push moves the handle in a step, W f dt^2/2
+        assert max(r["position"] for r in of(rows, "hapticclay")) < 0.8 * (3.6e-4) ** 2 * 5.0 / 2.0
+        assert min(r["position"] for r in of(rows, "MuJoCo, plain")) > 1e-6
+
+
+@pytest.mark.parametrize("render", sampled_loop.RENDERED)
+def test_two_sampled_references_round_every_number_alike_and_pass_the_border(render):
+    s = sampled_loop.scene(render, 150)
+    one, other = (sampled_reference.solve(s, *x) for x in ((), sampled_loop.SECOND))
+    assert one.p[-1, 0] > sampled_loop.BORDER
+    for kind, levels in one.levels.items():
+        np.testing.assert_array_equal(levels, other.levels[kind])
+        assert len(np.unique(levels)) > 3
+    # what rounding is spared: farther from an edge than both solutions lie apart [m, rad, N]
+    assert min(x.min() for x in one.spare.values()) > 1e9 * np.abs(one.p - other.p).max()
+
+
+def test_yielding_clay_stops_and_a_regularised_law_creeps(studied):
+    data = studied["yielding_clay"]
+    told = data["texts"]["yielding clay"][1]
+    assert "the same 6 stops and releases" in told
+    rows = data["rows"]
+    assert {r["note"] for r in rows} == {""}
+    assert max(r["position"] for r in of(rows, "hapticclay", method="accurate")) < 1e-6
+    coarse, fine = (r["position"] for r in of(rows, "hapticclay", method="fast"))
+    assert coarse > 2.0 * fine  # second order, or first where a stop falls within a step
+    assert max(r["position"] for r in of(rows, "SciPy", method="DOP853, modes")) < 1e-5
+    for r in rows:
+        if "regularised" in r["method"]:  # creep of eps = 1e-2 m/s, 0.13 s before x yields
+            assert 0.1 * 1e-2 * 0.13 < r["position"] < 1e-2
+
+
+def test_compiled_laws_of_the_peers_are_the_plain_ones():
+    """Rounding of sums in another order."""
+    numba, rng = pytest.importorskip("numba"), np.random.default_rng(0)
+    loop = sampled_peers.Loop.of(sampled_loop.scene("physical"))
+    z = np.array((1.9, 0.2, 0.3, -0.4))
+    plain, fast = (sampled_peers.right_hand_side(loop, x)[1] for x in (False, True))
+    np.testing.assert_allclose(fast(z, 1.0, -2.0, 90.0), plain(z, 1.0, -2.0, 90.0), rtol=1e-12)
+    loop = yielding_peers.Loop.of(yielding_clay.scene())
+    laws = zip(
+        *(yielding_peers.equations(loop, x) for x in (handle.plain, numba.njit)), strict=True
+    )
+    z = peers.initial(loop.job) + 0.1 * rng.normal(size=12)
+    for (plain, fast), more in zip(laws, ((1.0, 0.0), (0.0, 0.0), (1e-2,)), strict=True):
+        for x, y in zip(plain(0.3, z, *more), fast(0.3, z, *more), strict=True):
+            np.testing.assert_allclose(y, x, rtol=1e-11, atol=1e-12)
+
+
+def test_the_page_of_a_study_says_who_leads_and_how_single_runs_fare():
+    def row(package, method, setting, position, wall):
+        own = dict(package=package, method=method, setting=setting)
+        return dict(problem="p q", position=position, wall=wall, note="", **own)
+
+    rows = [
+        row("hapticclay", "fast, native", 1e-3, 1e-6, 3.0),
+        row("hapticclay", "fast" + study.THROUGHOUT, 1e-3, 1e-6, 1.0),
+        row("SciPy", "LSODA", "0.1, 0.01", 1e-7, 2.0),
+        row("SciPy", "LSODA", "0.1, 0.001", 1e-5, 2.5),
+    ]
+    text = "\n".join(study.sections({"texts": {"p q": ["about", "told"]}, "rows": rows}))
+    both, single = text.split("In the first runs")
+    assert "by requested error: hapticclay at 1e-02 to 1e-06 m; SciPy at 1e-07 m." in both
+    assert "by requested error: SciPy at 1e-02 to 1e-07 m." in single
+    assert "Only SciPy went below the 1.0e-06 m of hapticclay." in text and "(p_q.png)" in text
+    assert "0.1, 0.01 " in text and "0.1, 0.001" not in text  # beaten in both
+
+
+def test_the_front_holds_what_no_other_point_beats():
+    points = [dict(setting="a", wall=w, e=e) for w, e in ((3, 1), (1, 9), (2, 5), (2, 6), (4, 2))]
+    assert [(r["wall"], r["e"]) for r in diagrams.line(points, "e")] == [(1, 9), (2, 5), (3, 1)]
+    ladder = [{**r, "setting": 0.1} for r in points]
+    assert diagrams.line(ladder, "e") == ladder
+
+
+def test_an_incomplete_run_has_no_error():
+    exact = np.zeros((3, 2))
+    assert study.error(study.Run(exact + [3.0, 4.0], 1.0), exact) == 5.0
+    for run in (
+        study.Run(exact, 1.0, "failed"),
+        study.Run(exact[:2], 1.0),
+        study.Run(exact + np.nan, 1.0),
+    ):
+        assert study.error(run, exact) is None
+
+
+def test_runs_take_turns_and_long_ones_run_once():
+    order, walls = [], iter([1.0, turns.LONG, 3.0, 2.0])
+
+    def job(name):
+        order.append(name)
+        return study.Run(np.zeros((1, 2)), next(walls))
+
+    _, found = turns.take_turns([(x, lambda x=x: job(x)) for x in "ab"], 3)
+    assert order == ["a", "b", "a", "a"] and found == [2.0, turns.LONG]
 
 
 def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
-    tmp_path, monkeypatch, capsys, rows, scaled
+    tmp_path, monkeypatch, capsys, rows, scaled, studied
 ):
     monkeypatch.setattr(wp, "measure", lambda *a, **kw: (of(rows, "hapticclay"), []))
+    every = [r for data in studied.values() for r in data["rows"]]
+    again = lambda p, *a: ([r for r in every if r["problem"] == p.name], "as before")  # noqa: E731
+    monkeypatch.setattr(study, "measure", again)
     monkeypatch.setattr(scaling, "measure", lambda *a: scaled)
     monkeypatch.setattr(wp, "against_hybrid", lambda quick: [])
     monkeypatch.setattr(stiffness, "SWEEP", (1e1, 1e2, 1e3))
@@ -206,12 +331,17 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
         "extremes.json",
         "hits.json",
         "parts.json",
+        "sampled_loop.json",
+        "sampled_loop_with_held_clay.png",
+        "sampled_loop_with_physical_clay.png",
         "scaling.json",
         "scaling.png",
         "stiffness.json",
         "throughput.json",
         "throughput.png",
         "work_precision.json",
+        "yielding_clay.json",
+        "yielding_clay.png",
     ]
     data = bench.load(tmp_path / "o")
     methods = {r["method"] for r in data["work_precision"]["rows"]}
@@ -291,8 +421,12 @@ def test_published_page_was_made_from_the_published_data():
     assert set(data) == set(bench.PARTS)
     assert (folder / "bench.md").read_text() == bench.page(data)
     assert bench.recommended(data) in (folder.parents[1] / "README.md").read_text()
-    for problem in {r["problem"] for r in data["work_precision"]["rows"]}:
-        assert (folder / f"{problem.replace(' ', '_')}.png").is_file()
+    drawn = [data[x]["rows"] for x in ("work_precision", "sampled_loop", "yielding_clay")]
+    for problem in {r["problem"] for rows in drawn for r in rows}:
+        assert (folder / study.figure_name(problem)).is_file()
+    text = (folder / "bench.md").read_text()
+    assert "rounds all 7506 numbers" in text  # both references, of held and of physical clay
+    assert "all but" not in text and "stops otherwise" not in text
 
 
 def test_stiffness_sweep_tells_where_each_breaks_down(tmp_path, monkeypatch):
