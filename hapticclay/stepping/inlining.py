@@ -39,11 +39,21 @@ class Values:
         self.argument_types = [context.get_value_type(x) for x in kinds]
 
     def as_arguments(self, builder: Any, values: Sequence[Any]) -> Sequence[Any]:  # noqa: ARG002
-        """The values."""
+        """The values, in the caller.
+
+        Args:
+            builder: of LLVM.
+            values: the arguments.
+        """
         return values
 
     def from_arguments(self, builder: Any, values: Sequence[Any]) -> Sequence[Any]:  # noqa: ARG002
-        """The values."""
+        """The values, in the function.
+
+        Args:
+            builder: of LLVM.
+            values: the arguments.
+        """
         return values
 
     def assign_names(self, values: Sequence[Any], names: Sequence[str]) -> None:
@@ -258,14 +268,26 @@ def modules(library: Any) -> Iterator[Any]:
 
 
 class EntryCompiler(Compiler):
-    """Compiles a function that calls those of an `InlinedCompiler`."""
+    """Compiles a function that calls those of an `InlinedCompiler`.
+
+    Args:
+        typingctx: of numba.
+        targetctx: of numba.
+        *more: what else numba gives a compiler.
+    """
 
     def __init__(self, typingctx: Any, targetctx: Any, *more: Any):
         super().__init__(typingctx, context_of(targetctx, EitherContext), *more)
 
 
 class InlinedCompiler(Compiler):
-    """Compiles a function into an InlinedLibrary."""
+    """Compiles a function into an InlinedLibrary.
+
+    Args:
+        typingctx: of numba.
+        targetctx: of numba.
+        *more: what else numba gives a compiler.
+    """
 
     def __init__(self, typingctx: Any, targetctx: Any, *more: Any):
         super().__init__(typingctx, context_of(targetctx, ByValueContext), *more)
