@@ -16,16 +16,15 @@ from typing import Any
 from . import parts as p_
 
 # measured: time to compile the whole steps of the plain cut, and what a part adds to it [s]
-COMPILING = 4.0
+COMPILING = 3.5
 COMPILING_PART = {
-    p_.Form: 2.0, p_.Hand: 0.3, p_.Special: 1.5, p_.Flow: 2.0, p_.Springs: 0.3, p_.Groove: 2.0,
-    p_.Sampler: 3.0, p_.Difference: 0.5, p_.Converter: 0.2, p_.Delay: 0.2, p_.Passivity: 0.8,
-    p_.Coupling: 0.2, p_.Accurate: 0.3, p_.Modal: 1.0,
+    p_.Form: 0.2, p_.Special: 0.7, p_.Flow: 0.9, p_.Groove: 0.4, p_.Sampler: 0.8,
+    p_.Converter: 1.2, p_.Delay: 0.7, p_.Passivity: 0.5, p_.Modal: 2.7,
 }  # fmt: skip
 # what begins the kind of more than whole steps; times that it takes as long to compile
 CARRY, COMPLETE = "many runs made together", "steps that may cross borders"
 STEPWISE = "many runs made step by step"
-TIMES = {CARRY: 2.8, COMPLETE: 1.1, STEPWISE: 2.5}
+TIMES = {CARRY: 2.8, COMPLETE: 1.2, STEPWISE: 2.5}
 MARK = ".kind"  # ending of a file that names a kind of scene with stored machine code
 
 

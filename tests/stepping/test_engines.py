@@ -1,6 +1,6 @@
 """All engines make the same run, to the last bit: CPython, machine code, batches.
 
-An entry of KINDS is one kind of scene, whose machine code takes 5 to 20 s to compile, and the
+An entry of KINDS is one kind of scene, whose machine code takes 3 to 10 s to compile, and the
 scenes of it that differ in numbers, which cost next to nothing. `present` finds every trait of
 `model.support` under every method that takes it. Plain scenes are in test_compiled.
 """
