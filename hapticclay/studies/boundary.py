@@ -21,6 +21,7 @@ from ..model.controller import SERVO
 from ..model.hardware import Hardware
 from ..model.spring import Spring
 from ..scene.scenario import Position, Scenario, TorqueLimit
+from ..simulation.period_map import PeriodMaps
 from ..simulation.simulate import simulate
 from ..theory import gain_crossings, gain_limits, linear_loop
 from ..theory.loops import TIMING, Loop
@@ -33,6 +34,7 @@ PUSH_TIME = 0.01  # [s] duration of a force that replaces such a velocity
 GROWTH_SPAN = 1.2  # [s] length of a run whose growth rate is read
 CLASSIFIED_SPANS = (2.0, 8.0, 32.0)  # [s] longer runs while the motors are saturated
 BRACKET = 2e-3  # relative accuracy of boundaries
+SEARCHED = 30  # growth rates in a search, about
 
 Subject = TypeVar("Subject")
 
@@ -245,7 +247,7 @@ def crossing_search(guess: float, most: float) -> Generator[float, float, float]
 
 
 def simulated_gain(loop: PushedLoop, guess: float | None = None, most: float = 200.0) -> float:
-    """Gain K above which the oscillation of a run grows; the loop's own K is ignored.
+    """Gain K above which the oscillation grows in the steps of a run; the loop's own K is ignored.
 
     Args:
         loop: all but K.
@@ -258,7 +260,7 @@ def simulated_gain(loop: PushedLoop, guess: float | None = None, most: float = 2
 
 
 def simulated_damping(loop: PushedLoop, guess: float, most: float = 1e5) -> float:
-    """Clay b [N.s/m] above which the oscillation of a run grows; the loop's own b is ignored.
+    """Clay b [N.s/m] above which the oscillation grows likewise; the loop's own b is ignored.
 
     Args:
         loop: all but b.
@@ -269,7 +271,7 @@ def simulated_damping(loop: PushedLoop, guess: float, most: float = 1e5) -> floa
 
 
 def simulated_stiffness(loop: PushedLoop, guess: float | None = None, most: float = 1e7) -> float:
-    """Clay's k [N/m] above which the oscillation of a run grows; the loop's own k is ignored.
+    """Clay's k [N/m] above which the oscillation grows likewise; the loop's own k is ignored.
 
     Args:
         loop: all but k.
@@ -281,8 +283,12 @@ def simulated_stiffness(loop: PushedLoop, guess: float | None = None, most: floa
 
 
 def _simulated(loop: PushedLoop, field: str, guess: float, most: float) -> float:
+    maps, small = PeriodMaps(SEARCHED), abs(loop.push) <= SMALL_PUSH
+
     def rate(value: float) -> float:
-        return growth.growth_rate(simulate(replace(loop, **{field: value}).scenario()), loop.axis)
+        s = replace(loop, **{field: value}).scenario()
+        found = growth.mapped_growth(s, loop.axis, maps) if small else math.nan
+        return growth.growth_rate(simulate(s), loop.axis) if math.isnan(found) else found
 
     return find_crossing(rate, guess, most)
 

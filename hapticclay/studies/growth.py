@@ -1,4 +1,7 @@
-"""Rate at which the oscillation of a free motion grows, read from its samples.
+"""Rate at which the oscillation of a free motion grows, from its map or read from its samples.
+
+`growth_of_map` takes the eigenvalues of the map of a period: exact for a linear loop, without
+samples.
 
 The modes of a free linear motion are those of a linear prediction of low rank (ESPRIT: Roy,
 Kailath, IEEE Trans. ASSP 37, 1989). `growth_rate` reads them from a record. `short_growth` reads
@@ -15,6 +18,8 @@ import numpy as np
 
 from ..errors import choice
 from ..model.constants import AXES
+from ..scene.scenario import Scenario
+from ..simulation.period_map import PeriodMap, PeriodMaps
 from ..simulation.record import Record
 
 FITTED_SHARE = 0.7  # share of a run, at its end, from which growth is read
@@ -26,6 +31,8 @@ FADED = 1e-6  # smaller shares of the first speed are dominated by rounding
 MOTION_SAMPLES = 55  # of a motion
 RANKS = (1e-5, 1e-7)  # singular values below these shares of the largest are left out
 LEAST_RATE = 0.3  # [1/s] slower growth or decay is left undecided
+NEUTRAL = 1e-6  # relative decay in a period below which a mode may be a position that just stays
+SEEN = 1e-6  # smaller shares of the motion along an axis are those of rounding in a map
 AGREEMENT = 0.1  # the two rates may differ by this share of the smaller one
 LINEAR_SHARE = 1e-4  # of the largest sample: residual allowed for a linear motion
 
@@ -171,3 +178,44 @@ def _least_damped_of(
         found = np.where(swings, growth, -np.inf).max(axis=1)
         rate[j] = np.where(doubtful | ~np.isfinite(found), np.nan, found)
     return rate, miss
+
+
+def growth_of_map(m: PeriodMap, slowest: float = SLOWEST_MODE) -> float:
+    """Growth rate of the oscillation after a push, from the map of a period.
+
+    Args:
+        m: the map.
+        slowest: as in `growth_rate`.
+
+    Returns:
+        [1/s], as `growth_rate`; NaN where growing modes cannot be told apart.
+    """
+    rate, swings = _rates(np.linalg.eigvals(m.matrix), m.period, slowest)
+    if not (swings & (rate > -NEUTRAL / m.period)).any():
+        return float(rate.max(where=swings, initial=-math.inf))
+    z, modes = np.linalg.eig(m.matrix)
+    try:
+        share = np.abs((m.seen @ modes) * np.linalg.solve(modes, m.pushed))
+    except np.linalg.LinAlgError:
+        return math.nan
+    rate, swings = _rates(z, m.period, slowest)
+    return float(rate.max(where=swings & (share > SEEN * share.max()), initial=-math.inf))
+
+
+def mapped_growth(s: Scenario, axis: str, maps: PeriodMaps, slowest: float = SLOWEST_MODE) -> float:
+    """As `growth_of_map`, of a scene; NaN for one without a map.
+
+    Args:
+        s: the scene.
+        axis: "x" or "y".
+        maps: those made before.
+        slowest: as in `growth_rate`.
+    """
+    m = maps.of(s, AXES.index(axis))
+    return math.nan if m is None else growth_of_map(m, slowest)
+
+
+def _rates(z: np.ndarray, period: float, slowest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Growth rates of the modes of a map [1/s], and which of them oscillate or diverge."""
+    rate = np.log(np.maximum(np.abs(z), 1e-300)) / period
+    return rate, (np.abs(np.angle(z)) / period > slowest) | (rate > slowest)

@@ -26,7 +26,8 @@ from ..theory import wall_limits
 from . import boundary, sweep, sweep_store
 from .boundary import PushedLoop
 from .probability import LEVEL, Probability, clopper_pearson
-from .trials import NOT_RUN, Trials, judge
+from .trials import Trials
+from .verdicts import NOT_RUN, judge
 
 PROBED = 200  # runs used to estimate the cost
 CURVE_POINTS = 61  # of a boundary

@@ -1,15 +1,14 @@
-"""Random trials of a loop or a wall, and which of them are unstable."""
+"""Random trials of a loop or a wall."""
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import hashlib
 import json
 import math
 import multiprocessing
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,27 +16,19 @@ import numpy as np
 from ..arguments import checked
 from ..errors import ParameterError, integer, number
 from ..files import versions
-from ..model.constants import AXES
 from ..scene.changes import nested, with_fields
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import VirtualWall
-from ..simulation.batch import simulate_batch
-from . import boundary, growth, wall_runs
+from . import wall_runs
 from .boundary import PushedLoop
 from .distribution import Distribution
 from .population import HAND, Hands, hands_of, open_uniform
 from .sampling import MOST_RUNS, Range
+from .verdicts import Case, judge
 
-SCHEMA = "hapticclay-trials-1"
+SCHEMA = "hapticclay-trials-2"
 TRIAL_PUSH = 1e-6  # [m/s] so small that the arm stays linear to 1e-6
 SAMPLE_PUSH = 1e-7  # [m] per sample, for a wall: far above rounding and far below the arm's length
-ENDED = ("limit cycle", "saturated")  # runs that the motors bound: a small push has grown to that
-LOST = ("diverged", "out of reach", "singular")  # runs that nothing bounds
-SPAN_STEPS = 200.0  # of a repeated run, at least
-WALL_SPANS = (1.0, 4.0)  # of a wall's run, then of the one that repeats it
-WALL_TOLD = 0.01  # a wall's run with a smaller relative change is repeated
-WALL_BATCH = 100  # walls per batch, limited by the memory for their samples
-NOT_RUN = -1  # in place of 0, stable, and 1, unstable
 
 
 @checked
@@ -174,12 +165,24 @@ class Trials:
             ParameterError: there is no such parameter, a value is out of its bounds, or a wall is
                 not linear.
         """
+        return self.case(values, t_max).scenario
+
+    def case(self, values: Mapping[str, float], t_max: float) -> Case:
+        """One run, with its loop or wall.
+
+        Args:
+            values: as in `scenario`.
+            t_max: as there.
+
+        Raises:
+            ParameterError: as there.
+        """
         own, others = self._split(values)
+        if isinstance(self.base, PushedLoop):
+            own["push"] = self.push or TRIAL_PUSH
         base = with_fields(self.base, own)
         if isinstance(base, PushedLoop):
-            scenario = replace(base, push=self.push or TRIAL_PUSH).scenario(
-                t_max, stop_when_unstable=False
-            )
+            scenario = base.scenario(t_max, stop_when_unstable=False)
         else:
             push = self.push or min(SAMPLE_PUSH / base.Ts, 1.0)
             scenario = base.scenario(t_max, push=push, steps=wall_runs.growth_steps(base))
@@ -190,7 +193,7 @@ class Trials:
             if base.unilateral or rough:
                 bound = "must be a wall without surface, friction and encoder; see hc.walls.zwidth"
                 raise ParameterError("base", base, bound)
-        return made
+        return Case(base, made, self.axis)
 
     def _split(self, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
         """Parameters of the base, and of the scenario."""
@@ -235,102 +238,3 @@ class Trials:
              "unstable": int(unstable[i]), "longer": bool(longer[i])}
             for i, run in enumerate(self.chunk_runs(number))
         ]  # fmt: skip
-
-
-def judge(
-    trials: Trials, points: np.ndarray, threads: int | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Makes runs and decides which are unstable.
-
-    A run is unstable if its oscillation grows. If `growth.short_growth` is undecided for an arm,
-    the run is repeated for `boundary.GROWTH_SPAN` and judged by `growth.growth_rate`. Runs of walls
-    have the length and the evaluation of `wall_runs.growth_rates`, at the wall's own samples; if
-    the size hardly changes, the run is repeated, four times as long. A run that ends early, or
-    saturates the motors after so small a push, is unstable.
-
-    Args:
-        trials: specification of the runs.
-        points: their parameters, shape (runs, trials.names).
-        threads: as in `simulate_batch`.
-
-    Returns:
-        Whether each is unstable: 1 or 0, NOT_RUN for one that cannot be run (a pose out of reach),
-        shape (runs,); whether it was repeated, shape (runs,).
-    """
-    if isinstance(trials.base, VirtualWall):
-        return _judge_walls(trials, points, threads)
-    unstable = np.full(len(points), NOT_RUN)
-    rate = np.full(len(points), np.nan)
-    short: dict[int, Scenario] = {}
-    steps = np.zeros(len(points), dtype=int)
-    for i, row in enumerate(points.tolist()):
-        with contextlib.suppress(ParameterError):
-            made = trials.scenario(dict(zip(trials.names, row, strict=True)), 1.0)
-            # Odd, so that half the sampling frequency is not aliased onto zero.
-            steps[i] = 2 * round(0.5 * growth.GROWTH_SAMPLE / made.dt) + 1
-            short[i] = replace(
-                made, t_max=(growth.MOTION_SAMPLES + 0.5) * float(steps[i]) * made.dt
-            )
-    axis = AXES.index(trials.axis)
-    for every in np.unique(steps[steps > 0]).tolist():
-        members = np.flatnonzero(steps == every)
-        scenarios = [short[i] for i in members.tolist()]
-        records = simulate_batch(scenarios, threads=threads, every=every)
-        v = np.full((len(members), growth.MOTION_SAMPLES), np.nan)
-        for k, record in enumerate(records):
-            if len(record.v) > growth.MOTION_SAMPLES:
-                v[k] = record.v[1 : growth.MOTION_SAMPLES + 1, axis]
-            else:  # it ended before its time
-                rate[members[k]] = math.inf
-        dt = np.array([s.dt for s in scenarios])
-        for step in np.unique(dt).tolist():
-            some = members[dt == step]
-            found = growth.short_growth(v[dt == step], every * step)
-            rate[some] = np.where(np.isnan(found), rate[some], found)
-    longer = np.isnan(rate) & (steps > 0)
-    unstable[steps > 0] = rate[steps > 0] > 0.0
-    again = np.flatnonzero(longer).tolist()
-    spans = [max(boundary.GROWTH_SPAN, SPAN_STEPS * short[i].dt) for i in again]
-    runs = [replace(short[i], t_max=t) for i, t in zip(again, spans, strict=True)]
-    for i, record in zip(again, simulate_batch(runs, threads=threads), strict=True):
-        ended = record.outcome.code in ENDED
-        unstable[i] = ended or growth.growth_rate(record, trials.axis) > 0.0
-    return unstable, longer
-
-
-def _judge_walls(
-    trials: Trials, points: np.ndarray, threads: int | None
-) -> tuple[np.ndarray, np.ndarray]:
-    """As `judge`, for walls."""
-    unstable, longer = np.full(len(points), NOT_RUN), np.zeros(len(points), dtype=bool)
-    walls: dict[int, VirtualWall] = {}
-    runs: dict[int, Scenario] = {}
-    for i, row in enumerate(points.tolist()):
-        values = dict(zip(trials.names, row, strict=True))
-        with contextlib.suppress(ParameterError):
-            runs[i], wall = trials.scenario(values, 1.0), trials.loop(values)
-            assert isinstance(wall, VirtualWall)
-            walls[i] = wall
-    # Those with as many steps a sample run together: their records keep one step of so many.
-    steps = {i: round(walls[i].Ts / run.dt) for i, run in runs.items()}
-    for every in sorted(set(steps.values())):
-        members = [i for i in runs if steps[i] == every]
-        for first in range(0, len(members), WALL_BATCH):
-            left = members[first : first + WALL_BATCH]
-            for span in WALL_SPANS:
-                read = {i: wall_runs.growth_reading(walls[i], span) for i in left}
-                jobs = [replace(runs[i], t_max=read[i][0] * walls[i].Ts) for i in left]
-                undecided = []
-                records = simulate_batch(jobs, threads=threads, every=every)
-                for i, job, record in zip(left, jobs, records, strict=True):
-                    if record.outcome.code in (*ENDED, *LOST):
-                        unstable[i] = True
-                        continue
-                    rate = growth.growth_of_run(record, *read[i][1:])
-                    unstable[i] = rate > 0.0
-                    if abs(rate) * job.t_max < WALL_TOLD:
-                        undecided.append(i)
-                left = undecided
-                if span == WALL_SPANS[0]:
-                    longer[left] = True
-    return unstable, longer

@@ -1,7 +1,8 @@
-"""Stability of a wall by runs: growth rate for a linear loop, rest after a push otherwise."""
+"""Stability of a wall by its steps: growth rate for a linear loop, rest after a push otherwise."""
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from ..model.shapes import Constant
 from ..model.spring import STIFFNESS_MAX
 from ..scene.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch
+from ..simulation.period_map import PeriodMaps
 from ..simulation.record import Record
 from . import boundary, growth
 from .wall_lines import Wall, is_linear, moving_mass, wall_at
@@ -34,6 +36,7 @@ WINDOWS = ((0.4, 0.6), (0.8, 1.0))  # parts of a run whose swings are compared
 KEPT = 0.97  # an oscillation that keeps this share from one part to the next is sustained
 ROUGH_KEPT = 0.8  # the same for one within ROUGH quanta, whose amplitude is irregular
 ROUGH = 10.0
+SEARCHED = 100  # growth rates in a search, about
 RUNG = 3.0  # ratio of successive K of the search
 EDGE_CLOSE = 5e-3  # relative accuracy of the boundary between rest and oscillation
 Search = Generator[float, Any, float]
@@ -95,7 +98,7 @@ def stiffest(
             for K in exact
         ]
         return _side_by_side(
-            searches, lambda i, K: wall_at(walls[i], K, _damping(walls[i])), growth_rates, show
+            searches, lambda i, K: wall_at(walls[i], K, _damping(walls[i])), _growth(), show
         )
     top = 0.3 * STIFFNESS_MAX
     return _side_by_side(
@@ -104,6 +107,11 @@ def stiffest(
         lambda tried: come_to_rest(tried, press),
         show,
     )
+
+
+def _growth() -> Callable[[Sequence[Any]], list[float]]:
+    """`growth_rates` in a search."""
+    return functools.partial(growth_rates, maps=PeriodMaps(SEARCHED))
 
 
 def _damping(wall: Wall) -> float:
@@ -127,7 +135,7 @@ def most_damping(wall: Wall, top: float, K: float, press: Press) -> float:
 
     if K == 0.0:
         search = boundary.crossing_search(top, 100.0 * top)
-        return _side_by_side([search], tried, growth_rates)[0]
+        return _side_by_side([search], tried, _growth())[0]
     search = _rung_search(1e-3 * top, 10.0 * top)
     return _side_by_side([search], tried, lambda walls: come_to_rest(walls, press))[0]
 
@@ -173,12 +181,31 @@ def _rung_search(start: float, most: float) -> Search:
     return low
 
 
-def growth_rates(walls: Sequence[Wall]) -> list[float]:
-    """Growth rate of the oscillation of each wall's linear loop, from one run each [1/s].
+def growth_rates(walls: Sequence[Wall], maps: PeriodMaps | None = None) -> list[float]:
+    """Growth rate of the oscillation of each wall's linear loop [1/s].
+
+    It is that of the map of a sample; that of a run where there is none.
 
     Args:
         walls: the walls.
+        maps: those made before; None for none.
     """
+    maps, found, left = maps or PeriodMaps(len(walls)), {}, []
+    for i, wall in enumerate(walls):
+        axis, slowest = "x", growth.SLOWEST_MODE
+        if isinstance(wall, VirtualWall):
+            scene = wall.scenario(wall.Ts, steps=growth_steps(wall))
+            slowest = growth_reading(wall)[2]
+        else:
+            scene, axis = wall.scenario(), wall.axis
+        found[i] = growth.mapped_growth(scene, axis, maps, slowest)
+        left += [i] if math.isnan(found[i]) else []
+    rates = _rates_of_runs([walls[i] for i in left])
+    return [x for _, x in sorted((found | dict(zip(left, rates, strict=True))).items())]
+
+
+def _rates_of_runs(walls: Sequence[Wall]) -> list[float]:
+    """The rates of walls, from one run each."""
     arms = [w for w in walls if isinstance(w, boundary.PushedLoop)]
     if arms:
         records = simulate_batch(w.scenario() for w in arms)

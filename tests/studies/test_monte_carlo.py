@@ -14,7 +14,7 @@ from scipy import stats
 import hapticclay as hc
 from benchmarks import robustness
 from hapticclay.cli import app
-from hapticclay.studies import growth, sweep_store
+from hapticclay.studies import growth, sweep_store, verdicts
 from hapticclay.studies import robustness as study
 from hapticclay.studies.boundary import PushedLoop, pose_matrix
 from hapticclay.studies.sampling import Range
@@ -86,7 +86,28 @@ def test_a_run_is_judged_as_its_eigenvalues_are(base, vary, n):
     clear = np.abs(rate) > 0.01
     assert clear.sum() >= 0.97 * n and 0.1 * n < result.total.events < 0.9 * n
     assert np.all((rate > 0.0)[clear] == (result.unstable == 1)[clear])
-    assert result.longer.mean() < 0.3  # most are told by their first samples
+    assert result.longer.mean() < 0.02  # nearly all are told by their maps
+    # and by the samples of a run where the push is given
+    pushed = hc.studies.monte_carlo(replace(trials, push=1e-6))
+    assert np.all((rate > 0.0)[clear] == (pushed.unstable == 1)[clear])
+    assert pushed.longer.mean() < 0.3
+
+
+@pytest.mark.parametrize("base", [PushedLoop("x"), SAMPLED, hc.VirtualWall(B=20.0)])
+def test_the_verdict_on_a_linear_loop_needs_no_run(base, monkeypatch):
+    monkeypatch.setattr(verdicts, "simulate_batch", None)
+    gains = hc.studies.Distribution("log-uniform", 1e-2, 1e5)
+    result = hc.studies.monte_carlo(hc.studies.Trials(base, {"K": gains}, runs=20))
+    assert 0 < result.total.events < 20
+
+
+def test_a_run_is_made_where_the_map_leaves_the_verdict_open(monkeypatch):
+    monkeypatch.setattr(verdicts, "LEAST_OF_MAP", math.inf)
+    trials = hc.studies.Trials(PushedLoop("x"), {"K": GAIN, "b": CLAY}, runs=10, seed=5)
+    result = hc.studies.monte_carlo(trials)
+    rows = [dict(zip(trials.names, p, strict=True)) for p in result.points.tolist()]
+    assert result.longer.all()
+    assert [least_damped(trials.loop(row)) > 0.0 for row in rows] == (result.unstable == 1).tolist()
 
 
 @pytest.mark.parametrize(
