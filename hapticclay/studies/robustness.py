@@ -27,7 +27,7 @@ from . import boundary, sweep, sweep_store
 from .boundary import PushedLoop
 from .probability import LEVEL, Probability, clopper_pearson
 from .trials import Trials
-from .verdicts import NOT_RUN, judge
+from .verdicts import NOT_RUN
 
 PROBED = 200  # runs used to estimate the cost
 CURVE_POINTS = 61  # of a boundary
@@ -251,9 +251,9 @@ def measure_cost(trials: Trials, left: int, out: Path | None = None, workers: in
     """
     threads = None if workers == 1 else 1
     points = trials.points(0)[:PROBED]
-    judge(trials, points[:4], threads)  # the first run loads and compiles
+    trials.judge(points[:4], threads)  # the first run loads and compiles
     begin = time.perf_counter()
-    judge(trials, points, threads)
+    trials.judge(points, threads)
     each = (time.perf_counter() - begin) / len(points) / workers
     if out is None:
         return Cost(left, each * left)
@@ -338,4 +338,4 @@ def stored_runs(trials: Trials, out: Path | str) -> Instability:
 
 def _judged_chunk(trials: Trials, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     points = trials.points(number)
-    return (points, *judge(trials, points))
+    return (points, *trials.judge(points))

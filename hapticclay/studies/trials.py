@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
 import json
@@ -216,6 +217,25 @@ class Trials:
         text = json.dumps({**self.described(), "release": versions()["hapticclay"]}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
+    def judge(
+        self, points: np.ndarray, threads: int | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Makes verdicts on runs, see `verdicts.judge`.
+
+        Args:
+            points: their parameters, shape (runs, names).
+            threads: as in `simulate_batch`.
+
+        Returns:
+            Whether each is unstable: 1 or 0, NOT_RUN for one that cannot be run (a pose out of
+            reach), shape (runs,); whether a longer run was made, shape (runs,).
+        """
+        cases = {}
+        for i, row in enumerate(points.tolist()):
+            with contextlib.suppress(ParameterError):
+                cases[i] = self.case(dict(zip(self.names, row, strict=True)), 1.0)
+        return judge(cases, len(points), self.push is not None, threads)
+
     # The interface that `sweep` requires of stored runs.
 
     def blank_row(self) -> dict[str, Any]:
@@ -231,7 +251,7 @@ class Trials:
         points = self.points(number)
         # A worker is one of several processes, one per core.
         threads = None if multiprocessing.parent_process() is None else 1
-        unstable, longer = judge(self, points, threads)
+        unstable, longer = self.judge(points, threads)
         values = points.tolist()
         return [
             {"run": run, **dict(zip(self.names, values[i], strict=True)),

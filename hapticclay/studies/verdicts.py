@@ -6,24 +6,19 @@ a run give. Where there is none, or where a push is given, a run is made and jud
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import ParameterError
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch
 from ..simulation.period_map import PeriodMaps
 from . import boundary, growth, wall_runs
-
-if TYPE_CHECKING:
-    from .trials import Trials
 
 LEAST_OF_MAP = 1e-3  # [1/s] slower growth or decay of a map is left undecided
 ENDED = ("limit cycle", "saturated")  # runs that the motors bound: a small push has grown to that
@@ -68,35 +63,33 @@ class Reading(NamedTuple):
 
 
 def judge(
-    trials: Trials, points: np.ndarray, threads: int | None = None
+    cases: Cases, n: int, pushed: bool, threads: int | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Decides which runs are unstable.
 
     A run is unstable if its oscillation grows, as the map of a period says (`growth_of_map`). Where
-    a scene has no map, or where the trials have a push, a short run is made and read; so is a
-    longer one if map or run leaves the verdict open. A run that ends early, or saturates the motors
-    after so small a push, is unstable.
+    a scene has no map, or where the push matters, a short run is made and read; so is a longer one
+    if map or run leaves the verdict open. A run that ends early, or saturates the motors after so
+    small a push, is unstable.
 
     Args:
-        trials: specification of the runs.
-        points: their parameters, shape (runs, trials.names).
+        cases: the runs, by index; all of loops or all of walls.
+        n: number of verdicts; those without a case cannot be run.
+        pushed: whether the push matters.
         threads: as in `simulate_batch`.
 
     Returns:
-        Whether each is unstable: 1 or 0, NOT_RUN for one that cannot be run (a pose out of reach),
-        shape (runs,); whether a longer run was made, shape (runs,).
+        Whether each is unstable: 1 or 0, NOT_RUN for one that cannot be run, shape (n,); whether a
+        longer run was made, shape (n,).
     """
-    cases: Cases = {}
-    for i, row in enumerate(points.tolist()):
-        with contextlib.suppress(ParameterError):
-            cases[i] = trials.case(dict(zip(trials.names, row, strict=True)), 1.0)
-    reading = WALLS if isinstance(trials.base, VirtualWall) else ARMS
-    rate = {} if trials.push else mapped_rates(cases, reading)
+    are_walls = any(isinstance(x.base, VirtualWall) for x in cases.values())
+    reading = WALLS if are_walls else ARMS
+    rate = {} if pushed else mapped_rates(cases, reading)
     if left := {i: x for i, x in cases.items() if i not in rate}:
         rate |= reading.short(left, threads)
     if again := {i: cases[i] for i, x in rate.items() if math.isnan(x)}:
         rate |= reading.long(again, threads)
-    unstable, longer = np.full(len(points), NOT_RUN), np.zeros(len(points), dtype=bool)
+    unstable, longer = np.full(n, NOT_RUN), np.zeros(n, dtype=bool)
     unstable[[*rate]] = np.array([*rate.values()]) > 0.0
     longer[[*again]] = True
     return unstable, longer
