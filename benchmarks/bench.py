@@ -205,7 +205,7 @@ def main(
 if __name__ == "__main__":
     parser = common.parser(__doc__)
     parser.add_argument(
-        "--quick", action="store_true", help="fewer jobs, settings and scenes: about a minute"
+        "--quick", action="store_true", help="fewer jobs, settings and scenes: about two minutes"
     )
     parser.add_argument(
         "--readme", type=Path, help="a README whose table of recommended settings is to be renewed"

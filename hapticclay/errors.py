@@ -561,5 +561,5 @@ def needing(what: str, package: str, extra: str = "data") -> Iterator[None]:
     try:
         yield
     except ImportError:
-        bound = f"is not installed: pip install 'hapticclay[{extra}]'"
+        bound = f"must be installed: pip install 'hapticclay[{extra}]'"
         raise ParameterError(what, package, bound) from None

@@ -293,7 +293,7 @@ def _check_loose(loose: list[str], path: str, slots: dict[str, Slot]) -> None:
         if given:
             _check_option(name, given, kind)
     if loose:
-        raise _refused(f"{loose[0]!r}: one word too many for {path}")
+        raise _refused(f"unexpected argument {loose[0]!r} of {path}")
 
 
 def _refused(text: str) -> ParameterError:

@@ -76,13 +76,12 @@ class PeriodMaps:
         warm = warm_periods(parts)
         if not has_map(s, parts) or warm + 1 > MOST:
             return None
-        ratio = 1 if parts.sampler is None else parts.sampler.ratio
         key = kind_of(parts), s.arm, s.clay and s.clay.angle, s.hardware is None
         if key not in self.kinds:
             if len(self.kinds) >= KINDS:
                 del self.kinds[next(iter(self.kinds))]
             self.kinds[key] = MapsOfKind(s, parts, self.expected)
-        return self.kinds[key].of(s, parts, i, warm * ratio)
+        return self.kinds[key].of(s, parts, i, warm)
 
 
 # ---- which scenes have a map ---------------------------------------------------------------------
@@ -239,10 +238,9 @@ class MapsOfKind:
         machine = getattr(at.loop, "machine", None)
         self.torques = None if machine is None else machine.hold.tau
         self.filled, self.code = at.filled.rows, at.status.code
-        self.period = 1 if parts.sampler is None else parts.sampler.ratio
         self.coupled = False  # whether one axis has acted on the other
         names = [x.part for x in self.rings]
-        steps = expected * len(self.own[0]) * self.period
+        steps = expected * len(self.own[0]) * steps_of_period(parts)
         self.steps: Any = (
             CompiledSteps(s, parts, state, names, MOST + 1)
             if repays(s, parts, state, steps)
@@ -259,22 +257,16 @@ class MapsOfKind:
             s: the scene, at rest.
             parts: of the scene.
             i: index of the axis.
-            warm: steps before the period.
+            warm: periods before the one of the map.
         """
-        state = self._start(s, parts)
-        rings = [ring_of(parts, x.part)[None] for x in self.rings]
-        x = Copies(np.array([self.numbers(state)], float), rings)
-        before = x.states[0, self.moving]
+        state, n = self._start(s, parts), steps_of_period(parts)
         self.steps.take(parts)
-        self._advance(x, warm)
-        moves = (np.abs(x.states[0, self.moving] - before) > LINEAR * KICK).any()
-        if moves or x.states[0, self.code] != OPEN:
+        rest = self._at_rest(parts, state, warm * n)
+        if rest is None:
             return None
-        one, both = (i,), (i, 1 - i)
-        matrix = None if self.coupled else self._matrix(x, one)
-        axes = one if matrix is not None else both
+        axes, matrix = (i,), None if self.coupled else self._matrix(rest, (i,), n)
         if matrix is None:
-            matrix = self._matrix(x, both)
+            axes, matrix = (i, 1 - i), self._matrix(rest, (i, 1 - i), n)
             self.coupled = self.coupled or matrix is not None
         if matrix is None:
             return None
@@ -282,19 +274,29 @@ class MapsOfKind:
         first = 0
         for j in axes:  # the rate of a joint is the second coordinate of its axis
             pushed[first + 1], seen[first + 1] = push_of(s, state, i, j)
-            first += sum(map(len, self._places(x, j)))
-        return PeriodMap(matrix, self.period * s.dt, pushed, seen)
+            first += sum(map(len, self._places(rest, j)))
+        return PeriodMap(matrix, n * s.dt, pushed, seen)
 
-    def _matrix(self, rest: Copies, axes: tuple[int, ...]) -> np.ndarray | None:
-        """The map of some axes; None where it is not linear, or the other one acts on them."""
-        places = [self._places(rest, i) for i in (axes[0], 1 - axes[0])]
-        count = sum(map(len, (at for each in places[: len(axes)] for at in each)))
+    def _at_rest(self, parts: Parts, state: State, n: int) -> Copies | None:
+        """The run after n steps; None where it moves."""
+        rings = [ring_of(parts, x.part)[None] for x in self.rings]
+        x = Copies(np.array([self.numbers(state)], float), rings)
+        before = x.states[0, self.moving]
+        self._advance(x, n)
+        moves = np.abs(x.states[0, self.moving] - before) > LINEAR * KICK
+        return None if moves.any() or x.states[0, self.code] != OPEN else x
+
+    def _matrix(self, rest: Copies, axes: tuple[int, ...], n: int) -> np.ndarray | None:
+        """The map of some axes over n steps; None where it is not linear, or others act on them."""
+        kicked = [self._places(rest, i) for i in axes]
+        others = [self._places(rest, i) for i in (0, 1) if i not in axes]
+        count = sum(len(at) for places in kicked for at in places)
         if count > MOST:
             return None
         x = rest.repeated(count + 1)
-        kick(x, places[: len(axes)], places[len(axes) :])
-        self._advance(x, self.period)
-        before = [coordinates_at(rest, places[j]) for j in range(len(axes))]
+        kick(x, kicked, others)
+        self._advance(x, n)
+        before = [coordinates_at(rest, places) for places in kicked]
         after = [coordinates_at(x, self._places(x, i)) for i in axes]
         if (x.states[:, self.code] != OPEN).any():
             return None
@@ -322,6 +324,15 @@ class MapsOfKind:
         """Where the coordinates of an axis lie in the arrays of copies."""
         pairs = zip(self.rings, x.rings, strict=True)
         return [self.own[i], *(ring.places(x.states[0], a.shape[1], i) for ring, a in pairs)]
+
+
+def steps_of_period(parts: Parts) -> int:
+    """Engine steps of a period.
+
+    Args:
+        parts: of the scene.
+    """
+    return 1 if parts.sampler is None else parts.sampler.ratio
 
 
 def push_of(s: Scenario, state: State, i: int, j: int) -> tuple[float, float]:

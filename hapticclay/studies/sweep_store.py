@@ -272,7 +272,7 @@ def claimed(sweep: P, out: Path) -> Iterator[tuple[P, list[int]]]:
         import pyarrow  # noqa: F401
     except ImportError:
         raise ParameterError(
-            "sweep", "pyarrow", "is not installed: pip install 'hapticclay[sweep]'"
+            "sweep", "pyarrow", "must be installed: pip install 'hapticclay[sweep]'"
         ) from None
     try:
         out.mkdir(parents=True, exist_ok=True)

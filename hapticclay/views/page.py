@@ -86,7 +86,7 @@ class Page:
             import rich
             import viser
         except ImportError:
-            bound = "is not installed: pip install 'hapticclay[web]'"
+            bound = "must be installed: pip install 'hapticclay[web]'"
             raise ParameterError("web", "viser", bound) from None
         self.session, self.player = session, Player(session)
         port = integer("port", port, 0, 65535)

@@ -44,7 +44,7 @@ def test_export_writes_beside_the_record_or_where_it_is_told(capsys, folder, tmp
         (["--format", "cvs"], ["--format = 'cvs': must be one of nc, parquet, csv"]),
         (["--frmat", "csv"], ["--frmat: no option of export; did you mean --format?"]),
         (["--format", "csv", "--out", "/proc/no/x"], ["out = '/proc/no/x'", "writable"]),
-        (["more"], ["'more': one word too many for export"]),
+        (["more"], ["unexpected argument 'more' of export"]),
     ],
 )
 def test_bad_words_are_one_line(capsys, folder, tmp_path, monkeypatch, words, told):

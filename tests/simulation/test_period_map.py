@@ -133,6 +133,15 @@ def test_one_scene_does_not_decide_what_acts_in_the_next():
     )
 
 
+def test_scenes_of_one_kind_may_differ_in_their_steps_and_delays():
+    wall, maps = WALLS["two samples late"], period_map.PeriodMaps(1)
+    for steps, late in ((16, 2.0), (4, 0.5), (50, 3.2)):
+        s = replace(wall, delay=late * wall.Ts).scenario(1.0, steps=steps)
+        found, alone = maps.of(s, 0), map_of(s)
+        assert np.array_equal(found.matrix, alone.matrix) and found.period == alone.period
+        assert found.period == pytest.approx(wall.Ts)
+
+
 SAMPLED = scene_of(LOOPS["sampled"])
 SLIDES = hc.Profile((), (20.0,), Fy=(0.5,))
 YIELDS = hc.Clay(SLIDES, SLIDES)
