@@ -44,10 +44,8 @@ GROUPS = {  # by fixture, or by the end of a file's name: tests that run in one 
     "test_page.py": "gui",
 }
 PLAIN = {  # files whose tests are about steps in Python
-    "test_energy.py",
     "test_engine.py",
     "test_interrupted.py",
-    "test_monitor.py",
 }
 
 

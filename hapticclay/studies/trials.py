@@ -166,9 +166,9 @@ class Trials:
             ParameterError: there is no such parameter, a value is out of its bounds, or a wall is
                 not linear.
         """
-        return self.case(values, t_max).scenario
+        return self._case(values, t_max).scenario
 
-    def case(self, values: Mapping[str, float], t_max: float) -> Case:
+    def _case(self, values: Mapping[str, float], t_max: float) -> Case:
         """One run, with its loop or wall.
 
         Args:
@@ -233,7 +233,7 @@ class Trials:
         cases = {}
         for i, row in enumerate(points.tolist()):
             with contextlib.suppress(ParameterError):
-                cases[i] = self.case(dict(zip(self.names, row, strict=True)), 1.0)
+                cases[i] = self._case(dict(zip(self.names, row, strict=True)), 1.0)
         return judge(cases, len(points), self.push is not None, threads)
 
     # The interface that `sweep` requires of stored runs.
