@@ -20,7 +20,8 @@ from ..simulation.batch import simulate_batch
 from ..simulation.period_map import PeriodMaps
 from . import boundary, growth, wall_runs
 
-LEAST_OF_MAP = 1e-3  # [1/s] slower growth or decay of a map is left undecided
+LEAST_OF_MAP = 1e-3  # [1/s] slower growth or decay of a map of a loop is left undecided
+WALL_MAP_TOLD = 1e-3  # so is a smaller relative change over a wall's run: a kick changes 3e-4 of it
 ENDED = ("limit cycle", "saturated")  # runs that the motors bound: a small push has grown to that
 LOST = ("diverged", "out of reach", "singular")  # runs that nothing bounds
 SPAN_STEPS = 200.0  # of a repeated run, at least
@@ -192,7 +193,7 @@ def wall_scale(case: Case) -> tuple[float, float]:
         case: the wall.
     """
     n, _, slowest = wall_runs.growth_reading(case.base)
-    return slowest, WALL_TOLD / (n * case.base.Ts)
+    return slowest, WALL_MAP_TOLD / (n * case.base.Ts)
 
 
 def short_walls(cases: Cases, threads: int | None) -> Rates:
