@@ -159,7 +159,7 @@ class RobustnessCommand:
         print(f"unstable: {total.events} of {total.runs} runs, {total}")
         if result.trials.grid:
             print("over a grid this is the mean of its cells")
-        print(f"{100.0 * result.longer.mean():.1f} % of the runs were repeated for longer")
+        print(f"{100.0 * result.longer.mean():.1f} % of the runs needed a longer run")
         if result.refused:
             print(f"{result.refused} draws cannot be run (out of reach or bounds): not counted")
         drawn = {

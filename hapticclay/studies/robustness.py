@@ -1,8 +1,7 @@
-"""The probability that a loop is unstable: many short runs over random hands, clay and hardware.
+"""The probability that a loop is unstable: many verdicts over random hands, clay and hardware.
 
-Each run starts with a push and is judged on its own: its oscillation grows or not. A few samples
-decide most runs (`growth`); the others are repeated for longer. Chunks of runs are stored like
-those of a sweep, so an interrupted study resumes where it stopped.
+Each verdict is on a run of its own: its oscillation grows or not (`verdicts`). Chunks of runs are
+stored like those of a sweep, so an interrupted study resumes where it stopped.
 """
 
 from __future__ import annotations
