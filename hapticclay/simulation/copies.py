@@ -97,17 +97,19 @@ class PlainSteps:
     """Makes steps of copies in CPython.
 
     Args:
+        store: engines to use.
         s: a scene of their kind.
         parts: of the scene.
         state: of their kind.
         rings: names of the parts that have a ring.
     """
 
-    def __init__(self, s: Scenario, parts: Parts, state: State, rings: Sequence[str]):
-        self.state, self.rings, self.store = state, rings, EngineStore()
-        model, data = self.store.engine(s)
-        self.limits, self.e = model.actuator_ctrlrange, self.store.arrays(parts, model, data, PLAIN)
-        self.parts = parts
+    def __init__(
+        self, store: EngineStore, s: Scenario, parts: Parts, state: State, rings: Sequence[str]
+    ):
+        self.state, self.rings, self.parts = state, rings, parts
+        model, data = store.engine(s)
+        self.limits, self.e = model.actuator_ctrlrange, store.arrays(parts, model, data, PLAIN)
 
     def take(self, parts: Parts) -> None:
         """Takes another scene.
@@ -139,6 +141,7 @@ class CompiledSteps:
     """As PlainSteps, by machine code, with the same bits.
 
     Args:
+        store: engines to use.
         s: a scene of their kind.
         parts: of the scene.
         state: of their kind.
@@ -146,12 +149,15 @@ class CompiledSteps:
         most: copies that are advanced together.
     """
 
-    def __init__(self, s: Scenario, parts: Parts, state: State, rings: Sequence[str], most: int):
+    def __init__(
+        self, store: EngineStore, s: Scenario, parts: Parts, state: State, rings: Sequence[str],
+        most: int,
+    ):  # fmt: skip
         from ..stepping import compiled, own_law
 
-        self.called, self.rings, self.store = own_law.called, rings, EngineStore()
-        model, data = self.store.engine(s)
-        engine, like = self.store.arrays(parts, model, data, compiled.KERNEL), self.called(parts)
+        self.called, self.rings, self.store = own_law.called, rings, store
+        model, data = store.engine(s)
+        engine, like = store.arrays(parts, model, data, compiled.KERNEL), self.called(parts)
         c = vector.Common(most)
         c.kept[:, :2] = self.store.rows.ctypes.data, self.store.rendered.ctypes.data
         self.numbers, self.arrays = leaves_of(like, float | int), leaves_of(like, np.ndarray)

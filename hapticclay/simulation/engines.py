@@ -78,7 +78,17 @@ def pays(scenario: Scenario, steps: float) -> bool:
         steps: number of steps of its kind that are about to be made.
     """
     kind = kind_of(scene.parts_of(scenario))
-    saved[kind] = saved.get(kind, 0.0) + 0.5 * saved_in_a_step(scenario) * steps
+    return repays_with(kind, 0.5 * saved_in_a_step(scenario) * steps)
+
+
+def repays_with(kind: Any, more: float) -> bool:
+    """As `repays`, with all that machine code would have saved in this process.
+
+    Args:
+        kind: of scene.
+        more: time that it may save now, which is added to that [s].
+    """
+    saved[kind] = saved.get(kind, 0.0) + more
     return repays(kind, saved[kind])
 
 

@@ -6,7 +6,6 @@ make the steps of one period: of a control sample, or of one step where control 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from ..model import arm
 from ..scene.scenario import Scenario
 from ..stepping import many, scene
 from ..stepping.hardware import QUEUED
-from ..stepping.machine_code import kind_of
+from ..stepping.machine_code import kind_of, leaves
 from ..stepping.memories import delay_in_samples
 from ..stepping.parts import Parts
 from ..stepping.run import PLAIN, EngineStore, with_checked
@@ -165,7 +164,8 @@ def coordinates(at: State, i: int) -> list[int]:
     springs = x and (x.rest[i], x.stretch[i], x.at[i], x.force[i], x.before[i])
     owed = at.clay.reaction and at.clay.reaction.owed
     loop = controller_of(at.loop, i)
-    return [*leaves((at.body.q[i], at.body.w[i], loop, owed and owed[i], springs))]
+    found = leaves((at.body.q[i], at.body.w[i], loop, owed and owed[i], springs))
+    return [x for x in found if x is not None]
 
 
 def controller_of(loop: Any, i: int) -> Any:
@@ -203,19 +203,6 @@ def rings_of(parts: Parts, at: State) -> list[Ring]:
     return found
 
 
-def leaves(part: Any) -> Iterator[int]:
-    """The numbers in nested tuples.
-
-    Args:
-        part: the tuples; None for no number.
-    """
-    if isinstance(part, tuple):
-        for x in part:
-            yield from leaves(x)
-    elif part is not None:
-        yield part
-
-
 # ---- the map -------------------------------------------------------------------------------------
 
 
@@ -242,9 +229,9 @@ class MapsOfKind:
         names = [x.part for x in self.rings]
         steps = expected * len(self.own[0]) * steps_of_period(parts)
         self.steps: Any = (
-            CompiledSteps(s, parts, state, names, MOST + 1)
+            CompiledSteps(self.store, s, parts, state, names, MOST + 1)
             if repays(s, parts, state, steps)
-            else PlainSteps(s, parts, state, names)
+            else PlainSteps(self.store, s, parts, state, names)
         )
 
     def _start(self, s: Scenario, parts: Parts) -> State:
@@ -360,10 +347,8 @@ def repays(s: Scenario, parts: Parts, state: State, steps: float) -> bool:
         state: of it.
         steps: that are about to be made.
     """
-    kind = kind_of_steps(parts, state)
-    more = engines.saved_in_a_step(s) * steps
-    engines.saved[kind] = engines.saved.get(kind, 0.0) + more
-    return engines.repays(kind, engines.saved[kind]) and engines.load_compiled() is not None
+    kind, more = kind_of_steps(parts, state), engines.saved_in_a_step(s) * steps
+    return engines.repays_with(kind, more) and engines.load_compiled() is not None
 
 
 def coordinates_at(x: Copies, places: list[np.ndarray]) -> np.ndarray:

@@ -413,7 +413,5 @@ def repay(run: Run, steps: float) -> bool:
     """
     if not is_vectored(run):
         return engines.pays(run.scenario, steps)
-    kind = RunVector.kind_of(run)
     more = 0.5 * engines.saved_in_a_step(run.scenario) * steps
-    engines.saved[kind] = engines.saved.get(kind, 0.0) + more
-    return engines.repays(kind, engines.saved[kind])
+    return engines.repays_with(RunVector.kind_of(run), more)

@@ -190,18 +190,20 @@ def growth_rates(walls: Sequence[Wall], maps: PeriodMaps | None = None) -> list[
         walls: the walls.
         maps: those made before; None for none.
     """
-    maps, found, left = maps or PeriodMaps(len(walls)), {}, []
-    for i, wall in enumerate(walls):
-        axis, slowest = "x", growth.SLOWEST_MODE
-        if isinstance(wall, VirtualWall):
-            scene = wall.scenario(wall.Ts, steps=growth_steps(wall))
-            slowest = growth_reading(wall)[2]
-        else:
-            scene, axis = wall.scenario(), wall.axis
-        found[i] = growth.mapped_growth(scene, axis, maps, slowest)
-        left += [i] if math.isnan(found[i]) else []
-    rates = _rates_of_runs([walls[i] for i in left])
-    return [x for _, x in sorted((found | dict(zip(left, rates, strict=True))).items())]
+    maps = maps or PeriodMaps(len(walls))
+    rates = [_mapped_rate(wall, maps) for wall in walls]
+    if left := [i for i, x in enumerate(rates) if math.isnan(x)]:
+        for i, x in zip(left, _rates_of_runs([walls[i] for i in left]), strict=True):
+            rates[i] = x
+    return rates
+
+
+def _mapped_rate(wall: Wall, maps: PeriodMaps) -> float:
+    """The rate of a wall by its map; NaN for none."""
+    if not isinstance(wall, VirtualWall):
+        return growth.mapped_growth(wall.scenario(), wall.axis, maps)
+    s = wall.scenario(wall.Ts, steps=growth_steps(wall))
+    return growth.mapped_growth(s, "x", maps, growth_reading(wall)[2])
 
 
 def _rates_of_runs(walls: Sequence[Wall]) -> list[float]:
