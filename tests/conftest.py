@@ -17,6 +17,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: workers shar
 
 from hapticclay.simulation import engines  # noqa: E402
 from hapticclay.stepping.notice import Notice  # noqa: E402
+from tests.hunt import EXAMPLES, HUNTS, MORE  # noqa: E402
 
 try:
     import fcntl
@@ -29,8 +30,10 @@ for name, handler in (("SIGINT", signal.default_int_handler), ("SIGHUP", signal.
     if number and signal.getsignal(number) is signal.SIG_IGN:
         signal.signal(number, handler)
 
-# deterministic in CI, no deadline: run times on shared machines mean nothing
-settings.register_profile("default", deadline=None, derandomize=True, max_examples=100)
+# deterministic but in a hunt, no deadline: run times on shared machines mean nothing
+settings.register_profile(
+    "default", deadline=None, derandomize=not HUNTS, max_examples=MORE * EXAMPLES
+)
 settings.load_profile("default")
 
 GROUPS = {  # by fixture, or by the end of a file's name: tests that run in one worker, in turns

@@ -22,12 +22,11 @@ from ..scene.plausible import warn_of
 from ..scene.scenario import Scenario
 from ..stepping import scene
 from ..stepping.engine import warnings_caught
-from ..stepping.machine_code import compile_time, is_kept
 from ..stepping.many import FEWEST, SUMMARY_CROSSINGS, Lane, Patterns, draws_of, kind_key
 from ..stepping.monitor import Outcome
 from ..stepping.run import PLAIN, Crossing, EngineStore, Kernel, Run, completed
 from . import record
-from .engines import LOADING, NUMBA, has_numba, load_compiled, pays, saved_in_a_step
+from .engines import NUMBA, has_numba, load_compiled, outweighs, pays, saved_in_a_step
 from .simulate import simulate
 
 KEEP = ("records", "summaries")
@@ -329,8 +328,7 @@ class Plan:
         pattern = self.patterns.of(key, jobs[0])
         if not pattern.is_made or pattern.kind in carried:
             return pattern.is_made
-        time = saved[pattern.kind]
-        return time >= LOADING and (is_kept(pattern.kind) or time >= compile_time(pattern.kind))
+        return outweighs(saved[pattern.kind], pattern.kind)
 
     def kernel(self, s: Scenario) -> Kernel:
         """How the steps of a run made alone are made; compiles them if needed.

@@ -13,9 +13,10 @@ from ..stepping.machine_code import compile_time, is_kept, kind_of
 from ..stepping.run import PLAIN, Kernel, Run, plainly
 
 ENGINES = ("auto", "python", "native")
-# measured: time that machine code saves in a step, and in clay that stays cut; to load it [s]
+# measured: time that machine code saves in a step, and in clay that stays cut; to import the
+# compiler, and to load machine code of a kind [s]
 SAVED, SAVED_IN_GROOVE = {"continuous": 50e-6, "sampled": 90e-6, "accurate": 150e-6}, 400e-6
-LOADING = 0.8
+IMPORTING, LOADING = 0.8, 0.03
 TRIED = 128  # rows made in CPython between two checks whether machine code repays itself
 saved: dict[Any, float] = {}  # time that it would have saved in this process, by kind of scene [s]
 
@@ -63,7 +64,18 @@ def repays(kind: Any, time: float) -> bool:
     compiled = sys.modules.get("hapticclay.stepping.compiled")
     if compiled is not None and kind in compiled.ready:
         return has_numba()
-    if time < LOADING or not has_numba():
+    return outweighs(time, kind) and has_numba()
+
+
+def outweighs(time: float, kind: Any) -> bool:
+    """Whether some time is longer than that to load or compile machine code of a kind.
+
+    Args:
+        time: the time [s].
+        kind: from `kind_of`, or (CARRY, kind, ...).
+    """
+    is_imported = sys.modules.get("hapticclay.stepping.compiled") is not None
+    if time < LOADING + (0.0 if is_imported else IMPORTING):
         return False
     return is_kept(kind) or time >= compile_time(kind)
 

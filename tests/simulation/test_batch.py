@@ -189,8 +189,7 @@ def test_scenes_alike_in_their_traits_have_the_same_parts():
 def test_machine_code_is_compiled_where_the_runs_of_its_kind_repay_it(monkeypatch, known):
     monkeypatch.setattr(batch, "saved", {})
     monkeypatch.setattr(batch, "carried", set())
-    monkeypatch.setattr(batch, "is_kept", lambda kind: False)
-    monkeypatch.setattr(batch, "compile_time", lambda kind: 20.0)
+    monkeypatch.setattr(batch, "outweighs", lambda time, kind: time >= 20.0)
     monkeypatch.setattr(batch, "pays", lambda s, steps: False)
     monkeypatch.setattr(batch, "is_ready", lambda kind: False)
     asked = []

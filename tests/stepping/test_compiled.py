@@ -10,6 +10,7 @@ import re
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -236,7 +237,11 @@ def test_auto_takes_machine_code_once_what_was_run_of_a_kind_repays_it(monkeypat
     machine_code.mark(kind).touch()
     monkeypatch.setattr(engines, "saved", {})
     asked = [engines.pays(cut, cut.t_max / cut.dt) for _ in range(20)]
-    assert asked == [(i + 1) * per_run >= engines.LOADING for i in range(20)]
+    cost = engines.IMPORTING + engines.LOADING
+    assert asked == [(i + 1) * per_run >= cost for i in range(20)]
+    monkeypatch.setitem(sys.modules, "hapticclay.stepping.compiled", SimpleNamespace(ready=set()))
+    monkeypatch.setattr(engines, "saved", {})
+    assert not engines.pays(cut, 1000.0) and engines.pays(cut, 300.0)  # 25 ms, 32.5 ms
     assert engines.kernel_for(cut, "python") is run.PLAIN
 
 
