@@ -1,6 +1,7 @@
 # Needs python3 (3.11 or newer) and make; everything else goes into .venv here.
 PYTHON ?= python3
 BIN := .venv/bin
+unexport PYTHONDONTWRITEBYTECODE  # the tests start hundreds of processes, which would compile each module anew
 
 .PHONY: demo test coverage check docs pages linkcheck bench build release clean
 .DELETE_ON_ERROR:

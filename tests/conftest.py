@@ -42,7 +42,7 @@ GROUPS = {  # by fixture, or by the end of a file's name: tests that run in one 
     "rows": "bench",
     "scaled": "bench",
     "poses": "poses",
-    "whole": "sweep",
+    "swept": "sweep",
     "screen": "gui",
     "test_page.py": "gui",
 }

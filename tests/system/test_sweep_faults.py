@@ -70,11 +70,23 @@ def until(condition, seconds=60.0):
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    """What every sweep of `command` must come to."""
+def swept(tmp_path_factory):
+    """The folder of the sweep of `command`."""
     out = tmp_path_factory.mktemp("whole")
     sweep.run_sweep(plan(), out, workers=1)
-    return columns(sweep_store.read_sweep(out))
+    return out
+
+
+@pytest.fixture
+def copy(swept, tmp_path):
+    """A copy of that folder."""
+    return shutil.copytree(swept, tmp_path / "o")
+
+
+@pytest.fixture(scope="module")
+def whole(swept):
+    """What every sweep of `command` must come to."""
+    return columns(sweep_store.read_sweep(swept))
 
 
 @pytest.fixture
@@ -106,11 +118,11 @@ def test_a_full_disk_is_one_line_and_the_sweep_goes_on_with_room(small_disk, who
     assert not temporary(out)
     there = len(sweep_store.read_sweep(out))  # all that is there is valid
     assert 0 < there < RUNS
-    again = subprocess.run(command(out, workers=workers), capture_output=True, text=True)
-    one_line_of_a_full_disk(again, "No space left")
+    with pytest.raises(ParameterError, match="No space left"):
+        sweep.run_sweep(plan(), out, workers=1)
     assert len(sweep_store.read_sweep(out)) >= there
     subprocess.run(["mount", "-o", "remount,size=4m", small_disk], check=True)
-    subprocess.run(command(out, workers=workers), capture_output=True, check=True)
+    sweep.run_sweep(plan(), out, workers=1)
     assert columns(sweep_store.read_sweep(out)) == whole
 
 
@@ -136,7 +148,7 @@ def test_a_file_beyond_the_limit_of_the_process_is_one_line(tmp_path, whole, wor
     )
     one_line_of_a_full_disk(done, "File too large")
     assert not temporary(tmp_path) and not list((tmp_path / "data").iterdir())
-    subprocess.run(command(tmp_path, workers=workers), capture_output=True, check=True)
+    sweep.run_sweep(plan(), tmp_path, workers=1)
     assert columns(sweep_store.read_sweep(tmp_path)) == whole
 
 
@@ -253,9 +265,8 @@ def columnless(file, out):
         (columnless, "incomplete"),
     ],
 )
-def test_bad_parts_are_named_and_made_again(tmp_path, capsys, whole, harm, fault):
-    out = tmp_path / "o"
-    sweep.run_sweep(plan(), out, workers=1)
+def test_bad_parts_are_named_and_made_again(copy, capsys, whole, harm, fault):
+    out = copy
     for n in (1, 7):
         harm(sweep_store.sweep_part(out, n), out)
     if harm is not short:
@@ -272,39 +283,36 @@ def test_bad_parts_are_named_and_made_again(tmp_path, capsys, whole, harm, fault
     assert sweep.run_sweep(plan(), out, workers=1) == 0 and not capsys.readouterr().err
 
 
-def test_many_bad_parts_are_one_short_line(tmp_path, capsys):
-    sweep.run_sweep(plan(), tmp_path, workers=1)
+def test_many_bad_parts_are_one_short_line(copy, capsys):
     for n in range(12):
-        empty(sweep_store.sweep_part(tmp_path, n), tmp_path)
-    assert len(sweep_store.begin_sweep(plan(), tmp_path)) == 12
+        empty(sweep_store.sweep_part(copy, n), copy)
+    assert len(sweep_store.begin_sweep(plan(), copy)) == 12
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and said.count(".parquet") == 5 and "7 more" in said
 
 
-def test_a_stray_file_among_the_parts_is_refused_and_kept(tmp_path):
-    sweep.run_sweep(plan(), tmp_path, workers=1)
-    stray = tmp_path / "data" / "part-000001 (copy).parquet"
-    shutil.copy(sweep_store.sweep_part(tmp_path, 1), stray)
+def test_a_stray_file_among_the_parts_is_refused_and_kept(copy):
+    stray = copy / "data" / "part-000001 (copy).parquet"
+    shutil.copy(sweep_store.sweep_part(copy, 1), stray)
     with pytest.raises(ParameterError, match="does not belong to the sweep"):
-        sweep.run_sweep(plan(), tmp_path, workers=1)
+        sweep.run_sweep(plan(), copy, workers=1)
     with pytest.raises(ParameterError, match="copy"):
-        sweep_store.read_sweep(tmp_path)
+        sweep_store.read_sweep(copy)
     assert stray.is_file()
 
 
-def test_a_part_that_may_not_be_read_is_refused_not_removed(tmp_path, monkeypatch):
-    sweep.run_sweep(plan(), tmp_path, workers=1)
-    real = type(tmp_path).read_bytes
+def test_a_part_that_may_not_be_read_is_refused_not_removed(copy, monkeypatch):
+    real = type(copy).read_bytes
 
     def denied(self):
         if self.name == "part-000003.parquet":
             raise PermissionError(13, "Permission denied")
         return real(self)
 
-    monkeypatch.setattr(type(tmp_path), "read_bytes", denied)
+    monkeypatch.setattr(type(copy), "read_bytes", denied)
     with pytest.raises(ParameterError, match="part-000003.*Permission denied"):
-        sweep.run_sweep(plan(), tmp_path, workers=1)
-    assert sweep_store.sweep_part(tmp_path, 3).is_file()
+        sweep.run_sweep(plan(), copy, workers=1)
+    assert sweep_store.sweep_part(copy, 3).is_file()
 
 
 @pytest.mark.parametrize("other", ["10:1000:40log", "20:1000:40log"])
@@ -312,7 +320,7 @@ def test_of_two_sweeps_started_at_once_one_wins_and_the_other_is_refused(tmp_pat
     """The same twice, and two that differ."""
     starts = [
         subprocess.Popen(
-            command(tmp_path, t_max=0.3, b=b),
+            command(tmp_path, t_max=0.3, b=b, workers=1),
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
