@@ -28,7 +28,8 @@ def attach(
 
     def __getattr__(wanted: str) -> Any:
         if wanted not in names:
-            raise AttributeError(_unknown(module, wanted, names, doors))
+            near = "" if wanted.startswith("_") else _nearest(module, wanted, names, doors)
+            raise AttributeError(f"no name {wanted!r} in {module}{near}")
         own, start = vars(sys.modules[module]), vars(sys.modules[package])
         before = start.get(wanted, start)
         value = own[wanted] = found(wanted)
@@ -47,8 +48,8 @@ def _restore(names: dict[str, Any], name: str, before: Any) -> None:
         names[name] = before
 
 
-def _unknown(module: str, wanted: str, names: Sequence[str], doors: Sequence[str]) -> str:
-    """The message for an unknown name."""
+def _nearest(module: str, wanted: str, names: Sequence[str], doors: Sequence[str]) -> str:
+    """The end of the message for an unknown name: the nearest that there is, if any."""
     import difflib
     import importlib
 
@@ -59,4 +60,4 @@ def _unknown(module: str, wanted: str, names: Sequence[str], doors: Sequence[str
     }
     paths |= {x: f"{module}.{x}" for x in names}
     near = difflib.get_close_matches(wanted, paths, 1)
-    return f"no name {wanted!r} in {module}" + (f"; did you mean {paths[near[0]]}?" if near else "")
+    return f"; did you mean {paths[near[0]]}?" if near else ""

@@ -6,6 +6,7 @@ Tests marked `plain` test steps in Python: there `engine="auto"` takes no machin
 """
 
 import contextlib
+import gc
 import os
 import signal
 
@@ -66,6 +67,12 @@ def pytest_collection_modifyitems(items):
         # xdist 3.8 appends the group to `_nodeid`, which pytest 9.2 no longer has
         if mark and "PYTEST_XDIST_WORKER" in os.environ and not hasattr(item, "_nodeid"):
             item._id = type(item._id).parse(f"{item.nodeid}@{mark.args[0]}")
+
+
+def pytest_collection_finish():
+    """Takes what was collected out of the search for cycles: it stays to the end."""
+    gc.collect()
+    gc.freeze()
 
 
 @contextlib.contextmanager

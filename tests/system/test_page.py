@@ -65,7 +65,7 @@ def test_page_loads_and_its_sliders_change_the_simulation(page, tmp_path, capfd)
     troubles = []
     with playwright.sync_playwright() as p:
         browser = p.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        tab = browser.new_page(viewport={"width": 900, "height": 600})
+        tab = browser.new_page(viewport={"width": 720, "height": 400})
         tab.set_default_timeout(150_000)  # software drawing, about a picture a second
         tab.on("console", lambda m: troubles.append(m.text) if m.type == "error" else None)
         tab.on("pageerror", lambda e: troubles.append(str(e)))
@@ -82,8 +82,8 @@ def test_page_loads_and_its_sliders_change_the_simulation(page, tmp_path, capfd)
         press(sliders.nth(2), "ArrowRight", 6)
         # the page sends at most 20 values a second, of all sliders together: the last
         until(lambda: page.session.run.pull.force[0] > 0.59)
-        press(sliders.nth(0), "ArrowLeft", 5)
-        until(lambda: page.session.frames[-1][1][0] > 0.06 and page.b.value < 85.5)
+        press(sliders.nth(0), "ArrowLeft", 2)
+        until(lambda: page.session.frames[-1][1][0] > 0.06 and page.b.value < 88.5)
         picture = tab.screenshot(path=tmp_path / "page.png")
         before = page.session.scenario.clay.x.values[1]
         number = tab.locator("input[type=text], input[type=number]").nth(0)
@@ -95,14 +95,14 @@ def test_page_loads_and_its_sliders_change_the_simulation(page, tmp_path, capfd)
     assert page.session.scenario.clay.x.values[1] == page.b.value == 0.0  # as far down as it goes
     assert capfd.readouterr().err == ""
     assert page.session.run.pull.force == pytest.approx((0.6, 0.0))
-    assert before == pytest.approx(85.0)
+    assert before == pytest.approx(88.0)
     assert page.session.frames[-1][1][0] > 0.06  # the force moved the handle into the clay
 
     import imageio.v3 as iio
 
     image = iio.imread(picture)[..., :3].astype(int)
     clay = (image[..., 0] - image[..., 2] > 60) & (image[..., 0] > image[..., 1])
-    assert clay[:, :600].sum() > 500  # clay and knob are in the picture
+    assert clay[:, :400].sum() > 500  # clay and knob are in the picture
     record = page.session.record()
     inside = (record.b[:, 0] > 0.0) & (abs(record.v[:, 0]) > 1e-3)
     assert record.ratio(record.fe)[inside, 0] == pytest.approx(record.b[inside, 0], rel=0.01)

@@ -35,7 +35,7 @@ def x_server(*args):
     """A screen of its own; its name."""
     reading, writing = os.pipe()
     x = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writing), "-screen", "0", "1280x800x24", "-noreset", *args],
+        ["Xvfb", "-displayfd", str(writing), "-screen", "0", "800x600x24", "-noreset", *args],
         pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     os.close(writing)
