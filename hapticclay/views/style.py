@@ -8,6 +8,7 @@ palette alone.
 from __future__ import annotations
 
 import contextlib
+import functools
 from collections.abc import Iterator, Sequence
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -331,15 +332,16 @@ def set_title(ax: Axes, *parts: str, panel: bool = False, **more: Any) -> None:
         panel: whether it distinguishes this panel from others of the figure.
         more: further arguments of `Axes.set_title`.
     """
-    from matplotlib.textpath import TextPath
+    from matplotlib import rcParams
 
     if _STYLE.get() != "screen" and not panel:
         return
     figure, size = ax.figure, points(TITLE_SIZE)
     room = 72.0 * (figure.get_figwidth() - stroke(TITLE_MARGIN))  # type: ignore[union-attr]
+    families = tuple(rcParams["font.family"])
 
     def fits(text: str) -> bool:
-        return TextPath((0.0, 0.0), text, size=size).get_extents().width <= room
+        return _width(text, size, families) <= room
 
     lines: list[str] = []
     for i, part in enumerate(parts):
@@ -355,6 +357,16 @@ def set_title(ax: Axes, *parts: str, panel: bool = False, **more: Any) -> None:
             else:
                 lines[-1] = longer
     ax.set_title("\n".join(lines), fontsize=size, loc="left", color=GREY, **more)
+
+
+@functools.lru_cache(maxsize=4096)  # the figures of a run share phrases
+def _width(text: str, size: float, families: tuple[str, ...]) -> float:
+    """Width of a text [pt], in the first of the font families that there is."""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import TextPath
+
+    font = FontProperties(family=list(families))
+    return TextPath((0.0, 0.0), text, size=size, prop=font).get_extents().width
 
 
 def add_legend(figure: Figure, ax: Axes | None, ncols: int = 5, **more: Any) -> None:

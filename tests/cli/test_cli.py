@@ -409,7 +409,7 @@ def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(
 ):
     monkeypatch.chdir(tmp_path)
     for name in ("constant", "variable"):
-        code, out, _ = run(capsys, "run", name, "--t-max", "0.1")
+        code, out, _ = run(capsys, "run", name, "--t-max", "0.1", "--no-plots")
         assert code == 0 and f"written to out/run/{name}\n" in out
     assert sorted(os.listdir("out/run")) == ["constant", "variable"]
     (tmp_path / "o").mkdir()

@@ -30,8 +30,9 @@ sys.exit(app.main())
 """
 
 
-@pytest.mark.parametrize("ignored", [False, True])  # Ctrl-C, as a shell's background jobs do
-@pytest.mark.parametrize("how", SIGNALS)
+@pytest.mark.parametrize(  # ignored: Ctrl-C, as a shell's background jobs do
+    "how, ignored", [(signal.SIGTERM, True), (signal.SIGHUP, False)]
+)
 def test_a_run_keeps_its_samples(tmp_path, how, ignored):
     ignore = (lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)) if ignored else None
     words = [sys.executable, "-c", WAIT, str(int(how)), *RUN, str(tmp_path)]

@@ -57,7 +57,7 @@ def test_an_answer_names_the_clay_exactly():
 
 def test_the_pd_law_follows_the_line_where_random_actions_do_not():
     found = {
-        name: baselines.returns("CutLine-v0", maker, range(3), engine="python")
+        name: baselines.returns("CutLine-v0", maker, range(2), engine="python")
         for name, maker in baselines.BASELINES["CutLine-v0"].items()
     }
     assert found["PD along the line"].info["is_success"].all()

@@ -120,12 +120,13 @@ def reading(K, n, rpm):
     """
     w = rpm * 2.0 * math.pi / 60.0
     r = np.linspace(0.0, 30.0, 200_001)  # log of the radius over that of the spindle
+    falls = np.exp(-2.0 * r)
 
     def speed(T):
-        return np.trapezoid((T * np.exp(-2.0 * r) / K) ** (1.0 / n), r)
+        return np.trapezoid((T * falls / K) ** (1.0 / n), r)
 
     low, high = 0.0, 1e6
-    for _ in range(100):
+    for _ in range(50):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if speed(middle) < w else (low, middle)
     return low / (2.0 * w)

@@ -87,7 +87,8 @@ def scene_of(*names):
         kw |= PARTS.get(name, {})
     if any(x.name in names for x in support.LAWS):
         kw["clay"] = clay_of(names)
-    return hc.Scenario(force=(1.0, 0.2), start=(0.019, 0.0), t_max=0.01, length=None, dt=1e-4, **kw)
+    kw |= dict(t_max=0.003, dt=1e-4, length=None)
+    return hc.Scenario(force=(1.0, 0.2), start=(0.019, 0.0), **kw)
 
 
 NAMES = [x.name for x in (*support.LAWS, *support.PARTS)]

@@ -1,5 +1,7 @@
 """The sampled loop: controller by matrix exponential, the arm exact between its samples."""
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
@@ -91,3 +93,17 @@ def hybrid(  # noqa: PLR0913  # a case, spelt out
             t, x = s.t[-1], s.y[:, -1]
         q, w = x[:2], x[2:]
     return np.array(P), np.array(V), np.array(T)
+
+
+class Samples(NamedTuple):
+    """Positions, velocities, and torques at some samples, (n, 2) each."""
+
+    p: np.ndarray
+    v: np.ndarray
+    tau: np.ndarray
+
+
+def in_slab(b, begin, end, every, case):
+    """As `hybrid` with b from begin to end, to be stored: the first sample, and each so many."""
+    found = hybrid(lambda x: b if begin <= x < end else 0.0, **case)
+    return Samples(*(x[::every] for x in found))

@@ -7,6 +7,7 @@ the numbers of a scenario's parts.
 """
 
 import bisect
+from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -268,6 +269,28 @@ def solve(scenario, times, uh=None, method="DOP853", rtol=1e-11, atol=1e-13):
         if scenario.length is not None and events[k].edge == scenario.length:
             break
     return passed, np.array(out)
+
+
+class Places(NamedTuple):
+    """Positions of a handle, (n, 2)."""
+
+    p: np.ndarray
+
+
+def positions(scenario, times, accuracy, numbers):  # noqa: ARG001
+    """As `solve`, to be stored; the numbers are all those of the scenario."""
+    return Places(solve(scenario, times, **accuracy)[1])
+
+
+class Passed(NamedTuple):
+    """Times of a handle at borders."""
+
+    t: np.ndarray
+
+
+def passed(scenario, axis, edges, values, numbers):  # noqa: ARG001
+    """As `forward`, to be stored; the numbers are all those of the scenario."""
+    return Passed(np.array(forward(scenario, axis, edges, values, 60.0, scan=5e-3)[0]))
 
 
 def _hit(loop, axis, edge, way):

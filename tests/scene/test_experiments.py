@@ -1,6 +1,7 @@
 """The experiments beside exact solutions: variable cut (Figs. 9, 10), stability test (Fig. 11)."""
 
 import dataclasses
+import functools
 import inspect
 import pickle
 
@@ -13,6 +14,12 @@ from hapticclay.scene import experiments
 from tests.oracles import Linear, piecewise_linear
 
 F = np.sqrt(0.5)  # 1 N at 45 degrees, on each axis
+
+
+@functools.cache
+def without_growth(shaping):
+    """The variable cut in clay that does not grow."""
+    return hc.simulate(hc.variable_cut("none", inertia_shaping=shaping))
 
 
 def crossings(r, axis):
@@ -31,7 +38,7 @@ def test_variable_cut_without_growth(axis, K, time, before, after):
     assert exact[0] == pytest.approx(time, abs=5e-6)  # half the last digit
     name = "xy"[axis]
     for shaping in (True, False):
-        r = hc.simulate(hc.variable_cut("none", inertia_shaping=shaping))
+        r = without_growth(shaping)
         assert r.outcome.code == "finished"
         c = crossings(r, name)[0]
         # without shaping the axes couple through Lambda(q): both numbers within 0.1 %
@@ -44,7 +51,7 @@ def test_variable_cut_without_growth(axis, K, time, before, after):
 
 
 def test_each_axis_changes_by_its_own_coordinate():
-    r = hc.simulate(hc.variable_cut("none"))
+    r = without_growth(False)
     for i in (0, 1):
         inside = r.p[:, i] > 0.05 + 1e-9
         assert np.all(r.b[inside, i] == 100.0)

@@ -24,6 +24,7 @@ from hapticclay.scene.changes import named_values, nested, with_fields
 from hapticclay.scene.experiments import EXPERIMENTS, parameter_unit
 from hapticclay.scene.given_values import make_part
 from hapticclay.scene.plain_data import plain_data
+from tests.hunt import examples
 
 
 def floats(low, high):
@@ -126,6 +127,7 @@ def folder(tmp_path_factory):
 
 
 @pytest.mark.parametrize("end", [".toml", ".json"])
+@examples(15)
 @given(scenario=scenarios())
 def test_a_saved_scenario_comes_back_to_the_last_bit(folder, end, scenario):
     file = scenario.save(folder / f"s{end}")
@@ -367,6 +369,7 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
     assert file.read_text() == before and os.listdir(tmp_path) == ["s.toml"]
 
 
+@examples(15)
 @given(scenarios(), st.data())
 def test_any_number_of_any_part_is_changed_by_name(scenario, data):
     """The same change made with dataclasses.replace, part by part, is the oracle."""

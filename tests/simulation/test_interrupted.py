@@ -1,6 +1,7 @@
 """A run that is told to end keeps what was run: the first part of what the whole run gives."""
 
 import dataclasses
+import functools
 
 import numpy as np
 import pytest
@@ -9,38 +10,44 @@ import hapticclay as hc
 from hapticclay.simulation import record
 
 HARDWARE = dataclasses.replace(
-    hc.constant_cut(control="sampled", t_max=3.5),
+    hc.constant_cut(control="sampled", t_max=1.7),
     hardware=hc.Hardware(jitter=2e-5, delay=1e-4, friction=(0.01, 0.01)),
 )
-CUT = hc.constant_cut(t_max=3.5)  # some steps longer than two looks
-SCENES = {  # name: scenario, engine, every
-    "fast": (CUT, "python", 1),
-    "fast, some samples": (CUT, "python", 7),
-    "driven": (hc.stability_test(3.0, t_max=3.5), "python", 1),
-    "growing": (hc.variable_cut(t_max=3.5), "python", 1),
-    "native": (CUT, "native", 1),
-    "native, some samples": (CUT, "native", 7),
-    "accurate": (hc.constant_cut(integrator="accurate", dt=1e-3, t_max=9.5), "python", 1),
-    "accurate, native": (hc.constant_cut(integrator="accurate", t_max=9.5), "native", 3),
-    "sampled": (hc.constant_cut(control="sampled", t_max=3.5), "python", 1),
-    "hardware": (HARDWARE, "python", 1),
+CUT = hc.constant_cut(t_max=3.5)  # some steps longer than two looks; others than one
+SCENES = {  # name: scenario, engine, every, looks
+    "fast": (CUT, "python", 1, 2),
+    "fast, some samples": (CUT, "python", 7, 1),
+    "driven": (hc.stability_test(3.0, t_max=1.7), "python", 1, 1),
+    "growing": (hc.variable_cut(t_max=1.7), "python", 1, 1),
+    "native": (CUT, "native", 1, 2),
+    "native, some samples": (CUT, "native", 7, 2),
+    "accurate": (hc.constant_cut(integrator="accurate", dt=1e-3, t_max=4.6), "python", 1, 1),
+    "accurate, native": (hc.constant_cut(integrator="accurate", t_max=9.5), "native", 3, 2),
+    "sampled": (hc.constant_cut(control="sampled", t_max=1.7), "python", 1, 1),
+    "hardware": (HARDWARE, "python", 1, 1),
 }
+
+
+@functools.cache
+def whole_run(scenario, engine):
+    """The run that nothing ends before its time."""
+    return hc.simulate(scenario, engine=engine)
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_an_interrupted_record_is_the_beginning_of_the_whole_one(name):
-    scenario, engine, every = SCENES[name]
+    scenario, engine, every, most = SCENES[name]
     if engine == "native":
         pytest.importorskip("numba")
     looks = []
 
     def enough(t, x):
         looks.append(t)
-        return len(looks) == 2
+        return len(looks) == most
 
     r = hc.simulate(scenario, engine=engine, every=every, progress=enough)
-    whole = hc.simulate(scenario, engine=engine)
-    assert len(looks) == 2 and r.outcome.code == "interrupted" and not r.outcome.advice
+    whole = whole_run(scenario, engine)
+    assert len(looks) == most and r.outcome.code == "interrupted" and not r.outcome.advice
     step = r.outcome.step
     assert 1000 < step < len(whole.t) - 1 and r.outcome.time == r.t[-1] == whole.t[step]
     index = sorted({*range(0, step, every), step})  # each every-th, and the last

@@ -5,11 +5,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
+from tests.hunt import examples
 from tests.oracles import Linear, nonlinear, piecewise_linear, store
 
 EDGES = (0.05, 0.15, 0.20)
@@ -103,7 +104,7 @@ stable_cut = {
 }
 
 
-@settings(max_examples=25)
+@examples(10)
 @given(**stable_cut, hand=st.booleans())
 def test_any_stable_shaped_cut(b, K, f, hand):
     th = TH if hand else (0, 0, 0)
@@ -140,7 +141,7 @@ def test_any_stable_shaped_cut(b, K, f, hand):
     np.testing.assert_allclose(r.p[: n - 1, 0], position(r.t[: n - 1]), atol=3e-6 * scale)
 
 
-@settings(max_examples=5)
+@examples(3)
 @given(**stable_cut)
 def test_any_stable_cut_without_shaping(b, K, f):
     assume(K < 0.6 * min(hc.theory.gain_limit("x", b), 3.0))
@@ -164,7 +165,7 @@ def test_clay_force_and_speeds_of_the_default_cut():
 
 
 @given(b=st.floats(1, 500), K=st.floats(0.2, 1.0), f=st.floats(0.5, 2.0))
-@settings(max_examples=15)
+@examples(8)
 def test_steady_speed_law(b, K, f):
     assume(K < 0.5 * hc.theory.gain_limit("x", b))
     r = hc.simulate(
@@ -329,7 +330,7 @@ def test_speed_is_a_small_multiple_of_the_bare_engine():
 @pytest.mark.parametrize("engine", ["python", "auto"])
 def test_runs_within_and_beside_a_run_leave_it_as_it_is(engine):
     """Runs share engines one after the other, never at the same time."""
-    s = hc.constant_cut(t_max=3.0)
+    s = hc.constant_cut(t_max=1.6)  # one look at its progress
     alone = hc.simulate(s, engine=engine)
     inner = []
 
@@ -338,7 +339,7 @@ def test_runs_within_and_beside_a_run_leave_it_as_it_is(engine):
 
     outer = hc.simulate(s, engine=engine, progress=progress)
     with ThreadPoolExecutor(3) as pool:
-        beside = list(pool.map(lambda _: hc.simulate(s, engine=engine), range(6)))
+        beside = list(pool.map(lambda _: hc.simulate(s, engine=engine), range(4)))
     for r in (outer, *beside):
         np.testing.assert_array_equal(r.p, alone.p)
         assert r.energy == alone.energy and r.crossings == alone.crossings

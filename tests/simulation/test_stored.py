@@ -46,12 +46,12 @@ def member(shape, dtype=float, size=None):
 
 
 def test_arrays_that_inflate_are_refused_by_their_headers(saved, tmp_path, monkeypatch):
-    """16 MB of zeros in some kilobytes: their size is read, and they are not."""
-    n = 1_000_000
+    """4.8 MB of zeros in some kilobytes: their size is read, and they are not."""
+    n = 300_000
     big = {name: np.zeros((n, 2)) for name in ARRAYS if name != "t"}
     folder = changed(saved, tmp_path, t=np.arange(n) * 1e-9, **big)
     assert (folder / "record.npz").stat().st_size < 9 * n
-    monkeypatch.setattr(stored, "memory_left", lambda: 2e8)
+    monkeypatch.setattr(stored, "memory_left", lambda: 6e7)
     read = []
     monkeypatch.setattr(np.lib.format, "read_array", lambda *a, **k: read.append(a))
     with pytest.raises(ParameterError, match="GB of memory, more than are left"):

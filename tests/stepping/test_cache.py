@@ -61,8 +61,10 @@ def test_damaged_machine_code_is_compiled_again(damage, tmp_path):
     (file,) = tmp_path.iterdir()
     file.write_bytes(DAMAGE[damage](file.read_bytes()))
     (tmp_path / f"1234{machine_code.MARK}").touch()
-    again = fresh(tmp_path)
-    assert again(14) == 2.0 and hits(again) == 0
+    again, told = fresh(tmp_path), []
+    before = cache.on_miss.set(lambda: told.append(1))
+    assert again(14) == 2.0 and hits(again) == 0 and told == [1]
+    cache.on_miss.reset(before)
     assert list(tmp_path.iterdir()) == [file]  # the mark promised what was not there
     third = fresh(tmp_path)
     assert third(14) == 2.0 and hits(third) == 1

@@ -6,6 +6,7 @@ scenes of it that differ in numbers, which cost next to nothing. `present` finds
 """
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -19,9 +20,9 @@ from hapticclay.simulation import record
 from hapticclay.stepping.machine_code import kind_of
 from hapticclay.stepping.run import EngineStore, Run, completed
 from hapticclay.stepping.scene import parts_of
-from tests.oracles import paper_law
 from tests.stepping.test_compiled import GROWING, LAYERS, WAVE, fast
 from tests.stepping.test_kick import HANDS, OTHER, ZEROS
+from tests.stepping.test_own_controller import to_pose
 from tests.stepping.test_signals_in_runs import CASES as SIGNALS
 
 PHYSICAL = dict(
@@ -41,8 +42,8 @@ METHODS = {
 
 
 def run(method, clay, **more):
-    """A slanted path of 0.3 s through clay."""
-    kw = dict(t_max=0.3, force=(2.0, 0.7), length=None, stop_when_unstable=False) | METHODS[method]
+    """A slanted path of 0.15 s through clay."""
+    kw = dict(t_max=0.15, force=(2.0, 0.7), length=None, stop_when_unstable=False) | METHODS[method]
     hardware = more.pop("hardware", None)
     more["hardware"] = hc.Hardware(**hardware) if hardware else None
     return dataclasses.replace(hc.free(), clay=clay, **(kw | more))
@@ -57,8 +58,8 @@ def variants(method, clay, common, **changes):
 
 def signals(method, clay, **common):
     """Driven by each signal, both ways."""
-    dt = {} if "Ts" in common else dict(dt=1e-3)
-    common = dict(force=(0.0, 0.0), t_max=0.75) | dt | common
+    dt = {} if "Ts" in common else dict(dt=2e-3)
+    common = dict(force=(0.0, 0.0), t_max=0.66) | dt | common
     return {
         name: run(method, clay, muscle=2.0 * signal, command=1e-4 * signal, **common)
         for name, (signal, *_) in SIGNALS.items()
@@ -98,18 +99,17 @@ def yields(Fy, K, n, b, along=False, angle=0.0):
 COULOMB, BINGHAM = (0.5, 0.0, 1.0, 0.0), (0.6, 0.0, 1.0, 20.0)
 THINS, THICKENS, HELD = (0.5, 2.0, 0.4, 10.0), (0.3, 30.0, 1.5, 2.0), (6.0, 0.0, 1.0, 0.0)
 FLOWS = dict(coulomb=COULOMB, bingham=BINGHAM, thins=THINS, thickens=THICKENS, holds=HELD)
-PULSE = hc.Step((2.0, 0.5), 0.0) + hc.Step((-3.5, -0.9), 0.1) + hc.Ramp((9.0, 4.0), 0.2, 0.3)
+PULSE = hc.Step((2.0, 0.5), 0.0) + hc.Step((-4.5, -0.9), 0.04) + hc.Ramp((40.0, 15.0), 0.09, 0.14)
 
 
 def flows(method, along=False, angles=(0.0,), b=1.0, **common):
     """A handle pushed to rest and on again in clay of each law."""
-    common = dict(operator=HAND, muscle=PULSE, force=(1.0, 0.2)) | common
+    common = dict(operator=HAND, muscle=PULSE, force=(1.0, 0.2), start=(0.002, 0.0)) | common
     return {
         f"{name}, {angle:g}": run(
             method, yields(*law[:3], b * (law[3] or 1.0), along, angle), **common
         )
-        for name, law in FLOWS.items()
-        for angle in angles
+        for (name, law), angle in zip(FLOWS.items(), itertools.cycle(angles), strict=False)
     } | {"weak": run(method, yields(*BINGHAM[:3], b * 20.0, along, angles[0]), **common, **WEAK)}
 
 
@@ -134,18 +134,15 @@ def grooves(method, damping=0.0, **common):
     law = Profile((0.005, 0.02), (0.0, 40.0, 10.0))
     hard = dataclasses.replace(BLOCK, gradient=1e6, damping=damping)
     block = dataclasses.replace(BLOCK, damping=damping)
-    common = dict(force=(3.0, 1.0)) | common
+    common = dict(force=(3.0, 1.0), start=(0.003, 0.0), t_max=0.1) | common
     return variants(
         method, Clay(law, law, angle=0.3, groove=block), common,
         cut={}, hard=dict(clay=Clay(law, law, angle=0.3, groove=hard)), weak=WEAK,
-        steep=dict(force=(0.5, 3.0), length=0.004),
+        steep=dict(force=(0.5, 3.0), length=0.004, start=(0.0037, 0.0)),
     )  # fmt: skip
 
 
-def own(gain=(1.0, 0.2), Ts=TS):
-    """The paper's controller as a law of one's own."""
-    params = [0.01, 0.02, 90.0, *paper_law.memory(gain, Ts)]
-    return hc.Controller(paper_law.paper, [0.0] * 8, params)
+OWN = hc.Controller(to_pose, (0.0, 0.0), (20.0, 2.0, 0.01))
 
 
 FORMED = dict(compensator=ZEROS, operator=HANDS, **OTHER)
@@ -156,11 +153,12 @@ KINDS = {
     "fast: signals, growth": signals("fast", GROWS, inertia_shaping=True, operator=HAND)
     | variants(
         "fast", GROWS, dict(inertia_shaping=True, operator=HAND, muscle=WAVE, command=LED),
-        weak=WEAK, unstable=dict(gain=(25.0, 0.5), t_max=1.0), growing=dict(clay=GROWING),
+        weak=WEAK, unstable=dict(gain=(25.0, 0.5), t_max=1.0, dt=1e-3), growing=dict(clay=GROWING),
     ),
     "fast: form, stiff": variants(
         "fast", STIFF, dict(compensator=ZEROS, inertia_shaping=True, **OTHER),
-        strong=dict(torque_limit=(1e5, 1e5)), weak=WEAK, soft=dict(clay=SOFT),
+        strong=dict(torque_limit=(1e5, 1e5)), weak=WEAK | dict(t_max=0.06),
+        soft=dict(clay=SOFT, t_max=0.09),
         coarse=dict(dt=5e-3, t_max=1.0),
     ),
     "fast: cells, smooth, rotated": variants(
@@ -169,7 +167,7 @@ KINDS = {
     ),
     "fast: yield by axis": flows("fast", angles=(0.5, -1.0), inertia_shaping=True),
     "fast: yield along the motion": flows("fast", True, b=1e4, operator=None, command=LED),
-    "fast: springs": springs(method="fast", operator=HAND, force=(4.0, 1.0)),
+    "fast: springs": springs(method="fast", operator=HAND, force=(4.0, 1.0), t_max=0.24),
     "fast: groove": grooves("fast", **SHAKEN, inertia_shaping=True, damping=1e5),
     "accurate: signals, growth": signals("accurate", GROWS, inertia_shaping=True, operator=HAND)
     | variants(
@@ -179,15 +177,20 @@ KINDS = {
     "accurate: form, cells, smooth, rotated": variants(
         "accurate", TURNED, dict(FORMED), turned={}, otherwise=dict(clay=OTHERWISE), weak=WEAK,
     ),
-    "accurate: yield by axis": flows("accurate", operator=None),
-    "accurate: yield by axis, rotated": flows("accurate", angles=(0.5, -1.0), inertia_shaping=True),
-    "accurate: yield along the motion": flows("accurate", True, compensator=ZEROS),
+    "accurate: yield by axis": flows("accurate", operator=None, t_max=0.12),
+    "accurate: yield by axis, rotated": flows(
+        "accurate", angles=(0.5, -1.0), inertia_shaping=True, t_max=0.12
+    ),
+    "accurate: yield along the motion": flows(
+        "accurate", True, compensator=ZEROS,
+        muscle=hc.Step((2.0, 0.5), 0.0) + hc.Step((-3.0, -0.9), 0.04),
+    ),
     "held: plain": variants(
         "held", LAYERS, {}, plain={}, steps=dict(dt=1e-4, Ts=4e-4), odd=dict(t_max=0.1001),
-        weak=WEAK, unstable=dict(clay=hc.slab(8e3, 0.003, 0.1), gain=(1.0, 0.1), t_max=1.0),
+        weak=WEAK, unstable=dict(clay=hc.slab(8e3, 0.003, 0.1), gain=(1.0, 0.1), t_max=0.5),
     ),
     "held: all hardware, signals": signals(
-        "held", GROWS, inertia_shaping=True, operator=HAND, hardware=ALL, dt=7.2e-4, Ts=1.44e-3
+        "held", GROWS, inertia_shaping=True, operator=HAND, hardware=ALL, dt=2.88e-3, Ts=2.88e-3
     )
     | variants(
         "held", GROWS,
@@ -202,13 +205,13 @@ KINDS = {
         turned={}, otherwise=dict(clay=OTHERWISE), steps=dict(dt=1e-4, Ts=4e-4),
     ),
     "held: yield by axis, springs": springs(
-        method="held", operator=HAND, dt=1e-4, Ts=5e-4,
+        method="held", operator=HAND, dt=2.5e-4, Ts=5e-4,
         hardware=dict(encoder=4096, friction=(0.02, 0.01)),
     ),
-    "held: yield along the motion": flows("held", True, hardware=ALL),
+    "held: yield along the motion": flows("held", True, hardware=ALL, t_max=0.1),
     "held: groove": grooves("held"),
     "held: own controller": variants(
-        "held", LAYERS, dict(controller=own(), hardware=PHYSICAL, operator=HAND, muscle=WAVE),
+        "held", LAYERS, dict(controller=OWN, hardware=PHYSICAL, operator=HAND, muscle=WAVE),
         own={}, weak=WEAK,
     ),
     "physical: growth, signals": variants(
@@ -221,9 +224,11 @@ KINDS = {
     ),
     # with hardware these would take minutes to compile
     "physical: yield by axis, springs": springs(
-        method="physical", dt=2e-5, Ts=2e-4, t_max=0.05, velocity=(0.1, 0.0)
+        method="physical", dt=4e-5, Ts=2e-4, t_max=0.04, velocity=(0.1, 0.0)
     ),
-    "physical: yield along the motion": flows("physical", True, hardware=dict(delay=3e-4)),
+    "physical: yield along the motion": flows(
+        "physical", True, hardware=dict(delay=3e-4), t_max=0.12
+    ),
     "physical: cells, smooth, rotated": variants(
         "physical", TURNED, dict(hardware=dict(delay=2e-4), force=(4.0, 1.0)),
         turned={}, otherwise=dict(clay=OTHERWISE), weak=WEAK,
@@ -232,9 +237,11 @@ KINDS = {
         "physical", damping=2e5, hardware=dict(delay=2e-4, encoder=8192), force=(2.5, 0.5)
     ),
     "physical: own controller": variants(
-        "physical", LAYERS, dict(controller=own(), operator=HAND), own={}, weak=WEAK,
+        "physical", LAYERS, dict(controller=OWN, operator=HAND), own={}, weak=WEAK,
     ),
 }  # fmt: skip
+HOLDS = [x for x in KINDS if "yield" in x and x[:4] in ("fast", "accu")]
+HOLDS += "fast: springs", "physical: yield along the motion"
 WHOLE = (  # of these, steps that may cross borders are compiled as well
     "fast: yield by axis",
     "accurate: form, cells, smooth, rotated",
@@ -253,6 +260,14 @@ def same(a, b, what):
         assert getattr(a, name) == getattr(b, name), (what, name)
 
 
+def eventful(kind, records):
+    """Of each run that it passes a border; that weak motors reach their limits, that clay holds."""
+    for name, r in records.items():
+        assert r.crossings or name == "growing", name
+        assert name != "weak" or np.any(np.abs(r.tau) >= r.scenario.torque_limit)
+    assert kind not in HOLDS or any(r.stops for r in records.values())
+
+
 def plain_end(brief):
     """How a run ended, as plain numbers."""
     outcome, *counts, last, energy = brief
@@ -268,6 +283,7 @@ def test_all_engines_make_the_same_run(kind, monkeypatch):
     assert len({kind_of(parts_of(s)) for s in scenes.values()}) == 1
     monkeypatch.setattr(compiled, "enough", lambda kind: np.inf)  # whole steps alone
     plain = [hc.simulate(s, engine="python") for s in scenes.values()]
+    eventful(kind, dict(zip(scenes, plain, strict=True)))
     native = [hc.simulate(s, engine="native") for s in scenes.values()]
     batch = hc.simulate_batch(scenes.values(), threads=2)
     for name, *runs in zip(scenes, plain, native, batch, strict=True):

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model import groove
+from tests.hunt import some
 from tests.oracles.raster import raster
 
 FIELDS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta", "ground")
@@ -75,7 +76,8 @@ def test_a_straight_cut_presses_with_its_cross_section(angle):
     for n, limit in most.items():
         block = dataclasses.replace(BLOCK, y=(-0.05, 0.05), cells=(10 * n, 10 * n))
         tool, errors = Cutter(block), []
-        for way in np.arange(-0.012, 0.012, 0.13 * WIDTH / n):
+        begin = np.arange(-1.1 * RADIUS, 0.0, 0.5 * WIDTH / n)
+        for way in (*begin, *np.arange(0.0, 0.008, 0.13 * WIDTH / n)):
             tool.put(0.02 + way * c, way * s)
             if way > 0.0:
                 errors.append(tool.force(c, s) / block.hardest - 1.0)
@@ -101,7 +103,7 @@ def test_the_volume_is_that_of_the_disc_on_its_path():
 def test_a_cut_beside_meets_what_is_left(offset):
     """Of a groove as wide as the tool, the part beyond its edge: offset over width."""
     tool = Cutter(dataclasses.replace(BLOCK, cells=(240, 144)))
-    for x in np.arange(-0.01, 0.06, 1.3e-4):
+    for x in np.arange(-0.01, 0.06, 4e-4):
         tool.put(x, 0.0)
     tool.whole = 1
     places = np.arange(0.01, 0.05, 1.3e-4)
@@ -137,7 +139,7 @@ def test_what_was_cut_stays_cut():
     assert r.extra["removed"][-1] == pytest.approx(exact, rel=2e-3)  # of cells and raster
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", some(range(3), 2))
 def test_the_removed_volume_is_that_of_the_oracle(seed):
     """Of a random path that crosses itself."""
     rng = np.random.default_rng(seed)
@@ -196,12 +198,13 @@ def test_the_work_is_that_of_the_volume():
 
 def test_sampled_control_tends_to_the_continuous():
     """Of first order in the sample; what is removed, too, whoever renders the clay."""
-    first = hc.simulate(grooved(BLOCK, force=(2.5, 0.5), t_max=0.3, dt=1e-4))
+    more = dict(force=(2.5, 0.5), t_max=0.1)
+    first = hc.simulate(grooved(BLOCK, dt=1e-4, **more))
+    assert first.p[-1, 0] > 2e-3
     for render in ("held", "physical"):
         errors = []
         for dt in (4e-4, 1e-4):
-            s = grooved(BLOCK, force=(2.5, 0.5), t_max=0.3, dt=dt, control="sampled", render=render)
-            r = hc.simulate(s)
+            r = hc.simulate(grooved(BLOCK, dt=dt, control="sampled", render=render, **more))
             errors.append(np.abs(r.p[-1] - first.p[-1]).max())
             total = math.fsum([r.extra["removed"][-1], BLOCK.volume(r.ground)])
             assert abs(total - BLOCK.volume()) <= 1e-15 * BLOCK.volume()
@@ -214,7 +217,8 @@ def test_it_holds_the_tool_below_its_strength(angle, control):
     """Not a bit of motion below, from rest in fresh clay; and motion above."""
     for share, moves in ((0.99, False), (1.01, True)):
         force = share * BLOCK.hardest * math.cos(angle), share * BLOCK.hardest * math.sin(angle)
-        r = hc.simulate(grooved(BLOCK, force=force, t_max=0.2, length=None, **control))
+        t_max = 0.12 if moves else 0.05
+        r = hc.simulate(grooved(BLOCK, force=force, t_max=t_max, length=None, **control))
         assert (np.ptp(r.p, axis=0).max() > 1e-5) == moves
         if not moves:
             assert np.ptp(r.p) == np.ptp(r.p[0]) and (r.v == 0.0).all()
@@ -225,12 +229,12 @@ def test_it_holds_the_tool_below_its_strength(angle, control):
 
 def test_it_lets_the_tool_go_back():
     """Pushed into the clay and held there, it is free to leave by its groove."""
-    pulse = hc.Samples((0.0, 0.3, 0.31, 1.0), ((1.5, 0), (1.5, 0), (-0.3, 0), (-0.3, 0)))
+    pulse = hc.Samples((0.0, 0.2, 0.21, 0.7), ((1.5, 0), (1.5, 0), (-0.3, 0), (-0.3, 0)))
     r = hc.simulate(
-        grooved(BLOCK, force=(0, 0), muscle=pulse, length=None, inertia_shaping=True, t_max=1.0)
+        grooved(BLOCK, force=(0, 0), muscle=pulse, length=None, inertia_shaping=True, t_max=0.7)
     )
     far = r.p[:, 0].max()
-    back = (r.t > 0.5) & (r.p[:, 0] > 1e-3) & (r.p[:, 0] < far - 1e-3)
+    back = (r.t > 0.35) & (r.p[:, 0] > 1e-3) & (r.p[:, 0] < far - 1e-3)
     assert far > 5e-3 and back.any() and np.abs(r.fe[back]).max() < 0.01
 
 
@@ -292,7 +296,7 @@ VARIANTS = {
 
 def variant(name):
     block, more = VARIANTS[name]
-    s = grooved(block, **{"t_max": 0.5, **more})
+    s = grooved(block, **{"t_max": 0.12, **more})
     if name == "layers":
         law = hc.Profile((0.005, 0.02), (0.0, 40.0, 10.0))
         s = dataclasses.replace(s, clay=hc.Clay(law, law, angle=0.3, groove=block))
@@ -302,6 +306,7 @@ def variant(name):
 @pytest.mark.parametrize("name", VARIANTS)
 def test_it_never_gives_energy(name):
     r = hc.simulate(variant(name))
+    assert np.ptp(r.extra["removed"]) > 0.0
     assert (np.einsum("ij,ij->i", r.fe, r.v) >= 0.0).all()
     assert r.energy["clay"] > 0.0 or name == "held"  # the work of held clay is the motors'
     # a hand is no part of the balance of a kick but for its order

@@ -1,6 +1,7 @@
 """A sampled controller of the user's own: the paper's as one, others, and what goes wrong."""
 
 import functools
+import itertools
 import math
 import pickle
 import sys
@@ -14,6 +15,7 @@ from hapticclay.cli.app import main
 from hapticclay.errors import ParameterError
 from hapticclay.model.sampled_controller import LawCaller, LawFailed
 from hapticclay.stepping import scene
+from tests.hunt import some
 from tests.oracles import paper_law
 
 ARRAYS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau")
@@ -69,7 +71,7 @@ POSE = hc.Scenario(
     start=(0.05, 0.02),
     force=(0.5, 0.0),
     length=None,
-    t_max=8.0,
+    t_max=6.0,
     Ts=7.2e-4,
 )
 
@@ -282,12 +284,12 @@ def idle(t, q, qd, fh, state, params):
     return (0.0, 0.0), state
 
 
-@pytest.mark.parametrize("when", [0.0, 0.05])
-@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit, GeneratorExit])
-@pytest.mark.parametrize(
-    "parts", [None, hc.Hardware(delay=2e-3, dropout_probability=0.2)], ids=["bare", "late"]
-)
-@pytest.mark.parametrize("engine", ["python", "native"])
+LATE = hc.Hardware(delay=2e-3, dropout_probability=0.2)
+ERRORS = KeyboardInterrupt, SystemExit, GeneratorExit
+ENDS = itertools.product(("python", "native"), (None, LATE), ERRORS, (0.0, 0.05))
+
+
+@pytest.mark.parametrize("engine,parts,error,when", some(ENDS, 10))  # these have all pairs
 def test_what_a_law_raises_ends_the_run_and_is_raised(engine, parts, error, when):
     asked, raised = [], error("as asked")
 

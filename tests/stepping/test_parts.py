@@ -19,10 +19,11 @@ from hapticclay.model.cells import Profile
 from hapticclay.model.clay import Clay
 from hapticclay.model.signals import Multisine
 from hapticclay.studies import boundary, growth
-from tests.oracles import parts
+from tests.hunt import some
+from tests.oracles import parts, store
 from tests.stepping.test_compiled import fast, same
 
-SETS = 16
+SEEDS = some(np.arange(16).reshape(-1, 4), 2)  # orders 1 to 4 of C; first x, then y, twice
 TS = 3.6e-4
 FREE = dict(length=None, torque_limit=(1e5, 1e5))
 
@@ -128,13 +129,19 @@ def order_of(steps, errors):
     return np.polyfit(np.log(steps), np.log(errors), 1)[0]
 
 
+def solved(name, s, times, **accuracy):
+    """Positions at times by SciPy, from the disk."""
+    numbers = dataclasses.asdict(s)  # the repr of a scene leaves some out
+    return store.solution(f"parts-{name}", parts.positions, s, times, accuracy, numbers).p
+
+
 def at(r, times):
     """Positions of a record at samples."""
     return r.p[np.searchsorted(r.t, times - 1e-9)]
 
 
 @fast
-@pytest.mark.parametrize("seeds", np.arange(SETS).reshape(-1, 4), ids=lambda x: f"{x[0]}-{x[-1]}")
+@pytest.mark.parametrize("seeds", SEEDS, ids=lambda x: f"{x[0]}-{x[-1]}")
 def test_shaped_borders_to_1e_7_s_of_the_matrix_exponential(seeds):
     """The error is (h/tau)^2/12 of some 0.05 s, tau the times of servo and C, 10 ms and more.
 
@@ -143,7 +150,9 @@ def test_shaped_borders_to_1e_7_s_of_the_matrix_exponential(seeds):
     """
     for seed in seeds:
         s, (axis, b, edges) = passage(int(seed))
-        exact, _ = parts.forward(s, axis, edges, b, 60.0, scan=5e-3)
+        numbers = dataclasses.asdict(s)
+        case = parts.passed, s, axis, edges, b, numbers
+        exact = store.solution(f"parts-passage-{seed}", *case).t
         assert len(exact) == 3
         s = dataclasses.replace(s, t_max=exact[-1] + 0.01)
         found = border_times([dataclasses.replace(s, dt=k * TS) for k in (1, 4)], axis, 3)
@@ -159,7 +168,7 @@ def both_ways(seed, **kw):
 
 
 @fast
-@pytest.mark.parametrize("seeds", np.arange(SETS).reshape(-1, 4), ids=lambda x: f"{x[0]}-{x[-1]}")
+@pytest.mark.parametrize("seeds", SEEDS, ids=lambda x: f"{x[0]}-{x[-1]}")
 def test_unshaped_runs_are_those_of_scipy(seeds):
     """Within 5e-7 m at 0.36 ms, 1e-7 m at 1.44 ms by the accurate method; both fall with the step.
 
@@ -168,7 +177,7 @@ def test_unshaped_runs_are_those_of_scipy(seeds):
     times = np.arange(1, 26) * 0.0288
     for seed in seeds:
         s = both_ways(int(seed))
-        _, exact = parts.solve(s, times)
+        exact = solved(f"both-ways-{seed}", s, times)
         cases = ("fast", 1), ("fast", 4), ("accurate", 4), ("accurate", 1)
         runs = [dataclasses.replace(s, integrator=x, dt=k * TS) for x, k in cases]
         fine, coarse, accurate, most = (
@@ -208,7 +217,7 @@ def test_fitted_order_of_both_methods(name):
     s = dataclasses.replace(both_ways(0), clay=clay, **own)
     s = dataclasses.replace(s, gain=tuple(half_of_limit(s, axis, b) for axis in "xy"))
     times = np.arange(1, 26) * 0.0288
-    _, exact = parts.solve(s, times, rtol=1e-12, atol=1e-15)
+    exact = solved(f"order-{name}", s, times, rtol=1e-12, atol=1e-15)
     for method, factors, order, within in (
         ("fast", (0.5, 1, 2, 4, 8), 2.0, 0.2), ("accurate", (1, 2, 4), 4.0, 0.3)
     ):  # fmt: skip
@@ -401,12 +410,17 @@ def _pushed(A, B, s):
     return A
 
 
+BORNE = "order 1, biproper", "order 2, biproper", "order 3", "order 4, biproper"
+
+
 @fast
 @pytest.mark.parametrize("limit", [(1e6, 1e6), (0.5, 0.3)], ids=["strong", "weak"])
-@pytest.mark.parametrize("b", [1e3, 1e5, 1e6, 1e8])
-def test_stiff_clay_is_borne_whatever_the_compensator(b, limit):
+@pytest.mark.parametrize("b,turn", [(1e3, 0), (1e5, 3), (1e6, 1), (1e8, 2)], ids=str)
+def test_stiff_clay_is_borne_whatever_the_compensator(b, turn, limit):
     """Run into at 0.1 m/s: finite, in balance but for roundings, fe = b v, the same both ways."""
-    for name in ("order 1, biproper", "order 2, biproper", "order 3", "order 4, biproper"):
+    # weak motors at their limits are dear: two compensators in each clay, each in two clays
+    names = BORNE if limit[0] > 1.0 else some(BORNE[turn:] + BORNE[:turn], 2)
+    for name in names:
         c = OWN[name]
         s = dataclasses.replace(
             hc.constant_cut(
@@ -444,7 +458,8 @@ def test_accurate_method_divides_its_steps_where_parts_are_fast(kw):
     s = hc.constant_cut(gain=(0.3, 0.05), force=(1.0, 0.0), clay=(0.002, 0.2), t_max=0.5, dt=4e-3)
     s = dataclasses.replace(s, torque_limit=(1e6, 1e6), **kw)
     times = np.arange(1, 20) * 0.024
-    _, exact = parts.solve(s, times, method="Radau", rtol=1e-10, atol=1e-14)
+    name = f"divided-{len(s.compensators[0].num)}"
+    exact = solved(name, s, times, method="Radau", rtol=1e-10, atol=1e-14)
     r = hc.simulate(dataclasses.replace(s, integrator="accurate"))
     assert r.outcome.code == "time limit"
     np.testing.assert_allclose(at(r, times), exact, atol=1e-7)
@@ -463,7 +478,7 @@ def test_torque_limits_with_another_arm():
         origin=(0.3, 0.25),
     )
     times = np.arange(1, 26) * 0.0288
-    _, exact = parts.solve(s, times, rtol=1e-10, atol=1e-13)
+    exact = solved("limits", s, times, rtol=1e-10, atol=1e-13)
     for change, within in (dict(), 4e-5), (dict(integrator="accurate", dt=TS / 2), 1e-7):
         r = hc.simulate(dataclasses.replace(s, **change))
         used = np.abs(r.tau) >= np.array(s.torque_limit)
@@ -531,7 +546,7 @@ def loops(n):
 @fast
 def test_boundary_by_runs_within_0_2_percent_of_python_control():
     """A step of 0.1 mN from rest leaves the arm linear; growth read by ESPRIT, and bracketed."""
-    for s, i, b, K, omega in loops(8):
+    for s, i, b, K, omega in some(loops(8), 6):
         axis, wall = "xy"[i], Profile((), (b,))
         assert parts.growth(s, axis, 0.999 * K, b) < 0.0 < parts.growth(s, axis, 1.001 * K, b)
         run = dataclasses.replace(

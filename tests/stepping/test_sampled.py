@@ -11,7 +11,8 @@ from hapticclay.model import controller
 from hapticclay.model.compensator import PRINTED
 from hapticclay.model.operator import Operator
 from hapticclay.model.signals import Multisine
-from tests.oracles import hybrid
+from tests.oracles import hybrid, store
+from tests.oracles.hybrid import in_slab
 
 CASES = {
     "held": dict(),
@@ -22,6 +23,16 @@ CASES = {
 }
 
 
+EVERY = 5  # samples that are compared
+
+
+def of_scene(s, **more):
+    """What the oracle is told of a scene."""
+    th = (s.operator.mass, s.operator.damper, s.operator.spring) if s.operator else None
+    case = dict(Ts=s.dt, K=s.gain, uh=s.force, th=th)
+    return case | dict(inertia_shaping=s.inertia_shaping, render=s.render) | more
+
+
 def slab(x):
     return 90.0 if 0.03 <= x < 0.15 else 0.0
 
@@ -30,16 +41,15 @@ def slab(x):
 def test_position_within_1e_7_of_the_hybrid_system_borders_included(name):
     kw = dict(force=(1.5, 0.0), clay=(0.03, 0.15), t_max=0.5) | CASES[name]
     s = hc.constant_cut(control="sampled", **kw)
-    th = (0.25, 2.0, 6.0) if s.operator else None
-    P, V, T = hybrid(
-        slab, s.dt, s.gain, s.force, th, s.inertia_shaping, s.render, 0.45, (0.03, 0.15)
-    )
+    case = of_scene(s, t_end=0.45, edges=(0.03, 0.15))
+    at = 90.0, 0.03, 0.15, EVERY, case
+    exact = store.solution(f"sampled-{name}", in_slab, *at)
     r = hc.simulate(s)
-    n = len(P)
+    n = len(exact.p)
     assert r.crossings and r.crossings[0].time < 0.43
-    np.testing.assert_allclose(r.p[:n], P, atol=1e-7)
-    np.testing.assert_allclose(r.v[:n], V, atol=2e-5)
-    np.testing.assert_allclose(r.tau[: n - 1], T[: n - 1], atol=1e-3)
+    np.testing.assert_allclose(r.p[::EVERY][:n], exact.p, atol=1e-7)
+    np.testing.assert_allclose(r.v[::EVERY][:n], exact.v, atol=2e-5)
+    np.testing.assert_allclose(r.tau[::EVERY][:n], exact.tau, atol=1e-3)
 
 
 @pytest.mark.parametrize("render", ["held", "physical"])
@@ -66,24 +76,14 @@ def test_the_first_sample_feels_the_hand_that_is_there(kw, render):
         start=(0.06, 0.02),
     )
     s = dataclasses.replace(cut, **kw)
-    at = dict(p0=s.start, v0=s.velocity)
-    P, V, T = hybrid(
-        lambda x: 90.0,
-        s.dt,
-        s.gain,
-        s.force,
-        (0.25, 2.0, 6.0),
-        s.inertia_shaping,
-        render,
-        0.15,
-        (),
-        **at,
-    )
+    case = of_scene(s, t_end=0.15, edges=(), p0=s.start, v0=s.velocity)
+    name = f"sampled-first-{render}-{'-'.join(x for x in kw if x != 'hardware')}"
+    exact = store.solution(name, in_slab, 90.0, -np.inf, np.inf, EVERY, case)
     r = hc.simulate(s)
-    n = len(P)
-    np.testing.assert_allclose(r.tau[0], T[0], atol=1e-12)
-    np.testing.assert_allclose(r.p[:n], P, atol=1e-7)
-    np.testing.assert_allclose(r.v[:n], V, atol=2e-5)
+    n = len(exact.p)
+    np.testing.assert_allclose(r.tau[0], exact.tau[0], atol=1e-12)
+    np.testing.assert_allclose(r.p[::EVERY][:n], exact.p, atol=1e-7)
+    np.testing.assert_allclose(r.v[::EVERY][:n], exact.v, atol=2e-5)
 
 
 @pytest.mark.parametrize("operator,late", [(None, 0.0), (Operator(), 0.0), (None, 0.3)])

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 import hapticclay as hc
+from tests.hunt import examples
 from tests.oracles import friction
 
 M = 1.25  # mass of the slider [kg]
@@ -69,7 +70,7 @@ def test_it_is_of_second_order_at_a_stop(isotropic):
     clay = dataclasses.replace(hc.slab(law), isotropic=isotropic)
     worst = []
     for dt in (4e-3, 2e-3, 1e-3, 5e-4):
-        steps = dt * np.linspace(1.0, 1.1, 12)
+        steps = dt * np.linspace(1.0, 1.1, 8)
         runs = hc.simulate_batch([slider(clay, float(h), 0.2) for h in steps])
         worst.append(max(abs(r.p[-1, 0] - 0.02 - x) for r in runs))
     order = np.polyfit(np.log([4e-3, 2e-3, 1e-3, 5e-4]), np.log(worst), 1)[0]
@@ -82,7 +83,7 @@ def test_a_spring_with_a_yield_force_loses_the_same_each_half_cycle():
     hand = hc.Operator(0.0, 0.0, k)
     half = math.pi * math.sqrt(M / k)
     clay = hc.Clay(hc.Profile((), (0.0,), Fy=(Fy,)), hc.Profile((), (0.0,)))
-    s = slider(clay, 1e-4, half * (len(turns) + 1), (0.0, 0.0), start=(x0, 0.0), operator=hand)
+    s = slider(clay, 2e-4, half * (len(turns) + 1), (0.0, 0.0), start=(x0, 0.0), operator=hand)
     r = hc.simulate(s)
     ends = [r.p[np.searchsorted(r.t, half * i), 0] for i in range(len(turns))]
     # near its turning points the body is flat: samples beside them err by (dt/2)^2 k x0/M/2
@@ -145,19 +146,19 @@ def test_an_axis_that_is_held_beside_one_that_slides_does_not_drift():
 @pytest.mark.parametrize("dt", [1e-5, 3.6e-4, 1e-2])
 @pytest.mark.parametrize("Fy", [0.0, 0.1, 10.0, 1e4])
 def test_no_chatter_at_any_step_and_yield_force(dt, Fy):
-    # ten periods of a sine of twice the yield force, 200 steps each: two turns a period, and at
+    # five periods of a sine of twice the yield force, 200 steps each: two turns a period, and at
     # each turn one stop at most
     period = 200.0 * dt
     push = hc.Multisine((max(2.0 * Fy, 0.1), 0.0), 0.9 / period, 1.1 / period, period, lines=1)
     s = dataclasses.replace(
         hc.free(), clay=hc.slab(hc.Flow(Fy=Fy, b=max(300.0, 100.0 * Fy))), dt=dt,
         force=(0.0, 0.0), muscle=push,
-        t_max=10.0 * period, length=None, stop_when_unstable=False, torque_limit=(1e6, 1e6),
+        t_max=5.0 * period, length=None, stop_when_unstable=False, torque_limit=(1e6, 1e6),
         gain=(0.05, 0.05),
     )  # fmt: skip
     r = hc.simulate(s)
     turns = np.count_nonzero(np.diff(np.sign(r.v[r.v[:, 0] != 0.0, 0])))
-    assert np.isfinite(r.p).all() and turns <= 21 and len(r.stops) <= 22
+    assert np.isfinite(r.p).all() and turns <= 11 and len(r.stops) <= 12
     assert (r.v[1:, 0] == 0.0).any() == (Fy > 0.0)
 
 
@@ -201,7 +202,7 @@ def scenes(draw):
     )
 
 
-SLOW = settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow])
+SLOW = settings(examples(15), suppress_health_check=[HealthCheck.too_slow])
 
 
 @SLOW
@@ -251,7 +252,7 @@ def test_rotated_axes_is_felt_along_its_own_axes(isotropic):
     soft = hard if isotropic else hc.Profile((), (10.0,), Fy=(1.0,))
     s = dataclasses.replace(
         hc.free(), clay=hc.Clay(hard, soft, angle=0.7, isotropic=isotropic), force=(6.0, 2.0),
-        muscle=hc.Multisine((3.0, 3.0), 0.5, 6.0, 2.0, lines=6), t_max=0.5, length=None,
+        muscle=hc.Multisine((3.0, 3.0), 0.5, 6.0, 2.0, lines=6), t_max=0.25, length=None,
         stop_when_unstable=False,
     )  # fmt: skip
     for dt in (1e-3, 2.5e-4):
@@ -275,15 +276,15 @@ def test_stiff_clay_with_a_consistency_creeps_evenly(law, push, isotropic):
     # Fy + K v^n + (b + 10/gain) v = push, with a K v^n that changes faster than b v
     v = brentq(lambda v: float(law.force(v)) + 10.0 / 0.3 * v - push, 0.0, push / law.b)
     profile = hc.Profile((), (law.b,), Fy=(law.Fy,), K=(law.K,), n=(law.n,))
-    for dt in (1e-2, 3.6e-4):
+    for dt in (1e-2, 1e-3 if isotropic else 3.6e-4):
         s = dataclasses.replace(
             hc.free(), clay=hc.Clay(profile, profile, isotropic=isotropic), force=(push, 0.0),
-            gain=(0.3, 0.1), inertia_shaping=True, dt=dt, t_max=1.5, length=None,
+            gain=(0.3, 0.1), inertia_shaping=True, dt=dt, t_max=1.1, length=None,
             stop_when_unstable=False, torque_limit=(1e5, 1e5),
         )  # fmt: skip
         r = hc.simulate(s)
         # delta' settles as exp(-10 t); the last step is a short one, and divides v of both steps
         # around it unevenly
-        late = (r.t > 1.2) & (r.t < r.t[-1] - 2.5 * dt)
+        late = (r.t > 0.9) & (r.t < r.t[-1] - 2.5 * dt)
         np.testing.assert_allclose(r.v[late, 0], v, rtol=1e-3)
         np.testing.assert_allclose(r.fe[late, 0], push - 10.0 / 0.3 * v, rtol=1e-3)

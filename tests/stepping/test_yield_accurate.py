@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
@@ -16,6 +16,7 @@ from hapticclay.model.cells import Profile
 from hapticclay.model.clay import Clay
 from hapticclay.stepping import modes, pace
 from hapticclay.stepping.run import Run
+from tests.hunt import HUNTS, examples
 from tests.oracles import store
 from tests.oracles.yielding import yielding_case
 
@@ -73,14 +74,17 @@ def test_a_slider_stops_when_and_where_it_should(flow):
     # 1e-9 but where nothing but K v^n stops it, n < 1: there what is left of the servo, 2.5e-10
     # m/s^2, outlasts the clay, and the steps beside rest are shares of the speed (modes.GRADE)
     thins = flow.n < 1.0 and not flow.Fy
-    for dt, within in ((1e-2, 2e-7), (1e-3, 2e-9), (3.6e-4, 1e-9), (1e-4, 1e-9)):
+    most = [(1e-2, 2e-7), (1e-3, 2e-9), (3.6e-4, 1e-9)]
+    if HUNTS or flow.n == 2.0:
+        most += [(1e-4, 1e-9)]
+    for dt, within in most:
         within *= 10.0 if thins and dt < 1e-2 else 1.0
-        r = hc.simulate(slider(flow, dt, 1.5 * t))
+        r = hc.simulate(slider(flow, dt, 1.1 * t + 2.0 * dt))
         (stop,) = r.stops
         assert stop.axis == "xy" and stop.end is None
         assert abs(stop.start / t - 1.0) < within and abs((r.p[-1, 0] - 0.02) / x - 1.0) < within
         still = r.t > stop.start
-        assert np.all(r.v[still] == 0.0) and np.all(r.p[still] == r.p[-1])
+        assert still.any() and np.all(r.v[still] == 0.0) and np.all(r.p[still] == r.p[-1])
         assert np.all(r.qd[still] == 0.0)
         assert abs(r.energy["residual"]) < 1e-7 * MASS
 
@@ -156,6 +160,7 @@ def exact(name):
     return store.solution(f"yield-{name.replace(', ', '-')}", yielding_case, CASES[name])
 
 
+@functools.cache
 def errors(name, dt):
     """Largest errors of positions, velocities, times of stops, and times of crossings."""
     found, r = exact(name), hc.simulate(scene(CASES[name], dt))
@@ -196,7 +201,7 @@ def test_fourth_order_across_stops(name):
 
 @pytest.mark.parametrize("name", SMOOTH)
 def test_the_fast_method_is_of_second_order_beside_scipy(name):
-    steps = np.array([2e-3, 1e-3, 5e-4, 2.5e-4])
+    steps = np.array([2e-3, 1e-3, 5e-4])
     found, exactly = [], exact(name)
     for dt in steps:
         r = hc.simulate(scene(CASES[name], float(dt), integrator="fast"))
@@ -260,7 +265,7 @@ def test_energy_converges_at_fourth_order_and_none_is_made():
 size = st.floats(-1.0, 1.0)
 
 
-@settings(max_examples=25)
+@examples(10)
 @given(
     st.sampled_from((0.0, 0.1, 3.0, 200.0, 1e4)),
     st.sampled_from((0.0, 2.0)),
@@ -280,7 +285,7 @@ def test_the_clay_only_takes_energy(Fy, K, n, along, hand, x, dt):
         dataclasses.replace(
             hc.free(), clay=clay, force=(4.0 * x[0], 4.0 * x[1]), velocity=(0.1 * x[2], 0.1 * x[3]),
             muscle=wave, operator=hc.Operator() if hand else None, integrator="accurate", dt=dt,
-            t_max=0.3, stop_when_unstable=False,
+            t_max=0.1, stop_when_unstable=False,
         )
     )  # fmt: skip
     power = np.sum(r.fe * r.v, axis=1)
@@ -304,7 +309,7 @@ def test_the_motors_limits_hold_in_clay_that_yields():
 
 def test_a_creep_too_slow_for_explicit_steps_counts_as_rest():
     """Of clay of n < 1; how slow is known, and too much of it is refused."""
-    K, n, dt, span = 30.0, 0.5, 1e-3, 0.01
+    K, n, dt, span = 30.0, 0.5, 1e-3, 0.003
     s = slider(hc.Flow(K=K, n=n), dt, span)
     slowest = modes.creep_speed(pace.largest_lightness(s), dt, K, n)
     assert slowest < pace.CREEP_MOST

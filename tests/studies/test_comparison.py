@@ -1,11 +1,14 @@
 """Controllers and devices side by side: numbers against the analysis of each, and the page."""
 
+import contextlib
+import io
 import json
 import re
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import hapticclay as hc
 from hapticclay.cli import app
@@ -36,11 +39,32 @@ def controllers(tmp_path_factory):
     return comparison.compare_files(files(tmp_path_factory.mktemp("c"), SCENES))
 
 
+@pytest.fixture
+def no_layout(monkeypatch):
+    """Figures are drawn as they are."""
+    monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)
+
+
 @pytest.fixture(scope="module")
-def walls(tmp_path_factory):
-    return comparison.compare_files(files(tmp_path_factory.mktemp("w"), WALLS))
+def commanded(tmp_path_factory):
+    """A folder that the command writes, what it says, and the walls that it compares."""
+    out, said, found = tmp_path_factory.mktemp("w"), io.StringIO(), []
+    paths = map(str, files(out, WALLS))
+    words = ["compare", *paths, "--format", "pdf", "--data", "--out", str(out / "o")]
+    compare = comparison.compare_files
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(said):
+        patch.setattr(Figure, "get_layout_engine", lambda self: None)
+        patch.setattr(comparison, "compare_files", lambda *a: found.append(compare(*a)) or found[0])
+        assert app.main(words) == 0
+    return out / "o", said.getvalue(), found[0]
 
 
+@pytest.fixture(scope="module")
+def walls(commanded):
+    return commanded[-1]
+
+
+@pytest.mark.xdist_group("comparison")
 def test_numbers_are_those_of_the_analysis(controllers):
     for x, (K, b) in zip(controllers, ((1.0, 90.0), (2.0, 60.0)), strict=True):
         n, m = x.numbers, hc.theory.margins("x", K, b, operator=None)
@@ -60,6 +84,7 @@ def test_numbers_are_those_of_the_analysis(controllers):
         assert n["gain limit, worst hand [1/kg]"] <= n["gain limit, as sampled [1/kg]"] * (1 + 1e-9)
 
 
+@pytest.mark.xdist_group("comparison")
 def test_numbers_of_walls_are_the_closed_forms(walls):
     for x, (K, b, Ts) in zip(walls, ((500.0, 1.0, 1e-3), (300.0, 2.0, 2e-3)), strict=True):
         assert x.numbers["passive K, at most [N/m]"] == pytest.approx(2.0 * b / Ts)
@@ -74,6 +99,7 @@ def test_numbers_of_walls_are_the_closed_forms(walls):
         assert x.numbers["stable K, worst hand [N/m]"] >= 2.0 * b / Ts * (1.0 - 1e-6)
 
 
+@pytest.mark.xdist_group("comparison")
 def test_only_fields_that_differ_are_told(controllers, walls):
     fields = comparison.differing_fields(controllers)
     layers = [[0.0, 90.0, 0.0], [0.0, 60.0, 0.0]]
@@ -98,6 +124,8 @@ class Page(HTMLParser):
             self.links += [value] * (name in ("src", "href", "xlink:href"))
 
 
+@pytest.mark.xdist_group("comparison")
+@pytest.mark.usefixtures("no_layout")
 @pytest.mark.parametrize("kind", ["controllers", "walls"])
 def test_the_page_needs_no_other_file(kind, request):
     found = request.getfixturevalue(kind)
@@ -121,15 +149,14 @@ def test_an_inline_picture_takes_the_colours_of_the_page():
     assert all(re.fullmatch("#[0-9a-f]{6}", color) for color in SVG_COLORS)
 
 
-def test_the_command_writes_page_numbers_and_figures(tmp_path, capsys):
-    paths = files(tmp_path, WALLS)
-    words = ["compare", *map(str, paths), "--format", "pdf", "--data", "--out", str(tmp_path / "o")]
-    assert app.main(words) == 0
-    names = {p.name for p in (tmp_path / "o").iterdir()}
+@pytest.mark.xdist_group("comparison")
+def test_the_command_writes_page_numbers_and_figures(commanded):
+    out, said, _ = commanded
+    names = {p.name for p in out.iterdir()}
     assert {"compare.html", "compare.json", "zwidth.pdf", "zwidth.csv"} <= names
-    data = json.loads((tmp_path / "o" / "compare.json").read_text())
+    data = json.loads((out / "compare.json").read_text())
     assert data["files"]["near"]["stiffness K [N/m]"] == 500.0
-    assert "near" in capsys.readouterr().out
+    assert "near" in said
 
 
 def test_what_does_not_compare_is_refused(tmp_path):
@@ -160,6 +187,7 @@ def test_the_command_refuses_in_one_line(words, told, tmp_path, capsys, monkeypa
     assert told in err and err.count("\n") == 1
 
 
+@pytest.mark.usefixtures("no_layout")
 def test_what_is_unstable_is_shown_as_such(tmp_path, capsys):
     scenes = {"stable": SCENES["printed"], "wild": SCENES["printed"] + "gain = [30.0, 0.5]\n"}
     words = map(str, files(tmp_path, scenes))

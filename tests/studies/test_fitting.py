@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import optimize, stats
 from scipy.interpolate import BSpline
@@ -21,8 +21,15 @@ from benchmarks import fit_coverage as coverage
 from hapticclay.cli import app
 from hapticclay.studies import sliding, trajectory
 from hapticclay.views.fit_plots import fit_plot
+from tests.hunt import examples
 
 FINE = coverage.SENSORS["fine"]
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Motions of the generator that last 6 s."""
+    monkeypatch.setattr(coverage, "DURATION", 6.0)
 
 
 def values(fitted):
@@ -140,7 +147,8 @@ def test_a_record_gives_back_its_own_clay():
     part = hc.studies.fit_flow(cuts, place=(0.051, 0.099))
     assert part.flow.b == pytest.approx(40.0, rel=1e-6)
     wall = hc.Profile((0.1,), (40.0, 40.0), springs=(hc.Spring(), hc.Spring(k=100.0)))
-    hit = hc.simulate(dataclasses.replace(hc.constant_cut(t_max=12.0), clay=hc.Clay(wall, wall)))
+    press = hc.constant_cut(t_max=12.0, dt=1e-3)
+    hit = hc.simulate(dataclasses.replace(press, clay=hc.Clay(wall, wall)))
     with pytest.raises(hc.ParameterError, match="springs.*from the velocity alone"):
         hc.studies.fit_flow(hit)
     assert hc.studies.fit_flow(hit, place=(0.0, 0.099)).flow.b == pytest.approx(40.0, rel=1e-6)
@@ -165,7 +173,7 @@ def test_runs_through_encoder_and_converter_tell_their_clay(law):
     """A run that sticks and slides: of the record, and of what 16-bit encoders and an ADC see."""
     flow = FLOWS[law]
     clay = dataclasses.replace(hc.slab(flow), isotropic=False)
-    scene = hc.Scenario(clay=clay, muscle=PUSH, force=(0.0, 0.0), length=None, t_max=8.0, dt=1e-3)
+    scene = hc.Scenario(clay=clay, muscle=PUSH, force=(0.0, 0.0), length=None, t_max=5.0, dt=1e-3)
     record = hc.simulate(scene)
     assert record.outcome.code == "time limit", record.status
     own = hc.studies.fit_flow(record)
@@ -206,7 +214,7 @@ def test_isotropic_clay_is_fitted_along_the_path():
         hc.studies.fit_flow(dataclasses.replace(record, scenario=apart), "path")
 
 
-@settings(max_examples=6, deadline=None)
+@examples(4)
 @given(
     st.sampled_from(sorted(coverage.TRUTHS)),
     st.sampled_from([0.125, 4.0, 64.0]),
@@ -215,7 +223,7 @@ def test_isotropic_clay_is_fitted_along_the_path():
 )
 def test_units_direction_and_zeros_do_not_matter(law, scale, way, zero):
     data = coverage.measured(law, 7, FINE._replace(position_count=0.0, force_count=0.0))
-    few = slice(0, 2500)
+    few = slice(0, 2000)
     f, p = data.input[few], data.output[few]
     a = hc.studies.fit_flow(hc.studies.Measurement(data.t[few], f, p))
     b = hc.studies.fit_flow(
@@ -281,6 +289,7 @@ def test_limits_of_a_claim_are_told():
     assert told(swing, 60.0 * w + noise) == ""
 
 
+@pytest.mark.usefixtures("short")
 def test_what_cannot_be_fitted_is_refused():
     data = coverage.measured("Bingham", 1, FINE)
     for kw, words in (
@@ -319,6 +328,7 @@ def test_counts_are_found_in_what_is_quantised():
     assert sliding.quantum(3.0 + 1e-4 * np.round(x / 1e-4)) == pytest.approx(1e-4)
 
 
+@pytest.mark.usefixtures("short")
 def test_command_reads_columns_and_writes_table_json_and_figure(tmp_path, capsys):
     data = coverage.measured("Herschel-Bulkley", 11, FINE)
     file, out = tmp_path / "rig.csv", tmp_path / "out"
@@ -327,7 +337,7 @@ def test_command_reads_columns_and_writes_table_json_and_figure(tmp_path, capsys
         rows.writerow(("time", "pos", "force"))
         rows.writerows(np.stack([data.t, data.output, data.input], axis=1).tolist())
     columns = [str(file), "--columns", "t=time", "p=pos", "f=force"]
-    words = ["fit", *columns, "--out", str(out)]
+    words = ["fit", *columns, "--dpi", "60", "--out", str(out)]
     assert app.main([*words, "--level", "0.9", "--laws", "power law", "herschel-bulkley"]) == 0
     shown = capsys.readouterr().out
     assert "90 % interval" in shown and "Herschel-Bulkley: " in shown
@@ -357,6 +367,7 @@ def test_command_reads_columns_and_writes_table_json_and_figure(tmp_path, capsys
         assert words in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("short")
 def test_figure_shows_data_law_and_what_is_left():
     fitted = hc.studies.fit_flow(coverage.measured("Bingham", 3, FINE))
     law, speed, time, lag = fit_plot(fitted).axes

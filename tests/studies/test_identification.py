@@ -263,6 +263,7 @@ def drift():
     return hc.studies.drift_map(0.3)
 
 
+@pytest.mark.xdist_group("drift")
 def test_drift_over_the_workspace(drift):
     """Tolerances: (omega dt)^2/6 = 2e-4 at 15 Hz; finite differences 1e-9."""
     assert len(drift.x) >= 4
@@ -283,12 +284,13 @@ def test_drift_over_the_workspace(drift):
     assert len(drift.ranges()) == 24 and json.dumps(drift.summary())
 
 
+@pytest.mark.xdist_group("drift")
 def test_map_is_drawn(drift):
     from hapticclay.views import workspace_plots
 
     figure = workspace_plots.workspace_plot(drift)
     assert [ax.get_xlabel() for ax in figure.axes[2:4]] == ["world x [m]", "world x [m]"]
-    figure.savefig("/dev/null", format="png")
+    figure.savefig("/dev/null", format="png", dpi=40)
 
 
 def test_poses_are_within_reach_and_hold_the_nominal_one():
@@ -350,7 +352,7 @@ def test_bad_input_is_refused(kw, field):
 
 
 def test_command_line(capsys, tmp_path):
-    args = ["identify", "--axis", "x", "--quick", "--noise", "--out", str(tmp_path)]
+    args = ["identify", "--axis", "x", "--quick", "--noise", "--dpi", "40", "--out", str(tmp_path)]
     assert app.main(args) == 0
     out, err = capsys.readouterr()
     assert err == "" and "damping [1/s]" in out and "95 % interval" in out

@@ -67,7 +67,7 @@ def test_what_is_no_wall_is_refused():
 
 
 def test_the_command_prints_and_writes(tmp_path, capsys):
-    words = ["mbk", "--quick", "--columns", "1", "--out", str(tmp_path)]
+    words = ["mbk", "--quick", "--columns", "1", "--dpi", "50", "--out", str(tmp_path)]
     assert app.main(words) == 0
     assert "dynamic range" in capsys.readouterr().out
     assert json.loads((tmp_path / "mbk.json").read_text())["gap"] < CLOSE

@@ -74,7 +74,7 @@ def least_damped(loop):
 
 @pytest.mark.parametrize(
     "base, vary, n",
-    [(PushedLoop("x"), {"K": GAIN, "b": CLAY}, 150), (SAMPLED, MOVED, 100)],
+    [(PushedLoop("x"), {"K": GAIN, "b": CLAY}, 80), (SAMPLED, MOVED, 60)],
     ids=["continuous", "sampled, late, at any pose, without shaping"],
 )
 def test_a_run_is_judged_as_its_eigenvalues_are(base, vary, n):

@@ -1,6 +1,7 @@
 """Every public argument and field is documented."""
 
 import ast
+import functools
 import re
 from pathlib import Path
 
@@ -10,10 +11,14 @@ import hapticclay
 
 FOLDER = Path(hapticclay.__file__).parent
 MODULES = {
-    ".".join(f.relative_to(FOLDER).with_suffix("").parts): ast.parse(f.read_text())
-    for f in sorted(FOLDER.rglob("*.py"))
+    ".".join(f.relative_to(FOLDER).with_suffix("").parts): f for f in sorted(FOLDER.rglob("*.py"))
 }
 Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+def tree_of(module):
+    """The syntax of a module."""
+    return ast.parse(MODULES[module].read_text())
 
 
 def decorators(node):
@@ -59,15 +64,16 @@ def named_in(tree):
     return {x.target.id for x in fields if isinstance(x, ast.AnnAssign)}
 
 
-# what stands for itself in everything that is stepped: the room's own names, fields of its values
-SHARED = documented(MODULES["stepping.__init__"], "Names").union(
-    *(named_in(MODULES[f"stepping.{name}"]) for name in ("parts", "state"))
-)
+@functools.cache
+def shared_names():
+    """What stands for itself in everything that is stepped: names of the room, fields of values."""
+    of_values = (named_in(tree_of(f"stepping.{name}")) for name in ("parts", "state"))
+    return documented(tree_of("stepping.__init__"), "Names").union(*of_values)
 
 
 def undocumented(module, tree):
     """`where: names` of what a module leaves out."""
-    shared = SHARED if module.startswith("stepping.") else frozenset()
+    shared = shared_names() if module.startswith("stepping.") else frozenset()
     for node in tree.body:
         if not isinstance(node, Function | ast.ClassDef) or node.name.startswith("_"):
             continue
@@ -91,7 +97,7 @@ def test_every_public_argument_is_documented(module):
     """Each stands as `name:` on a line of its own under Args or Attributes."""
     found = [
         f"{where}: {', '.join(names)}"
-        for where, names in undocumented(module, MODULES[module])
+        for where, names in undocumented(module, tree_of(module))
         if names
     ]
     assert not found, "\n".join(found)

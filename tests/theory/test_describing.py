@@ -190,7 +190,7 @@ def test_a_push_ends_in_the_exact_limit_cycle(hand):
     A, B = relay(loop, flow)
     start = np.zeros(len(A))
     start[1] = cycle.speed
-    t, z, stuck = sticking.motion(A, B, flow.Fy, start, 8.0)
+    t, z, stuck = sticking.motion(A, B, flow.Fy, start, 5.0)
     period, v, amplitude = last_period(t, z)
     assert stuck == math.inf
     # interpolation between steps of the oracle, of some 1/20 of a period

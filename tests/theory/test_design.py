@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
@@ -12,6 +12,7 @@ import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.theory import linear_loop
 from hapticclay.theory.design import DESIGN_BAND
+from tests.hunt import HUNTS, examples
 
 MARGINS = [
     (dict(gain_margin=2.0), lambda m: m.gain[1] - 2.0),
@@ -21,7 +22,7 @@ MARGINS = [
 ]
 
 
-@settings(max_examples=3)
+@examples(2)
 @given(axis=st.sampled_from("xy"), b=st.floats(20.0, 300.0), on=st.booleans())
 @pytest.mark.parametrize("asked,left", MARGINS)
 def test_the_margin_is_there_and_not_a_bit_further(asked, left, axis, b, on):
@@ -68,7 +69,7 @@ def test_shapes_are_compared_at_equal_margin_the_best_first():
         hc.Compensator((1.0,), (1.0, 2.0, 0.0)),
         hc.Compensator((1.0, 20.0), (1.0, 40.0, 0.0)),
     ]
-    for axis in "xy":
+    for axis in "xy" if HUNTS else "y":
         found = hc.theory.compare(
             axis, 90.0, shapes, hc.Operator(), disk_margin=0.5, delay_margin=0.005
         )

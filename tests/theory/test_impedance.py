@@ -6,7 +6,7 @@ from dataclasses import replace
 import control
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
@@ -15,6 +15,7 @@ from hapticclay.errors import ParameterError
 from hapticclay.model.controller import SERVO
 from hapticclay.theory import impedance, stability_margins
 from hapticclay.theory.impedance import Impedance, loop_impedance, loop_response, wall_response
+from tests.hunt import HUNTS, examples
 from tests.oracles.multirate import fundamental
 
 TH = hc.Operator()
@@ -23,7 +24,7 @@ OMEGA = 2.0 * np.pi * np.geomspace(0.5, 30.0, 13)
 
 @pytest.mark.parametrize("axis", ["x", "y"])
 @given(K=st.floats(0.05, 20.0), b=st.floats(0.0, 1e3), k=st.floats(0.0, 1e4), held=st.booleans())
-@settings(max_examples=20)
+@examples(20)
 def test_continuous_impedance_is_that_of_python_control(axis, K, b, k, held):
     s = control.tf("s")
     G = {"x": 910.19 / (s**2 + 41.8 * s + 910.19), "y": 765.5 / (s**2 + 30.3 * s + 765.5)}[axis]
@@ -57,9 +58,16 @@ def test_late_impedance_is_that_of_the_signals_around_the_loop(render):
     np.testing.assert_allclose(loop_impedance(loop, OMEGA), left / (s * right), rtol=1e-11)
 
 
-@pytest.mark.parametrize("operator", [None, TH, hc.Operator(2.0, 1.0, 0.0)])
-@pytest.mark.parametrize("render", ["held", "physical"])
-@pytest.mark.parametrize("delay", [0.0, 1.7e-3, 5e-3])
+MARCHES = [  # each two of hand, delay and rendering, in a hunt each three
+    (operator, delay, render)
+    for i, operator in enumerate((None, TH, hc.Operator(2.0, 1.0, 0.0)))
+    for j, delay in enumerate((0.0, 1.7e-3, 5e-3))
+    for k, render in enumerate(("held", "physical"))
+    if HUNTS or (i + j + k) % 2 == 0
+]
+
+
+@pytest.mark.parametrize("operator, delay, render", MARCHES)
 def test_sampled_impedance_is_that_of_a_march_in_time(operator, render, delay):
     """Ts = 5 ms, where the hold costs a third of the damping at 20 Hz."""
     Ts, b, k, K, W = 5e-3, 30.0, 80.0, 0.6, 0.9
@@ -143,7 +151,7 @@ def test_wall_impedance_is_that_of_a_march_in_time(wall):
     delay=st.floats(0.0, 4e-3),
     velocity_window=st.integers(1, 5),
 )
-@settings(max_examples=25)
+@examples(12)
 def test_wall_impedance_agrees_with_wall_limits_without_a_hand(K, B, M, delay, velocity_window):
     """Two derivations of one number; the hand's sidebands are none without its arm."""
     wall = hc.VirtualWall(

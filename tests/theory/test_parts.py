@@ -10,7 +10,7 @@ import math
 import control
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.optimize import brentq
@@ -20,6 +20,7 @@ import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.constants import SecondOrder
 from hapticclay.theory import gain_crossings, linear_loop, roots, stability_margins
+from tests.hunt import examples
 from tests.oracles import parts
 
 SIZE = st.floats(1.0, 80.0)  # of a pole or zero [rad/s]
@@ -119,7 +120,7 @@ def unseen(loop):
 # ---- continuous ----------------------------------------------------------------------------------
 
 
-@settings(max_examples=60)
+@examples(25)
 @given(loop=LOOPS)
 def test_gain_limit_is_the_gain_margin_of_python_control(loop):
     C, G, S, T = transfer_functions(loop)
@@ -144,7 +145,7 @@ def test_gain_limit_is_the_gain_margin_of_python_control(loop):
     assert found == pytest.approx(root, rel=1e-8)  # brentq's 2e-12 and the eigenvalues' 1e-13 * 1e4
 
 
-@settings(max_examples=60)
+@examples(25)
 @given(loop=LOOPS, K=st.floats(0.01, 20.0))
 def test_poles_and_state_space_are_those_of_another_realisation(loop, K):
     loop = dataclasses.replace(loop, K=K)
@@ -166,7 +167,7 @@ def test_poles_and_state_space_are_those_of_another_realisation(loop, K):
     assert step[:2] == pytest.approx(same[:2], rel=1e-6, abs=1e-9)
 
 
-@settings(max_examples=60)
+@examples(25)
 @given(loop=LOOPS, K=st.floats(0.01, 20.0), at=st.sampled_from(stability_margins.BREAKS))
 def test_margins_are_those_of_python_control(loop, K, at):
     n, d = stability_margins.open_loop(loop, K=K, at=at)
@@ -188,7 +189,7 @@ def test_margins_are_those_of_python_control(loop, K, at):
     assert m.phase == pytest.approx(turn, abs=1e-5)
 
 
-@settings(max_examples=80)
+@examples(30)
 @given(
     loop=LOOPS,
     K=st.floats(0.01, 20.0),
@@ -279,7 +280,7 @@ def late_crossing(loop):
     return sorted(out)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(12)
 @given(
     loop=LOOPS,
     delay=st.floats(2e-4, 8e-3),
@@ -361,7 +362,7 @@ def radius(loop, K):
     return np.abs(np.delete(z, np.argsort(np.abs(z - 1.0))[: unseen(loop)])).max()
 
 
-@settings(max_examples=40, deadline=None)
+@examples(15)
 @given(
     loop=LOOPS,
     Ts=st.floats(5e-4, 5e-3),
@@ -384,7 +385,7 @@ def test_sampled_limits_are_those_of_the_period_map(loop, Ts, share, render, bar
     assert found == pytest.approx(root, rel=1e-8)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(12)
 @given(
     loop=LOOPS,
     Ts=st.floats(5e-4, 5e-3),
@@ -420,7 +421,7 @@ def test_sampled_margins_put_a_pole_on_the_circle(loop, Ts, share, part):
     assert m.disk <= 2.0 / np.abs((1.0 - L) / (1.0 + L)).max() * (1.0 + 1e-9)
 
 
-@settings(max_examples=30, deadline=None)
+@examples(12)
 @given(
     loop=LOOPS,
     K=st.floats(0.01, 20.0),
@@ -650,7 +651,7 @@ def test_steady_speed_with_two_integrators_and_no_clay_grows():
     assert speeds.tolist() == [math.inf, 0.5]
 
 
-@settings(max_examples=40)
+@examples(15)
 @given(loop=LOOPS, K=st.floats(0.01, 5.0))
 def test_passivity_and_transparency_are_those_of_the_blocks(loop, K):
     C, G, S, _ = transfer_functions(loop)
@@ -696,7 +697,7 @@ def test_a_design_is_a_run():
     )
 
 
-@settings(max_examples=15, deadline=None)
+@examples(8)
 @given(loop=LOOPS, seed=st.integers(0, 100))
 def test_no_hand_of_a_box_is_worse_than_the_worst(loop, seed):
     box = hc.theory.Box((0.0, 1.0), (0.5, 10.0), (1.0, 200.0))

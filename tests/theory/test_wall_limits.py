@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
@@ -14,6 +14,7 @@ from hapticclay.errors import ParameterError
 from hapticclay.studies.growth import growth_rate
 from hapticclay.theory import wall_limits
 from hapticclay.theory.loop_passivity import colgate_schenkel
+from tests.hunt import HUNTS, examples
 
 DEVICE = hc.Device(mass=0.1, damper=1.0)
 
@@ -81,7 +82,7 @@ class Stepped:
         return pieces
 
 
-@settings(max_examples=40, deadline=None)
+@examples(15)
 @given(walls())
 def test_the_map_makes_the_samples_of_a_stepped_wall(wall):
     less = wall_limits.wall_differences(wall)
@@ -98,7 +99,7 @@ def test_the_map_makes_the_samples_of_a_stepped_wall(wall):
         other.sample()
 
 
-@settings(max_examples=30, deadline=None)
+@examples(12)
 @given(walls())
 def test_the_band_ends_where_the_wall_becomes_unstable(wall):
     low, high = hc.walls.stiffness_band(wall)
@@ -116,7 +117,7 @@ def test_the_band_ends_where_the_wall_becomes_unstable(wall):
         assert not any(hc.walls.stable_wall(replace(wall, K=K * scale)) for K in (1e-4, 1e-2, 1.0))
 
 
-@settings(max_examples=40, deadline=None)
+@examples(15)
 @given(st.floats(-0.9, 3.0), st.floats(1e-3, 5.0), st.sampled_from([0.0, 1.0]), st.booleans())
 def test_jury_in_closed_form_is_the_band(beta, b, samples, hand):
     Ts, m = 1e-3, 0.4 if hand else 0.1
@@ -204,7 +205,7 @@ def test_the_passive_stiffness_is_that_of_colgate_and_schenkel(b, B, Ts):
         assert least.min() == pytest.approx(0.0, abs=2e-5 * b)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(12)
 @given(walls(whole=True))
 def test_with_window_filter_and_delay_the_condition_decides(wall):
     wall = replace(wall, velocity="difference", velocity_window=wall.velocity_window, operator=None)
@@ -233,7 +234,7 @@ def test_with_window_filter_and_delay_the_condition_decides(wall):
         assert passive(1e-3 * max(wall.device.damper, 1.0) / Ts) < 1e-6 * (size + abs(wall.B))
 
 
-@settings(max_examples=60, deadline=None)
+@examples(25)
 @given(
     st.floats(0.02, 0.98), st.floats(0.02, 1.0), st.integers(0, 3), st.floats(1e-3, 3.0),
     st.floats(-0.5, 0.5),
@@ -291,14 +292,22 @@ def test_friction_and_quantum():
 # ---- what the hand feels -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("turn", [(1, 17), (2, 5), (9, 10), (13, 7)])
+STEADY = (
+    dict(),
+    dict(delay=0.4e-3, velocity_window=3, velocity_filter=80.0),
+    dict(delay=2e-3, M=0.02),
+    dict(velocity="exact", delay=1e-3),
+)
+TURNS = ((1, 17), (2, 5), (9, 10), (13, 7))
+
+
 @pytest.mark.parametrize(
-    "parts",
+    "parts, turn",
     [
-        dict(),
-        dict(delay=0.4e-3, velocity_window=3, velocity_filter=80.0),
-        dict(delay=2e-3, M=0.02),
-        dict(velocity="exact", delay=1e-3),
+        (parts, turn)
+        for i, parts in enumerate(STEADY)
+        for j, turn in enumerate(TURNS)
+        if HUNTS or (i + j) % 2 == 0
     ],
 )
 def test_the_impedance_is_that_of_the_steady_motion(turn, parts):

@@ -5,13 +5,14 @@ The worst case against dense sampling and against the loop at the hand it names.
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
 from hapticclay.theory import hand_boxes, linear_loop, loops
+from tests.hunt import examples
 
 
 def spans(high):
@@ -19,7 +20,7 @@ def spans(high):
     return st.tuples(side, side).map(lambda x: (min(x), max(x)))
 
 
-@settings(max_examples=20)
+@examples(10)
 @given(
     axis=st.sampled_from("xy"), b=st.floats(5.0, 300.0), m=spans(2.0), d=spans(40.0), k=spans(400.0)
 )

@@ -17,7 +17,8 @@ ROOT = Path(flex_block.__file__).parents[1]
 
 def test_no_module_and_no_model_names_the_block():
     for path in (ROOT / "hapticclay").rglob("*.py"):
-        words = ast.walk(ast.parse(path.read_text()))
+        text = path.read_text()
+        words = ast.walk(ast.parse(text)) if "flex" in text else ()
         texts = [x.value for x in words if isinstance(x, ast.Constant) and isinstance(x.value, str)]
         assert not any("flex_block" in x for x in texts), path
     for path in engine.mjcf_folder().glob("*.xml"):

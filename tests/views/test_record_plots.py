@@ -15,12 +15,12 @@ from hapticclay.views.record_plots import RecordPlots
 
 @pytest.fixture(scope="module")
 def cut():
-    return hc.simulate(hc.constant_cut())
+    return hc.simulate(hc.constant_cut(dt=1e-3))
 
 
 @pytest.fixture(scope="module")
 def maneuver():
-    return hc.simulate(hc.stability_test(t_max=2.0))
+    return hc.simulate(hc.stability_test(t_max=1.0, dt=1e-3))
 
 
 def curve(figure, k=0):
