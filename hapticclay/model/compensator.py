@@ -236,17 +236,19 @@ def moving_states(compensator: Compensator, v: float) -> list[float]:
     if v == 0.0:
         return out
     A, B, C, D = compensator.state_space()
-    # z = z0 + z1 t under a constant force f: A z1 = 0, A z0 + B f = z1, C z1 = v, C z0 + D f = 0
+    # z = z0 + z1 t under a constant force f: A z1 = 0, A z0 + B f = z1, C z1 = v, C z0 + D f = 0;
+    # for C and D of size one, so that an error of z1 counts as much in the first as in the third
+    size = max(np.abs(C).max(initial=0.0), abs(D))
     m, right = np.zeros((2 * n + 2, 2 * n + 1)), np.zeros(2 * n + 2)
     m[:n, n : 2 * n], m[n : 2 * n, :n], m[n : 2 * n, n : 2 * n] = A, A, -np.eye(n)
-    m[n : 2 * n, 2 * n], m[2 * n, n : 2 * n] = B, C
-    m[2 * n + 1, :n], m[2 * n + 1, 2 * n] = C, D
+    m[n : 2 * n, 2 * n], m[2 * n, n : 2 * n] = B, C / size
+    m[2 * n + 1, :n], m[2 * n + 1, 2 * n] = C / size, D / size
     right[2 * n] = 1.0  # the states scale with v itself; a tiny v must keep its digits
     z = np.linalg.lstsq(m, right, rcond=None)[0]
     if not np.allclose(m @ z, right, rtol=0.0, atol=1e-9):
         bound = "must be 0 with a compensator without an integrator"
         raise ParameterError("velocity", v, bound)
-    out[:n] = (v * z[:n]).tolist()
+    out[:n] = (v / size * z[:n]).tolist()
     return out
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..scene.scenario import Scenario
 from ..stepping import many, path, scene, vector
-from ..stepping.machine_code import STEPWISE, kind_of
+from ..stepping.machine_code import kind_of
 from ..stepping.parts import Parts
 from ..stepping.run import PLAIN, EngineStore
 from ..stepping.state import OPEN, State
@@ -81,16 +81,6 @@ def _paths(part: Any, kind: Any) -> Iterator[tuple[int, ...]]:
     elif isinstance(part, tuple):
         for i, x in enumerate(part):
             yield from ((i, *path) for path in _paths(x, kind))
-
-
-def kind_of_steps(parts: Parts, state: State) -> Any:
-    """What machine code for steps of copies is compiled for.
-
-    Args:
-        parts: of their run.
-        state: of one of them.
-    """
-    return STEPWISE, kind_of(parts), kind_of(state)
 
 
 class PlainSteps:
@@ -174,7 +164,7 @@ class CompiledSteps:
         self.which = np.arange(most)
         place = vector.Place(engine, model.actuator_ctrlrange, np.empty(1))
         self.arguments = like, state, place, self.x
-        kind = kind_of_steps(parts, state)
+        kind = vector.kind_of_steps(kind_of(parts), state)
         self.make = compiled.advancing(kind, *self.arguments, self.which[:0], vector.STEPS)
 
     def take(self, parts: Parts) -> None:
@@ -185,7 +175,7 @@ class CompiledSteps:
         """
         parts = self.called(parts)
         self.x.numbers[:] = self.numbers(parts)
-        self.x.arrays[:] = [i for a in self.arrays(parts) for i in (a.ctypes.data, *a.shape, 1)[:3]]
+        self.x.arrays[:] = vector.addresses_of(self.arrays(parts))
         self.parts = parts  # whose arrays the rows point at
 
     def advance(self, x: Copies, n: int) -> None:

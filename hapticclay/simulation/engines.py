@@ -9,14 +9,13 @@ from typing import Any
 from ..errors import ParameterError
 from ..scene.scenario import Scenario
 from ..stepping import scene
-from ..stepping.machine_code import compile_time, is_kept, kind_of
+from ..stepping.machine_code import LOADING, compile_time, is_kept, kind_of
 from ..stepping.run import PLAIN, Kernel, Run, plainly
 
 ENGINES = ("auto", "python", "native")
-# measured: time that machine code saves in a step, and in clay that stays cut; to import the
-# compiler, and to load machine code of a kind [s]
+# measured: time that machine code saves in a step, and in clay that stays cut; to import numba [s]
 SAVED, SAVED_IN_GROOVE = {"continuous": 50e-6, "sampled": 90e-6, "accurate": 150e-6}, 400e-6
-IMPORTING, LOADING = 0.8, 0.03
+IMPORTING = 0.8
 TRIED = 128  # rows made in CPython between two checks whether machine code repays itself
 saved: dict[Any, float] = {}  # time that it would have saved in this process, by kind of scene [s]
 

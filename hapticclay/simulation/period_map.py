@@ -19,8 +19,9 @@ from ..stepping.memories import delay_in_samples
 from ..stepping.parts import Parts
 from ..stepping.run import PLAIN, EngineStore, with_checked
 from ..stepping.state import OPEN, State
+from ..stepping.vector import kind_of_steps
 from . import engines
-from .copies import CompiledSteps, Copies, PlainSteps, kind_of_steps, leaves_of, ring_of
+from .copies import CompiledSteps, Copies, PlainSteps, leaves_of, ring_of
 
 KICK = 1e-6  # in SI units: the squares of angles are 1e-6 of it, their rounding is 1e-10 of it
 LINEAR = 1e-4  # share of the ends by which that of all kicks may miss the sum of those of each
@@ -347,7 +348,7 @@ def repays(s: Scenario, parts: Parts, state: State, steps: float) -> bool:
         state: of it.
         steps: that are about to be made.
     """
-    kind, more = kind_of_steps(parts, state), engines.saved_in_a_step(s) * steps
+    kind, more = kind_of_steps(kind_of(parts), state), engines.saved_in_a_step(s) * steps
     return engines.repays_with(kind, more) and engines.load_compiled() is not None
 
 

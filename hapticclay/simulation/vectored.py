@@ -14,7 +14,16 @@ from ..stepping.monitor import Outcome
 from ..stepping.rows import ROW
 from ..stepping.run import CHUNK, PLAIN, EngineStore, Run, torque_reached
 from ..stepping.state import OPEN
-from ..stepping.vector import BOTH, STEPS, TRY, Common, RunVector, is_vectored, kind_key
+from ..stepping.vector import (
+    BOTH,
+    STEPS,
+    TRY,
+    Common,
+    RunVector,
+    is_vectored,
+    kind_key,
+    kind_of_steps,
+)
 from . import engines
 from .engines import has_numba, load_compiled
 
@@ -414,4 +423,4 @@ def repay(run: Run, steps: float) -> bool:
     if not is_vectored(run):
         return engines.pays(run.scenario, steps)
     more = 0.5 * engines.saved_in_a_step(run.scenario) * steps
-    return engines.repays_with(RunVector.kind_of(run), more)
+    return engines.repays_with(kind_of_steps(run.kind, run.state), more)

@@ -79,7 +79,7 @@ from . import (
 from . import hardware as wires
 from .engine import mujoco
 from .inlining import EntryCompiler, InlinedCompiler
-from .machine_code import COMPLETE, cache_folder, compile_time, is_kept, mark
+from .machine_code import COMPLETE, LOADING, cache_folder, compile_time, is_kept, mark
 from .notice import Notice
 
 SOURCES = (
@@ -97,8 +97,7 @@ ENTRY: Any = {
     "nogil": True, "error_model": "numpy", "_nrt": False, "pipeline_class": EntryCompiler,
 }  # fmt: skip
 SIGNALS = [getattr(signal, x) for x in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, x)]
-# measured: time that machine code saves in a careful step, and that it takes to load [s]
-CAREFUL, LOADING = 2.5e-4, 0.8
+CAREFUL = 2.5e-4  # measured: time that machine code saves in a careful step [s]
 
 
 # ---- numbers at an address -----------------------------------------------------------------------

@@ -15,8 +15,9 @@ from typing import Any
 
 from . import parts as p_
 
-# measured: time to compile the whole steps of the plain cut, and what a part adds to it [s]
-COMPILING = 3.5
+# measured: time to load machine code of a kind where numba is imported; to compile the whole steps
+# of the plain cut, and what a part adds to it [s]
+LOADING, COMPILING = 0.03, 3.5
 COMPILING_PART = {
     p_.Form: 0.2, p_.Special: 0.7, p_.Flow: 0.9, p_.Groove: 0.4, p_.Sampler: 0.8,
     p_.Converter: 1.2, p_.Delay: 0.7, p_.Passivity: 0.5, p_.Modal: 2.7,

@@ -140,7 +140,9 @@ def _let_call(law: Any) -> None:
 
 
 def _tuple_of(names: list[str]) -> str:
-    return f"({''.join(x + ', ' for x in names)})"
+    """Source of a tuple; a display of more than 30 items would be a list, which numba refuses."""
+    parts = (names[i : i + 16] for i in range(0, len(names), 16))
+    return " + ".join(f"({', '.join(part)},)" for part in parts) or "()"
 
 
 def _assert_length(state, n):

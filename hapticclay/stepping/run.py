@@ -674,12 +674,10 @@ class Run:
     def _end(self, outcome: monitor.Outcome) -> None:
         self.outcome = self.outcome or outcome
 
-    def give_up(self, most: int = path.MOST_STEPS) -> None:
-        """Ends the run at its last sample, because the steps after it become too short.
-
-        Args:
-            most: steps that one sample may take.
-        """
+    def give_up(self) -> None:
+        """Ends the run at its last sample, because the steps after it become too short."""
+        cut_short = self.state.status.careful >= path.MOST_STEPS  # else divided by too many
+        most = path.MOST_STEPS if cut_short else SUBSTEPS
         cause = f"more than {most} steps in one sample"
         other = "fast" if self.scenario.integrator == "accurate" else "accurate"
         advice = f"change dt, or choose integrator {other!r}"

@@ -7,7 +7,7 @@ state back. `run` handles the rare cases: the monitor itself, the end of a run, 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -231,6 +231,25 @@ def arrays_in(part: Any) -> Iterator[np.ndarray]:
         yield part
 
 
+def addresses_of(arrays: Iterable[np.ndarray]) -> list[int]:
+    """Where arrays lie, as a row of `Vector.arrays` has it: address, rows and columns of each.
+
+    Args:
+        arrays: of one or two dimensions.
+    """
+    return [n for a in arrays for n in (a.ctypes.data, *a.shape, 1)[:3]]
+
+
+def kind_of_steps(kind: Any, state: State) -> Any:
+    """What machine code for steps of runs is compiled for.
+
+    Args:
+        kind: of their scenes.
+        state: of one of them.
+    """
+    return STEPWISE, kind, kind_of(state)
+
+
 def is_vectored(run: Run) -> bool:
     """Whether `advance` makes the steps of a run: not with signals, nor with the user's own law.
 
@@ -295,7 +314,7 @@ class RunVector:
 
     def __init__(self, run: Run, common: Common, kernel: Kernel):
         self.parts, self.state, self.scenario = run.parts, run.state, run.scenario
-        self.kind = self.kind_of(run)
+        self.kind = kind_of_steps(run.kind, run.state)
         self.at, self.put = many.places(run.state), many.places(run.parts)
         self.kernel, self.tells = kernel, scene.tells(run.parts)
         self.written = len(scene.written(run.parts))
@@ -310,15 +329,6 @@ class RunVector:
         self.advance: Any = None  # vector.advance for them, compiled
         self.most = 0  # bytes that a run's steps may write into
 
-    @staticmethod
-    def kind_of(run: Run) -> Any:
-        """What machine code for a run is compiled for.
-
-        Args:
-            run: the run.
-        """
-        return STEPWISE, run.kind, kind_of(run.state)
-
     def take(self, k: int, run: Run) -> None:
         """Takes a run over, as it is now.
 
@@ -328,7 +338,7 @@ class RunVector:
         """
         x, written, store = self.x, scene.written(run.parts), run.store
         x.numbers[k] = many.numbers_of(run.parts)
-        x.arrays[k] = [n for a in arrays_in(run.parts) for n in (a.ctypes.data, *a.shape, 1)[:3]]
+        x.arrays[k] = addresses_of(arrays_in(run.parts))
         x.written[k] = [n for a in written for n in (a.ctypes.data, a.nbytes)]
         kept = store.rows.ctypes.data, store.rendered.ctypes.data
         x.kept[k] = *kept, self.tells, run.recorded

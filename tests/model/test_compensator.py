@@ -485,6 +485,14 @@ def test_states_of_even_motion_give_that_motion(c, v):
         assert C @ at[:n] + D * f == pytest.approx(v * t, abs=1e-8 * (terms + abs(v)))
 
 
+def test_no_rate_is_held_without_an_integrator_however_large_the_numerator():
+    c = Compensator((10.0, -12790.0, 3884220.0, -158080320.0), (1.0, 3.0, 3.0, 1.0))
+    for size in (1e-6, 1.0, 1e6):
+        shape = Compensator(tuple(size * x for x in c.num), c.den)
+        with pytest.raises(ParameterError, match="without an integrator"):
+            compensator.moving_states(shape, 1.0)
+
+
 def test_states_at_the_start_as_printed():
     np.testing.assert_allclose(
         compensator.moving_states(Compensator(), 0.3), (0.0, 0.3, 0.0, 0.0), atol=1e-15
