@@ -22,6 +22,7 @@ from . import begin, energy, engine, monitor, path, rows, scene, viscous
 from .engine import mujoco
 from .engine_step import Dynamics, Engine, Probe
 from .machine_code import kind_of
+from .modes import SUBSTEPS
 from .parts import Chance, Parts
 from .state import FINISHED, NOT_FINITE, OPEN, UNRESOLVED, Filled, State
 

@@ -41,7 +41,7 @@ def same(a, b, names=ARRAYS):
     ],
     ids=["ideal", "slow", "limits", "hardware, hand"],
 )
-def test_the_papers_controller_as_a_law_gives_the_same_bits(kw, engine):
+def test_the_papers_controller_as_a_law_gives_the_same_bits(kw, engine, capsys):
     if kw.get("hardware"):  # a lost sample holds the torque, but the compensator goes on
         kw = {"hardware": replace(kw["hardware"], dropout_probability=0.0)}
     s = replace(CUT, **kw)
@@ -53,6 +53,7 @@ def test_the_papers_controller_as_a_law_gives_the_same_bits(kw, engine):
     assert not same(built_in, mine, names)
     assert str(built_in.outcome) == str(mine.outcome) and built_in.crossings == mine.crossings
     assert not mine.delta.any()  # there is no compensator
+    assert not capsys.readouterr().err  # machine code of 43 parameters, too
 
 
 def to_pose(t, q, qd, fh, state, params):
