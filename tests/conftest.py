@@ -46,6 +46,11 @@ GROUPS = {  # by fixture, or by the end of a file's name: tests that run in one 
     "swept": "sweep",
     "screen": "gui",
     "test_page.py": "gui",
+    "test_batch.py": "batch",
+    "test_column_batch.py": "batch",
+    "test_simulation_batch.py": "stepwise",
+    "test_stepwise.py": "stepwise",
+    "test_own_controller.py": "own law",
 }
 PLAIN = {  # files whose tests are about steps in Python
     "test_engine.py",

@@ -277,8 +277,8 @@ class Places(NamedTuple):
     p: np.ndarray
 
 
-def positions(scenario, times, accuracy, numbers):  # noqa: ARG001
-    """As `solve`, to be stored; the numbers are all those of the scenario."""
+def positions(scenario, times, accuracy):
+    """As `solve`, to be stored."""
     return Places(solve(scenario, times, **accuracy)[1])
 
 
@@ -288,8 +288,8 @@ class Passed(NamedTuple):
     t: np.ndarray
 
 
-def passed(scenario, axis, edges, values, numbers):  # noqa: ARG001
-    """As `forward`, to be stored; the numbers are all those of the scenario."""
+def passed(scenario, axis, edges, values):
+    """As `forward`, to be stored."""
     return Passed(np.array(forward(scenario, axis, edges, values, 60.0, scan=5e-3)[0]))
 
 

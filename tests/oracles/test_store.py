@@ -1,10 +1,12 @@
 """A stored solution is taken only for its own case, solved by its own source."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import hapticclay as hc
 from benchmarks import reference
 from tests.oracles import nonlinear, store
 
@@ -57,6 +59,23 @@ def test_what_changed_is_solved_anew(solved, change, tmp_path, monkeypatch):
     store.solution("a", oracle, *case)
     store.solution("a", oracle, *case)
     assert len(solved) == 2
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        dict(arm=hc.Arm(l1=0.25)),
+        dict(compensator=hc.Compensator((1.0,), (1.0, 9.0, 0.0))),
+        dict(servo=2 * (hc.Servo(*2 * (hc.SecondOrder(900.0, 40.0, 900.0),)),)),
+        dict(operator=hc.Operator(0.25, 2.0, 6.1)),
+    ],
+    ids=lambda x: next(iter(x)),
+)
+def test_scenes_of_other_parts_are_other_cases(part):
+    s = hc.constant_cut(operator=hc.Operator(0.25, 2.0, 6.0))
+    keys = {store.digest(nonlinear, (x,)) for x in (s, dataclasses.replace(s, **part))}
+    assert len(keys) == 2
+    assert store.digest(nonlinear, (dataclasses.replace(s),)) in keys
 
 
 def test_sources_are_those_that_the_oracle_imports():

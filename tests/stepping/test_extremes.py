@@ -47,7 +47,7 @@ def tolerance(case):
 
 
 def stored(case, s, times):
-    """The reference solution of a case, from the disk; a signal's phases are in no repr."""
+    """The reference solution of a case, from the disk; a signal's phases are not in the case."""
     if s.muscle or s.command:
         return reference.solve(s, times)
     name = re.sub(r"\W+", "-", f"{case.group} {case.name}")

@@ -131,8 +131,7 @@ def order_of(steps, errors):
 
 def solved(name, s, times, **accuracy):
     """Positions at times by SciPy, from the disk."""
-    numbers = dataclasses.asdict(s)  # the repr of a scene leaves some out
-    return store.solution(f"parts-{name}", parts.positions, s, times, accuracy, numbers).p
+    return store.solution(f"parts-{name}", parts.positions, s, times, accuracy).p
 
 
 def at(r, times):
@@ -150,9 +149,7 @@ def test_shaped_borders_to_1e_7_s_of_the_matrix_exponential(seeds):
     """
     for seed in seeds:
         s, (axis, b, edges) = passage(int(seed))
-        numbers = dataclasses.asdict(s)
-        case = parts.passed, s, axis, edges, b, numbers
-        exact = store.solution(f"parts-passage-{seed}", *case).t
+        exact = store.solution(f"parts-passage-{seed}", parts.passed, s, axis, edges, b).t
         assert len(exact) == 3
         s = dataclasses.replace(s, t_max=exact[-1] + 0.01)
         found = border_times([dataclasses.replace(s, dt=k * TS) for k in (1, 4)], axis, 3)
@@ -205,7 +202,7 @@ GAIN = {"order 0": hc.Compensator((1e-3,), (1.0,))}
 
 
 @fast
-@pytest.mark.parametrize("name", OWN | GAIN)
+@pytest.mark.parametrize("name", some(OWN | GAIN, 5))
 def test_fitted_order_of_both_methods(name):
     """2 from 0.18 to 2.88 ms, 4 from 0.36 to 1.44 ms.
 

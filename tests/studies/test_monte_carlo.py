@@ -18,6 +18,7 @@ from hapticclay.studies import growth, sweep_store, verdicts
 from hapticclay.studies import robustness as study
 from hapticclay.studies.boundary import PushedLoop, pose_matrix
 from hapticclay.studies.sampling import Range
+from tests.hunt import MORE
 from tests.oracles.sampled_wall import sample_map
 
 HANDS = hc.studies.Hands.around(hc.Operator(0.4, 5.0, 80.0), 0.5)
@@ -74,7 +75,7 @@ def least_damped(loop):
 
 @pytest.mark.parametrize(
     "base, vary, n",
-    [(PushedLoop("x"), {"K": GAIN, "b": CLAY}, 80), (SAMPLED, MOVED, 60)],
+    [(PushedLoop("x"), {"K": GAIN, "b": CLAY}, 60 * MORE), (SAMPLED, MOVED, 30 * MORE)],
     ids=["continuous", "sampled, late, at any pose, without shaping"],
 )
 def test_a_run_is_judged_as_its_eigenvalues_are(base, vary, n):

@@ -20,7 +20,7 @@ from hapticclay.studies.sampling import Sweep, parse_grid
 RUNS = 80
 
 
-def command(out, *extra, t_max=0.02, b="10:1000:40log", workers=2):
+def command(out, *extra, t_max=0.02, b="10:1000:40log", workers=2, chunk=4):
     return [
         sys.executable,
         "-m",
@@ -31,7 +31,7 @@ def command(out, *extra, t_max=0.02, b="10:1000:40log", workers=2):
         "--fixed",
         f"t_max={t_max}",
         "--chunk",
-        "4",
+        str(chunk),
         "--workers",
         str(workers),
         "--no-maps",
@@ -41,8 +41,8 @@ def command(out, *extra, t_max=0.02, b="10:1000:40log", workers=2):
     ]
 
 
-def plan(b="10:1000:40log", t_max=0.02):
-    return Sweep("constant", parse_grid(f"b={b} gain.x=1:2:2"), {"t_max": t_max}, chunk=4)
+def plan(b="10:1000:40log", t_max=0.02, chunk=4):
+    return Sweep("constant", parse_grid(f"b={b} gain.x=1:2:2"), {"t_max": t_max}, chunk=chunk)
 
 
 def columns(table):
@@ -160,10 +160,13 @@ def alive(process):
 
 
 @contextlib.contextmanager
-def at_work(out, t_max=0.3):
+def at_work(out, t_max=0.3, chunk=4):
     """A sweep with two workers that has written two parts, and its worker processes."""
     with subprocess.Popen(
-        command(out, t_max=t_max), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        command(out, t_max=t_max, chunk=chunk),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     ) as p:
         try:
             assert until(
@@ -177,15 +180,13 @@ def at_work(out, t_max=0.3):
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
 def test_workers_do_not_outlive_a_killed_parent(tmp_path, how):
-    with at_work(tmp_path, t_max=2.0) as (p, children):
+    with at_work(tmp_path, 2.0, 1) as (p, children):
         assert len(children) >= 2
         p.send_signal(how)
         p.wait()
         assert p.returncode == (-how if how == signal.SIGKILL else 128 + how)
         assert until(lambda: not any(map(alive, children)), 5.0)
-    assert sweep_store.missing_parts(
-        plan(t_max=2.0), tmp_path
-    )  # none of them had gone on to the end
+    assert sweep_store.missing_parts(plan(t_max=2.0, chunk=1), tmp_path)  # none had gone on
 
 
 def test_a_killed_worker_is_one_line_and_the_sweep_goes_on(tmp_path):

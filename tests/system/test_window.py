@@ -129,12 +129,12 @@ class Mouse:
     def do(self, *words):
         subprocess.run(["xdotool", *map(str, words)], env=self.screen, check=True)
 
-    def drag(self, pixels, pictures=1):
-        """Pull to the right in 20 moves, each seen for so many pictures."""
+    def drag(self, pixels, moves=5, pictures=1):
+        """Pull to the right in some moves, each seen for so many pictures."""
         self.do("mousemove", 400, 300, "keydown", "ctrl", "mousedown", 3)
         self.pictures(5)
-        for _ in range(20):
-            self.do("mousemove_relative", "--", pixels // 20, 0)
+        for _ in range(moves):
+            self.do("mousemove_relative", "--", pixels // moves, 0)
             self.pictures(pictures)
 
     def end(self, how):
@@ -217,7 +217,7 @@ def test_closing_a_replay_before_its_end_ends_it(screen, tmp_path, how):
 
 def test_mouse_cuts_through_the_clay(screen, tmp_path):
     mouse = Mouse(screen, tmp_path, "view", "--out", "o")
-    mouse.drag(240, 5)  # slowly, so that the way is straight
+    mouse.drag(240, 20, 5)  # slowly, so that the way is straight
     mouse.until(lambda now: now["x"] > 0.17 and now["frames"] > 100)
     code, out, err = mouse.close()
     assert (code, err) == (0, ""), (out, err)
