@@ -1,14 +1,16 @@
 """The suite in parallel: who shares a worker, what runs alone, and which engine runs.
 
-Workers are processes of pytest-xdist. Tests that share a dear fixture or a scarce resource share a
-worker (GROUPS). A test marked `perf` compares run times: while it runs, the other workers wait.
-Tests marked `plain` test steps in Python: there `engine="auto"` takes no machine code.
+Workers are processes of pytest-xdist. The tests of a file share a worker, and with it fixtures,
+runs and machine code; so do those of some files (TOGETHER). A test marked `perf` compares run
+times: while it runs, the other workers wait. Tests marked `plain` test steps in Python: there
+`engine="auto"` takes no machine code.
 """
 
 import contextlib
 import gc
 import os
 import signal
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -36,42 +38,44 @@ settings.register_profile(
     "default", deadline=None, derandomize=not HUNTS, max_examples=MORE * EXAMPLES
 )
 settings.load_profile("default")
+HERE = Path(__file__).parent
 
-GROUPS = {  # by fixture, or by the end of a file's name: tests that run in one worker, in turns
-    "paper_runs": "ledger",
-    "ledger_rows": "ledger",
-    "rows": "bench",
-    "scaled": "bench",
-    "poses": "poses",
-    "swept": "sweep",
-    "screen": "gui",
-    "test_page.py": "gui",
-    "test_batch.py": "batch",
-    "test_column_batch.py": "batch",
-    "test_simulation_batch.py": "stepwise",
-    "test_stepwise.py": "stepwise",
-    "test_own_controller.py": "own law",
+TOGETHER = {  # files that share a dear fixture, machine code or the processor's time for a screen
+    "paper/test_ledger.py": "ledger",
+    "paper/test_report.py": "ledger",
+    "simulation/test_batch.py": "batch",
+    "simulation/test_column_batch.py": "batch",
+    "simulation/test_simulation_batch.py": "step by step",
+    "simulation/test_stepwise.py": "step by step",
+    "system/test_page.py": "screen",
+    "system/test_window.py": "screen",
 }
+# folders with long files have the first turns, lest one be the last
+LONG = ("system", "views", "stepping", "studies")
 PLAIN = {  # files whose tests are about steps in Python
     "test_engine.py",
     "test_interrupted.py",
 }
 
 
+def folder_turn(item):
+    """When the tests of a folder have their turn."""
+    name = item.path.relative_to(HERE).parts[0]
+    return LONG.index(name) if name in LONG else len(LONG)
+
+
 @pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(items):
+    items.sort(key=folder_turn)
     for item in items:
-        names = (*item.fixturenames, item.path.name)
-        for group in {GROUPS[name] for name in names if name in GROUPS}:
-            item.add_marker(pytest.mark.xdist_group(group))
-        if item.get_closest_marker("perf"):
-            item.add_marker(pytest.mark.xdist_group("perf"))
+        file = item.path.relative_to(HERE).as_posix()
+        group = TOGETHER.get(file, file)
+        item.add_marker(pytest.mark.xdist_group(group))
         if item.path.name in PLAIN:
             item.add_marker(pytest.mark.plain)
-        mark = item.get_closest_marker("xdist_group")
         # xdist 3.8 appends the group to `_nodeid`, which pytest 9.2 no longer has
-        if mark and "PYTEST_XDIST_WORKER" in os.environ and not hasattr(item, "_nodeid"):
-            item._id = type(item._id).parse(f"{item.nodeid}@{mark.args[0]}")
+        if "PYTEST_XDIST_WORKER" in os.environ and not hasattr(item, "_nodeid"):
+            item._id = type(item._id).parse(f"{item.nodeid}@{group}")
 
 
 def pytest_collection_finish():

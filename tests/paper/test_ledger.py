@@ -94,7 +94,6 @@ def typed():
     return [node.value for node in nodes if isinstance(node.value, float)]
 
 
-@pytest.mark.xdist_group("typed")
 @pytest.mark.parametrize(
     "number", ["41.8", "30.3", "79.19", "13.1", "41.1", "432.0", "32.4", "492.46", "0.36e-3"]
 )

@@ -217,7 +217,6 @@ def rendered():
         return render(hc.constant_cut(b=30.0), server.url, 3.0, limits=PATIENT), server.exchanges[0]
 
 
-@pytest.mark.xdist_group("rendered")
 def test_the_force_of_the_coupling_reaches_the_device(rendered):
     """What the device gets is minus what pulls the simulated handle: K (xd - p) + B (vd - v).
 
@@ -240,7 +239,6 @@ def test_the_force_of_the_coupling_reaches_the_device(rendered):
     assert np.abs(sent[k + 1] - expected).max() < 0.01 * np.abs(sent).max()
 
 
-@pytest.mark.xdist_group("rendered")
 def test_the_law_of_the_clay_is_found_from_the_record(rendered, tmp_path, capsys):
     """`hapticclay fit` reads the record of a session with a device."""
     found, _ = rendered
@@ -253,7 +251,6 @@ def test_the_law_of_the_clay_is_found_from_the_record(rendered, tmp_path, capsys
     assert "viscous" in capsys.readouterr().out
 
 
-@pytest.mark.xdist_group("rendered")
 def test_the_notes_have_rate_latency_and_jitter(rendered):
     found, _ = rendered
     notes = found.record.notes["device"]

@@ -64,7 +64,6 @@ def walls(commanded):
     return commanded[-1]
 
 
-@pytest.mark.xdist_group("comparison")
 def test_numbers_are_those_of_the_analysis(controllers):
     for x, (K, b) in zip(controllers, ((1.0, 90.0), (2.0, 60.0)), strict=True):
         n, m = x.numbers, hc.theory.margins("x", K, b, operator=None)
@@ -84,7 +83,6 @@ def test_numbers_are_those_of_the_analysis(controllers):
         assert n["gain limit, worst hand [1/kg]"] <= n["gain limit, as sampled [1/kg]"] * (1 + 1e-9)
 
 
-@pytest.mark.xdist_group("comparison")
 def test_numbers_of_walls_are_the_closed_forms(walls):
     for x, (K, b, Ts) in zip(walls, ((500.0, 1.0, 1e-3), (300.0, 2.0, 2e-3)), strict=True):
         assert x.numbers["passive K, at most [N/m]"] == pytest.approx(2.0 * b / Ts)
@@ -99,7 +97,6 @@ def test_numbers_of_walls_are_the_closed_forms(walls):
         assert x.numbers["stable K, worst hand [N/m]"] >= 2.0 * b / Ts * (1.0 - 1e-6)
 
 
-@pytest.mark.xdist_group("comparison")
 def test_only_fields_that_differ_are_told(controllers, walls):
     fields = comparison.differing_fields(controllers)
     layers = [[0.0, 90.0, 0.0], [0.0, 60.0, 0.0]]
@@ -124,7 +121,6 @@ class Page(HTMLParser):
             self.links += [value] * (name in ("src", "href", "xlink:href"))
 
 
-@pytest.mark.xdist_group("comparison")
 @pytest.mark.usefixtures("no_layout")
 @pytest.mark.parametrize("kind", ["controllers", "walls"])
 def test_the_page_needs_no_other_file(kind, request):
@@ -149,7 +145,6 @@ def test_an_inline_picture_takes_the_colours_of_the_page():
     assert all(re.fullmatch("#[0-9a-f]{6}", color) for color in SVG_COLORS)
 
 
-@pytest.mark.xdist_group("comparison")
 def test_the_command_writes_page_numbers_and_figures(commanded):
     out, said, _ = commanded
     names = {p.name for p in out.iterdir()}

@@ -263,7 +263,6 @@ def drift():
     return hc.studies.drift_map(0.3)
 
 
-@pytest.mark.xdist_group("drift")
 def test_drift_over_the_workspace(drift):
     """Tolerances: (omega dt)^2/6 = 2e-4 at 15 Hz; finite differences 1e-9."""
     assert len(drift.x) >= 4
@@ -284,7 +283,6 @@ def test_drift_over_the_workspace(drift):
     assert len(drift.ranges()) == 24 and json.dumps(drift.summary())
 
 
-@pytest.mark.xdist_group("drift")
 def test_map_is_drawn(drift):
     from hapticclay.views import workspace_plots
 

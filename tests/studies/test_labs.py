@@ -20,7 +20,6 @@ def found(request):
     return made
 
 
-@pytest.mark.xdist_group("labs")
 def test_a_lab_has_a_table_questions_figures_and_a_run(found, tmp_path):
     assert len(found.questions) == 3 and len({len(x) for x in found.columns.values()}) == 1
     assert found.title in repr(found) and found._repr_html_().startswith("<table")
@@ -30,7 +29,6 @@ def test_a_lab_has_a_table_questions_figures_and_a_run(found, tmp_path):
     assert plain(again) == plain(found)
 
 
-@pytest.mark.xdist_group("labs")
 def test_its_runs_find_what_theory_says(found):
     c = {name.partition(" [")[0]: np.array(x) for name, x in found.columns.items()}
     if found.name == "wall":

@@ -35,7 +35,6 @@ def region():
     return study.passive_region(WALL, (0.0, 1.0), (1e-3,))
 
 
-@pytest.mark.xdist_group("passivity runs")
 def test_a_spring_leaves_b_less_half_k_ts_by_theory_and_by_runs(index):
     """Colgate, Schenkel: b - K Ts/2 at every frequency; the paths of runs to 1e-5, of 64 steps."""
     spare = WALL.device.damper - 0.5 * WALL.K * WALL.Ts
@@ -44,7 +43,6 @@ def test_a_spring_leaves_b_less_half_k_ts_by_theory_and_by_runs(index):
     assert index.margin == pytest.approx(spare)
 
 
-@pytest.mark.xdist_group("passivity runs")
 def test_sines_find_the_real_part_of_the_impedance(index):
     """To 1 %: near half the sampling frequency the steps of the engine are (omega dt)^2/6 off."""
     expected = hc.walls.wall_impedance(WALL, index.measured_omega).real
@@ -70,7 +68,6 @@ def test_arm_is_passive_on_x_and_active_on_y():
         np.testing.assert_allclose(found.measured, near, atol=0.01 * np.abs(near).max())
 
 
-@pytest.mark.xdist_group("passivity runs")
 def test_the_controller_keeps_rendered_clay_from_giving_energy(energy):
     wild, tame = energy.observed
     assert wild.min() < -1e-4 and tame.min() >= -1e-12 * tame.max()
@@ -80,7 +77,6 @@ def test_the_controller_keeps_rendered_clay_from_giving_energy(energy):
     np.testing.assert_array_equal(table["energy taken by the clay [J]"], tame)
 
 
-@pytest.mark.xdist_group("passivity runs")
 def test_region_is_that_of_the_closed_form(region):
     """2 b/(Ts (1 + 2 d)) with a delay of d samples; runs within 0.5 %, their paths being few."""
     for delay, limits, found in zip(region.delays, region.limits, region.found, strict=True):
@@ -90,7 +86,6 @@ def test_region_is_that_of_the_closed_form(region):
         assert found[0] >= 0.999 * limits[np.argmin(np.abs(region.Ts - 1e-3))]
 
 
-@pytest.mark.xdist_group("passivity runs")
 def test_figures_show_runs_beside_theory(index, energy, region):
     ax = plots.index_plot(index).axes[0]
     labels = ax.get_legend_handles_labels()[1]
@@ -102,7 +97,6 @@ def test_figures_show_runs_beside_theory(index, energy, region):
     assert len(plots.region_plot(region).axes[0].lines) == 4
 
 
-@pytest.mark.xdist_group("passivity runs")
 def test_the_active_half_is_named_where_there_is_room(index):
     """A passive wall needs no half plane; of an active one its name lies within the shade."""
     assert not plots.index_plot(index).axes[0].texts

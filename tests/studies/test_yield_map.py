@@ -102,7 +102,6 @@ def small_map():
     return chart
 
 
-@pytest.mark.xdist_group("yield map")
 def test_runs_of_the_map_do_what_theory_says(small_map):
     assert 0.5 < small_map.least < 0.6 and small_map.limit == pytest.approx(1.789, rel=1e-3)
     assert {c.simulated for c in small_map.cells} == {"sticks", "limit cycle", "grows"}
@@ -113,7 +112,6 @@ def test_runs_of_the_map_do_what_theory_says(small_map):
     assert "0 of 16 runs" in stability.yield_differences(small_map)
 
 
-@pytest.mark.xdist_group("yield map")
 def test_the_map_is_drawn(small_map):
     ax, bar = yield_map_plot(small_map).axes
     assert ax.get_xlabel() == "yield force Fy [N]" and ax.get_ylabel() == "gain K [1/kg]"

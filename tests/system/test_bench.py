@@ -34,8 +34,6 @@ from benchmarks.peers import sampled_loop as sampled_peers
 from benchmarks.peers import yielding_clay as yielding_peers
 from tests.hunt import HUNTS
 
-SHARED = pytest.mark.xdist_group("bench")  # tests with fixtures and references in common
-
 
 @pytest.fixture(scope="module")
 def rows():
@@ -86,7 +84,6 @@ def of(rows, package, **kw):
     return [r for r in rows if r["package"] == package and all(r[k] == v for k, v in kw.items())]
 
 
-@SHARED
 def test_errors_of_the_exact_solution_are_none():
     exact = problems.reference("default cut")
     t = np.arange(0.0, 11.0, 0.01)
@@ -206,7 +203,6 @@ def test_jobs_are_those_of_the_package():
     assert dataclasses.replace(problems.PROBLEMS["default cut"]) == problems.hc.constant_cut()
 
 
-@SHARED
 def test_sampled_control_is_as_late_as_its_hold_and_as_exact_as_the_hybrid_system():
     found = wp.against_hybrid(True)
     assert {r["render"] for r in found} == {"held", "physical"}
@@ -229,7 +225,6 @@ def test_sampled_rows_recommend_nothing(rows):
 # ---- studies of one problem ----------------------------------------------------------------------
 
 
-@SHARED
 def test_the_sampled_reference_and_scipy_agree_to_rounding_and_ours_to_its_first_order(studied):
     for problem in ("sampled loop with held clay", "sampled loop with physical clay"):
         rows = [r for r in studied["sampled_loop"]["rows"] if r["problem"] == problem]
@@ -252,7 +247,6 @@ def test_two_sampled_references_round_every_number_alike_and_pass_the_border(ren
     assert min(x.min() for x in one.spare.values()) > 1e9 * np.abs(one.p - other.p).max()
 
 
-@SHARED
 def test_yielding_clay_stops_and_a_regularised_law_creeps(studied):
     data = studied["yielding_clay"]
     told = data["texts"]["yielding clay"][1]
@@ -415,7 +409,6 @@ def test_a_page_is_stale_once_stepping_computes_something_else(tmp_path):
     assert provenance.stale(data, tmp_path) == {"hits": "abc", "parts": "unknown"}
 
 
-@SHARED
 def test_the_check_names_what_is_missing_or_older_than_the_code(tmp_path, capsys, one_checkout):
     for name in bench.PARTS:
         common.note(tmp_path, name, {"made": provenance.Stopwatch().stamp()})
@@ -429,7 +422,6 @@ def test_the_check_names_what_is_missing_or_older_than_the_code(tmp_path, capsys
     )
 
 
-@SHARED
 def test_an_interrupted_benchmark_goes_on_with_what_is_missing(
     tmp_path, monkeypatch, capsys, one_checkout
 ):
