@@ -75,7 +75,7 @@ def least_damped(loop):
 
 @pytest.mark.parametrize(
     "base, vary, n",
-    [(PushedLoop("x"), {"K": GAIN, "b": CLAY}, 60 * MORE), (SAMPLED, MOVED, 30 * MORE)],
+    [(PushedLoop("x"), {"K": GAIN, "b": CLAY}, 80 * MORE), (SAMPLED, MOVED, 30 * MORE)],
     ids=["continuous", "sampled, late, at any pose, without shaping"],
 )
 def test_a_run_is_judged_as_its_eigenvalues_are(base, vary, n):
