@@ -52,9 +52,9 @@ LIMITATIONS = (
     "All jobs are the planar arm of the paper in clay. Another arm, contact geometry or a larger "
     "model was not measured.",
     "In single runs hapticclay makes the steps that cross a border or stop in Python, until a "
-    "process has made some 18,000 of one kind of scene; from then on they are compiled. The tables "
-    "of cuts, hits and sampled loops are those of single runs; those of throughput are compiled "
-    "throughout; that of yielding clay has both.",
+    "process has made some 120 of one kind of scene (18,000, if their machine code is not stored "
+    "yet); from then on they are compiled. The tables of cuts, hits and sampled loops are those of "
+    "single runs; those of throughput are compiled throughout; that of yielding clay has both.",
     "The programs for the other packages are ours, written from the same equations "
     "(`benchmarks/peers`). Their authors might tune them better; a corrected program is welcome.",
     "Settings are a ladder of steps or tolerances. The best setting between two of them may be "

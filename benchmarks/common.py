@@ -51,7 +51,8 @@ def compile_careful_steps(s: hc.Scenario, are_compiled: bool) -> None:
 
     Args:
         s: the scene.
-        are_compiled: as after some 18,000 of them; else in Python, as the first ones of a process.
+        are_compiled: as later in a process; else in Python, as its first ones, see
+            `compiled.enough`.
     """
     from hapticclay.stepping import compiled, machine_code, scene
 
