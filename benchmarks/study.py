@@ -235,9 +235,9 @@ def sections(data: dict[str, Any]) -> list[str]:
         single = [r for r in rows if not r["method"].endswith(THROUGHOUT)]
         if len(single) < len(rows):
             text += [
-                "hapticclay makes the first steps that cross a border or stop in Python: some 120 of "
-                "a kind of scene in each process, and some 18,000 where their machine code is not "
-                "stored yet. In such runs (methods without `throughout`):",
+                "hapticclay makes the first steps that cross a border or stop in Python: some 120 "
+                "of a kind of scene in each process, and some 18,000 where their machine code is "
+                "not stored yet. In such runs (methods without `throughout`):",
                 *ranked(single),
             ]
         text += [
