@@ -291,7 +291,7 @@ def test_the_page_of_a_study_says_who_leads_and_how_single_runs_fare():
         row("SciPy", "LSODA", "0.1, 0.001", 1e-5, 2.5),
     ]
     text = "\n".join(study.sections({"texts": {"p q": ["about", "told"]}, "rows": rows}))
-    both, single = text.split("In the first runs")
+    both, single = text.split("hapticclay makes the first steps")
     assert "by requested error: hapticclay at 1e-02 to 1e-06 m; SciPy at 1e-07 m." in both
     assert "by requested error: SciPy at 1e-02 to 1e-07 m." in single
     assert "Only SciPy went below the 1.0e-06 m of hapticclay." in text and "(p_q.png)" in text
