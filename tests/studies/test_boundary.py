@@ -216,6 +216,18 @@ def test_bad_loops_are_refused(kw, field):
 # ----------------
 
 
+@pytest.mark.parametrize("make", [stability_map._gain_damping, stability_map._delay_damping])
+def test_maps_of_damping_hold_the_limit_of_their_loop(make):
+    """By runs within 0.2 % of the exact line of the same loop (boundary.BRACKET), and the engine's
+    steps; every cell is as the line says."""
+    found = make(Loop(), 2, 2, iter)
+    assert found.gap() < 3e-3
+    (xs, limits), *_ = found.found.values()
+    for cell in found.cells:
+        limit = limits[xs.index(cell.x)]
+        assert (cell.simulated == "stable") == (cell.y < limit), cell
+
+
 @pytest.fixture(scope="module")
 def poses():
     return stability_map._gain_pose(Loop(inertia_shaping=False), 2, 3, iter)
