@@ -1,7 +1,6 @@
 """The benchmark: its figures follow from the runs, its tables from the figures."""
 
 import dataclasses
-import functools
 import json
 from pathlib import Path
 
@@ -71,13 +70,6 @@ def studied(tmp_path_factory):
     out = tmp_path_factory.mktemp("studies")
     both = {"sampled_loop": sampled_loop, "yielding_clay": yielding_clay}
     return {name: x.main(out, True) for name, x in both.items()}
-
-
-@pytest.fixture
-def one_checkout(monkeypatch):
-    """Commit and digest of the code are looked up once."""
-    for name in ("commit", "code_digest"):
-        monkeypatch.setattr(provenance, name, functools.cache(getattr(provenance, name)))
 
 
 def of(rows, package, **kw):
@@ -328,7 +320,7 @@ def test_runs_take_turns_and_long_ones_run_once():
 
 
 def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
-    tmp_path, monkeypatch, capsys, rows, scaled, studied, one_checkout
+    tmp_path, monkeypatch, capsys, rows, scaled, studied
 ):
     monkeypatch.setattr(wp, "measure", lambda *a, **kw: (of(rows, "hapticclay"), []))
     every = [r for data in studied.values() for r in data["rows"]]
@@ -409,7 +401,7 @@ def test_a_page_is_stale_once_stepping_computes_something_else(tmp_path):
     assert provenance.stale(data, tmp_path) == {"hits": "abc", "parts": "unknown"}
 
 
-def test_the_check_names_what_is_missing_or_older_than_the_code(tmp_path, capsys, one_checkout):
+def test_the_check_names_what_is_missing_or_older_than_the_code(tmp_path, capsys):
     for name in bench.PARTS:
         common.note(tmp_path, name, {"made": provenance.Stopwatch().stamp()})
     assert bench.check(tmp_path) == 0
@@ -422,9 +414,7 @@ def test_the_check_names_what_is_missing_or_older_than_the_code(tmp_path, capsys
     )
 
 
-def test_an_interrupted_benchmark_goes_on_with_what_is_missing(
-    tmp_path, monkeypatch, capsys, one_checkout
-):
+def test_an_interrupted_benchmark_goes_on_with_what_is_missing(tmp_path, monkeypatch, capsys):
     begun, stops = [], iter([False, True])
 
     class Part:
