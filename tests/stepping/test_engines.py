@@ -177,12 +177,11 @@ KINDS = {
     "accurate: form, cells, smooth, rotated": variants(
         "accurate", TURNED, dict(FORMED), turned={}, otherwise=dict(clay=OTHERWISE), weak=WEAK,
     ),
-    "accurate: yield by axis": flows("accurate", operator=None, t_max=0.12),
     "accurate: yield by axis, rotated": flows(
-        "accurate", angles=(0.5, -1.0), inertia_shaping=True, t_max=0.12
+        "accurate", angles=(0.5, -1.0), operator=None, t_max=0.12
     ),
     "accurate: yield along the motion": flows(
-        "accurate", True, compensator=ZEROS,
+        "accurate", True, compensator=ZEROS, inertia_shaping=True,
         muscle=hc.Step((2.0, 0.5), 0.0) + hc.Step((-3.0, -0.9), 0.04),
     ),
     "held: plain": variants(
@@ -197,12 +196,9 @@ KINDS = {
         dict(hardware=ALL, operator=HAND, inertia_shaping=True, muscle=WAVE, command=LED),
         all={}, slow=dict(hardware=ALL | dict(delay=0.01), dt=1e-4, Ts=0.05), weak=WEAK,
     ),
-    "held: form, growth, filter of first order": variants(
-        "held", GROWS, dict(hardware=FILTERED) | FORMED, all={}, weak=WEAK,
-    ),
-    "held: cells, smooth, rotated": variants(
-        "held", TURNED, dict(operator=HAND, force=(4.0, 1.0)),
-        turned={}, otherwise=dict(clay=OTHERWISE), steps=dict(dt=1e-4, Ts=4e-4),
+    "held: form, cells, smooth, rotated, filter of first order": variants(
+        "held", TURNED, dict(hardware=FILTERED, force=(4.0, 1.0)) | FORMED,
+        turned={}, otherwise=dict(clay=OTHERWISE), weak=WEAK, steps=dict(dt=1e-4, Ts=4e-4),
     ),
     "held: yield by axis, springs": springs(
         method="held", operator=HAND, dt=2.5e-4, Ts=5e-4,
@@ -214,9 +210,10 @@ KINDS = {
         "held", LAYERS, dict(controller=OWN, hardware=PHYSICAL, operator=HAND, muscle=WAVE),
         own={}, weak=WEAK,
     ),
-    "physical: growth, signals": variants(
-        "physical", GROWS, dict(operator=HAND, muscle=WAVE, command=LED, inertia_shaping=True),
-        grows={}, weak=WEAK, steps=dict(dt=1e-4, Ts=4e-4),
+    "physical: cells, smooth, rotated, signals": variants(
+        "physical", TURNED,
+        dict(operator=HAND, muscle=WAVE, command=LED, inertia_shaping=True, force=(4.0, 1.0)),
+        turned={}, otherwise=dict(clay=OTHERWISE), weak=WEAK, steps=dict(dt=1e-4, Ts=4e-4),
     ),
     "physical: form, stiff, all hardware": variants(
         "physical", STIFF, dict(hardware=PHYSICAL) | FORMED,
@@ -228,10 +225,6 @@ KINDS = {
     ),
     "physical: yield along the motion": flows(
         "physical", True, hardware=dict(delay=3e-4), t_max=0.12
-    ),
-    "physical: cells, smooth, rotated": variants(
-        "physical", TURNED, dict(hardware=dict(delay=2e-4), force=(4.0, 1.0)),
-        turned={}, otherwise=dict(clay=OTHERWISE), weak=WEAK,
     ),
     "physical: groove": grooves(
         "physical", damping=2e5, hardware=dict(delay=2e-4, encoder=8192), force=(2.5, 0.5)
