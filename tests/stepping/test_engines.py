@@ -230,7 +230,7 @@ KINDS = {
         "physical", damping=2e5, hardware=dict(delay=2e-4, encoder=8192), force=(2.5, 0.5)
     ),
     "physical: own controller": variants(
-        "physical", LAYERS, dict(controller=OWN, operator=HAND), own={}, weak=WEAK,
+        "physical", LAYERS, dict(controller=OWN), own={}, weak=WEAK,
     ),
 }  # fmt: skip
 HOLDS = [x for x in KINDS if "yield" in x and x[:4] in ("fast", "accu")]
