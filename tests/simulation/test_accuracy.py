@@ -80,7 +80,7 @@ def true_error(s, r, unit):
         gaps = [abs(a.time - b[2]) for a, b in zip(r.crossings, crossings, strict=True)]
         return max(gaps, default=None)
     # samples behind a border err most; of the others, some tell
-    at = [np.linspace(0, len(r.t) - 1, 60).astype(int)]
+    at = [np.linspace(0, len(r.t) - 1, 20).astype(int)]
     at += [np.searchsorted(r.t, c.time) + np.arange(-2, 12) for c in r.crossings]
     index = np.unique(np.clip(np.concatenate(at), 0, len(r.t) - 1))
     _, p = exact(s, r.t[index])
@@ -94,7 +94,7 @@ def test_errors_are_as_small_as_asked_and_estimates_are_true():
     step shows. Scenes without a crossing, or unstable, have no estimate, and say so.
     """
     pytest.importorskip("numba")
-    found, n = [], 100 if HUNTS else 60
+    found, n = [], 100 if HUNTS else 40
 
     @settings(max_examples=n)
     @given(scenes(), st.floats(-8.0, -3.0), st.sampled_from("ssm"))
@@ -120,7 +120,7 @@ def test_errors_are_as_small_as_asked_and_estimates_are_true():
 
 def test_sampled_control_keeps_its_samples_and_the_physics_its_error():
     """Beside the hybrid system, exact between samples: steps divide Ts, and the error is kept."""
-    s = hc.constant_cut(control="sampled", dt=4e-3, render="physical", t_max=0.75)
+    s = hc.constant_cut(control="sampled", dt=4e-3, render="physical", start=(0.03, 0.0), t_max=0.4)
     r = hc.simulate(s, error="1e-7 m")
     e, Ts = r.error, r.scenario.Ts
     assert Ts == 4e-3 and e.reached and (Ts / e.dt) % 1.0 == 0.0 and e.dt < Ts
@@ -226,11 +226,11 @@ def test_progress_may_end_it(tmp_path):
 
     def stop(t, x):
         calls.append(t)
-        return len(calls) == 3
+        return True
 
     s = hc.stability_test(3.0, t_max=20.0)
     r = hc.simulate(s, error="1e-7 m", progress=stop, engine="python")
-    assert len(calls) == 3 and r.outcome.code == "interrupted"
+    assert len(calls) == 1 and r.outcome.code == "interrupted"
     assert r.error.note == "interrupted" and not r.error.reached and r.error.estimate is None
 
 
@@ -301,6 +301,6 @@ def test_rounding_bounds_what_can_be_said():
 
 def test_a_run_that_asks_for_no_error_does_not_load_it():
     name = "hapticclay.simulation.asked_error"
-    run = "import hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01)"
-    assert loaded(f"{run})", (name,)) == []
-    assert loaded(f"{run}, error=1.0)", (name,)) == [name]
+    run = "hc.simulate(hc.constant_cut(t_max=0.01)"
+    plain = f"import sys, hapticclay as hc; {run}); assert {name!r} not in sys.modules"
+    assert loaded(f"{plain}; {run}, error=1.0)", (name,)) == [name]

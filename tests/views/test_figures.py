@@ -63,11 +63,11 @@ def record(name):
     across = hc.Clay.of_groove(BLOCK)
     return hc.simulate(
         {
-            "constant": hc.constant_cut(t_max=4.0),
-            "variable": hc.variable_cut(operator=HAND, inertia_shaping=True, t_max=3.0),
-            "driven": hc.stability_test(25.0, t_max=3.0),
-            "yields": hc.Scenario(clay=yields, force=(5.0, 0.0), t_max=3.0),
-            "ground": hc.Scenario(clay=across, force=(5.0, 0.0), t_max=2.0),
+            "constant": hc.constant_cut(t_max=4.0, dt=1e-3),
+            "variable": hc.variable_cut(operator=HAND, inertia_shaping=True, t_max=3.0, dt=1e-3),
+            "driven": hc.stability_test(25.0, t_max=3.0, dt=1e-3),
+            "yields": hc.Scenario(clay=yields, force=(5.0, 0.0), t_max=3.0, dt=1e-3),
+            "ground": hc.Scenario(clay=across, force=(5.0, 0.0), t_max=2.0, dt=1e-3),
         }[name]
     )
 
@@ -274,11 +274,11 @@ def compared(kind):
         walls = [
             hc.VirtualWall(300.0 + 200.0 * i, 0.2 * i, device=hc.Device(0.1, 1.0)) for i, _ in looks
         ]
-        runs = [hc.simulate(w.scenario(0.1, push=0.01)) for w in walls]
+        runs = [hc.simulate(w.scenario(0.05, push=0.01)) for w in walls]
         found = zip(names, walls, [None] * 5, runs, strict=True)
     else:
         gains = [(1.0 - 0.15 * i, 0.5) for i, _ in looks]
-        scenes = [hc.constant_cut(gain=gain, operator=HAND, t_max=4.0) for gain in gains]
+        scenes = [hc.constant_cut(gain=k, operator=HAND, t_max=4.0, dt=1e-3) for k in gains]
         loops = [Loop.of(x, "x") for x in scenes]
         found = zip(names, scenes, loops, [hc.simulate(x) for x in scenes], strict=True)
     region = z_region("", hc.VirtualWall(device=hc.Device(0.1, 1.0)))
@@ -429,15 +429,16 @@ def assert_two_numbers(figure):
             assert len(some) >= 2, (ax, axis, some)
 
 
-AGAIN = {  # drawn by the function of another case, of a run or result of the same kind
+# drawn by the function of another case, of a run or result of the same kind: in a hunt alone
+AGAIN = {
     "variable velocity", "ground velocity", "constant force", "driven force_position",
     "map delay-damping", "identified Th", "sweep speed", "bode", "zwidth region",
     "impedance of wall", "transparency of wall", "instability line",
     *(n for n in CASES if re.match("compared walls: (spare|impedance|parts)", n)),
 }  # fmt: skip
 # in one column text has the least room
-WIDE = CASES if HUNTS else some((n for n in CASES if n not in AGAIN), 24)
-PRINTED = [(n, "print") for n in CASES] + [(n, "print-wide") for n in WIDE]
+ONCE = [n for n in CASES if HUNTS or n not in AGAIN]
+PRINTED = [(n, "print") for n in ONCE] + [(n, "print-wide") for n in some(ONCE, 12)]
 
 
 def test_figures_drawn_again_are_cases():
@@ -465,7 +466,8 @@ def test_text_can_be_read_in_print(name, style, monkeypatch):
         assert_two_numbers(figure)
 
 
-SHOWN = [(n, "screen") for n in LABELLED] + [("narrow family", "print")]  # CASES are printed above
+# CASES are printed above
+SHOWN = [(n, "screen") for n in some(LABELLED, 8)] + [("narrow family", "print")]
 
 
 @pytest.mark.parametrize("name, style", SHOWN)

@@ -11,6 +11,7 @@ from hapticclay.studies.sampling import Range
 from hapticclay.theory.loops import Loop
 from hapticclay.views.figure import Figure
 from hapticclay.views.robustness_plots import band_plot, instability_plot
+from tests.hunt import HUNTS
 
 HANDS = hc.studies.Hands.around(hc.Operator(0.4, 5.0, 80.0), 0.5)
 GAIN = hc.studies.Distribution("log-normal", 4.0, 1.0)
@@ -40,8 +41,12 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("style", ["screen", "print"])
-@pytest.mark.parametrize("name", CASES)
+# the others stand among all figures that are printed
+PRINTED = CASES if HUNTS else ["turned plane"]
+DRAWN = [(name, "screen") for name in CASES] + [(name, "print") for name in PRINTED]
+
+
+@pytest.mark.parametrize("name, style", DRAWN)
 def test_every_text_lies_in_the_figure(name, style, monkeypatch):
     drawn, draw = [], Text.draw
 

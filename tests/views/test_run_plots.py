@@ -45,7 +45,7 @@ def test_force_plot_shows_b_beside_the_ratios(run):
 @pytest.mark.parametrize("scenario", [
     hc.free(t_max=0.5), hc.constant_cut(gain=(1.0, 1.0), dt=1e-3), hc.constant_cut(t_max=1e-5),
     hc.free(force=(0.0, 0.0), t_max=0.1),
-    hc.constant_cut(operator=hc.Operator(), t_max=1.0),
+    hc.constant_cut(operator=hc.Operator(), t_max=1.0, dt=1e-3),
 ], ids=["free", "unstable", "two samples", "at rest", "hand"])  # fmt: skip
 def test_any_record_can_be_drawn(scenario, tmp_path):
     record = hc.simulate(scenario)
@@ -55,17 +55,18 @@ def test_any_record_can_be_drawn(scenario, tmp_path):
         draw(record, "y").draw_without_rendering()
 
 
-LONG = dict(operator=hc.Operator(), inertia_shaping=True, gain=(1.234, 0.5678), t_max=3.0)
+LONG = dict(operator=hc.Operator(), inertia_shaping=True, gain=(1.234, 0.5678), t_max=3.0,
+            dt=1e-3)  # fmt: skip
 
 
 SCENARIOS = {
-    "variable": hc.variable_cut(t_max=4.0),
+    "variable": hc.variable_cut(t_max=4.0, dt=1e-3),
     "long": hc.variable_cut(**LONG),
     "long constant": hc.constant_cut(**LONG, force=(1.234, -0.5678)),
     "long free": hc.free(**LONG),
-    "driven": hc.stability_test(25.0, inertia_shaping=True, t_max=3.0),
+    "driven": hc.stability_test(25.0, inertia_shaping=True, t_max=3.0, dt=1e-3),
     "short": hc.constant_cut(t_max=0.1),
-    "unstable": hc.constant_cut(gain=(1.0, 1.0)),
+    "unstable": hc.constant_cut(gain=(1.0, 1.0), dt=1e-3),
     "other parts": hc.with_fields(
         hc.constant_cut(**LONG),
         {"arm.l1": 0.3, "servo.x.S.damping": 50.0, "compensator.den.1": 8.0},
@@ -151,7 +152,7 @@ def test_force_plot_shows_the_damper_of_any_compensator(name):
     G = hc.SecondOrder(ratio * 800.0, 45.0, 800.0)
     servo = tuple(hc.Servo(G, axis.S) for axis in hc.Scenario().servo)
     scenario = dataclasses.replace(
-        hc.constant_cut(t_max=2.5, dt=1e-3, start=(0.045, 0.0)),
+        hc.constant_cut(t_max=2.0, dt=1e-3, start=(0.045, 0.0)),
         gain=(1.0, 0.0),
         compensator=c,
         servo=servo,

@@ -62,14 +62,14 @@ def test_slices_are_no_part_of_the_result():
     """With a still target, slices of two lengths and a headless run with that force agree."""
     ends = []
     for frame in (FRAME_TIME, 0.005, LONGEST_SLICE):
-        session = Session(hc.constant_cut(), stiffness=10.0)
+        session = Session(hc.constant_cut(dt=1e-3), stiffness=10.0)
         session.pull((0.0, 0.0))
         session.push((2.0, 0.0))
         while session.t < 1.2 - 1e-9:
             session.advance(min(frame, 1.2 - session.t + 1e-9))
         ends.append(session.record())
     still = dataclasses.replace(
-        played(hc.constant_cut(), 10.0), force=(2.0, 0.0), t_max=ends[0].t[-1]
+        played(hc.constant_cut(dt=1e-3), 10.0), force=(2.0, 0.0), t_max=ends[0].t[-1]
     )
     reference = hc.simulate(still)
     for record in ends:
@@ -79,7 +79,7 @@ def test_slices_are_no_part_of_the_result():
 
 
 def test_gain_and_damping_change_while_it_runs():
-    session = Session(hc.constant_cut(), stiffness=10.0)
+    session = Session(hc.constant_cut(dt=1e-3), stiffness=10.0)
     drag(session, 1.0, lambda t: (0.1, 0.0))
     session.change(b=2.0)
     assert session.b == (180.0, 180.0)
@@ -95,7 +95,7 @@ def test_gain_and_damping_change_while_it_runs():
 
 def test_letting_go_leaves_the_handle_to_itself():
     """The hand's mass and damper remain: 10/K and d slow the handle, no spring pulls it back."""
-    session = drag(Session(hc.free(), stiffness=10.0), 1.5, lambda t: (0.1, 0.0))
+    session = drag(Session(hc.free(dt=1e-3), stiffness=10.0), 1.5, lambda t: (0.1, 0.0))
     session.pull(None)
     for _ in range(120):
         session.advance(FRAME_TIME)
@@ -104,7 +104,7 @@ def test_letting_go_leaves_the_handle_to_itself():
 
 
 def test_pause_restart_and_record_switch():
-    session = drag(Session(hc.constant_cut(), stiffness=10.0), 0.5)
+    session = drag(Session(hc.constant_cut(dt=1e-3), stiffness=10.0), 0.5)
     session.paused = True
     assert len(session.advance(FRAME_TIME)) == 0 and session.t == pytest.approx(0.5, abs=FRAME_TIME)
     session.paused, session.recording = False, False
