@@ -38,7 +38,7 @@ pytestmark = pytest.mark.filterwarnings(
 @pytest.fixture
 def page():
     made, done = (
-        Page(Session(hc.constant_cut(), stiffness=10.0, every=10), port=0),
+        Page(Session(hc.constant_cut(start=(0.048, 0.0)), stiffness=10.0, every=10), port=0),
         threading.Event(),
     )
     thread = threading.Thread(target=made.serve, args=(done.is_set,))
@@ -79,11 +79,11 @@ def test_page_loads_and_its_sliders_change_the_simulation(page, tmp_path, capfd)
             while time.monotonic() < end and not condition():
                 tab.wait_for_timeout(50)
 
-        press(sliders.nth(2), "ArrowRight", 6)
+        press(sliders.nth(2), "ArrowRight", 4)
         # the page sends at most 20 values a second, of all sliders together: the last
-        until(lambda: page.session.run.pull.force[0] > 0.59)
-        press(sliders.nth(0), "ArrowLeft", 2)
-        until(lambda: page.session.frames[-1][1][0] > 0.06 and page.b.value < 88.5)
+        until(lambda: page.session.run.pull.force[0] > 0.39)
+        press(sliders.nth(0), "ArrowLeft", 1)
+        until(lambda: page.session.frames[-1][1][0] > 0.053 and page.b.value < 89.5)
         picture = tab.screenshot(path=tmp_path / "page.png")
         before = page.session.scenario.clay.x.values[1]
         number = tab.locator("input[type=text], input[type=number]").nth(0)
@@ -94,9 +94,9 @@ def test_page_loads_and_its_sliders_change_the_simulation(page, tmp_path, capfd)
     assert troubles == []
     assert page.session.scenario.clay.x.values[1] == page.b.value == 0.0  # as far down as it goes
     assert capfd.readouterr().err == ""
-    assert page.session.run.pull.force == pytest.approx((0.6, 0.0))
-    assert before == pytest.approx(88.0)
-    assert page.session.frames[-1][1][0] > 0.06  # the force moved the handle into the clay
+    assert page.session.run.pull.force == pytest.approx((0.4, 0.0))
+    assert before == pytest.approx(89.0)
+    assert page.session.frames[-1][1][0] > 0.053  # the force moved the handle into the clay
 
     import imageio.v3 as iio
 
