@@ -38,7 +38,7 @@ pytestmark = pytest.mark.filterwarnings(
 @pytest.fixture
 def page():
     made, done = (
-        Page(Session(hc.constant_cut(start=(0.048, 0.0)), stiffness=10.0, every=10), port=0),
+        Page(Session(hc.constant_cut(start=(0.048, 0.0), dt=1e-3), stiffness=10.0), port=0),
         threading.Event(),
     )
     thread = threading.Thread(target=made.serve, args=(done.is_set,))

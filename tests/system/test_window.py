@@ -195,7 +195,9 @@ def test_closing_while_clay_is_cut_ends_it_and_the_record_is_there(screen, tmp_p
 
     So the handle is still in the clay however late a busy machine closes the window.
     """
-    mouse = Mouse(screen, tmp_path, "view", "--b", "2000", "--out", "o", "--no-plots")
+    mouse = Mouse(
+        screen, tmp_path, "view", "--b", "2000", "--dt", "1e-3", "--out", "o", "--no-plots"
+    )
     try:
         mouse.drag(200)
         mouse.until(lambda now: now["x"] > 0.055)
