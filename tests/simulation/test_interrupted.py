@@ -10,20 +10,20 @@ import hapticclay as hc
 from hapticclay.simulation import record
 
 HARDWARE = dataclasses.replace(
-    hc.constant_cut(control="sampled", t_max=1.7),
+    hc.constant_cut(control="sampled", t_max=1.5),
     hardware=hc.Hardware(jitter=2e-5, delay=1e-4, friction=(0.01, 0.01)),
 )
-CUT = hc.constant_cut(t_max=3.5)  # some steps longer than two looks; others than one
+CUT = hc.constant_cut(t_max=3.0)  # some steps longer than two looks; others than one
 SCENES = {  # name: scenario, engine, every, looks
     "fast": (CUT, "python", 1, 2),
     "fast, some samples": (CUT, "python", 7, 1),
-    "driven": (hc.stability_test(3.0, t_max=1.7), "python", 1, 1),
-    "growing": (hc.variable_cut(t_max=1.7), "python", 1, 1),
+    "driven": (hc.stability_test(3.0, t_max=1.5), "python", 1, 1),
+    "growing": (hc.variable_cut(t_max=1.5), "python", 1, 1),
     "native": (CUT, "native", 1, 2),
     "native, some samples": (CUT, "native", 7, 2),
-    "accurate": (hc.constant_cut(integrator="accurate", dt=1e-3, t_max=4.6), "python", 1, 1),
+    "accurate": (hc.constant_cut(integrator="accurate", dt=1e-3, t_max=4.2), "python", 1, 1),
     "accurate, native": (hc.constant_cut(integrator="accurate", t_max=9.5), "native", 3, 2),
-    "sampled": (hc.constant_cut(control="sampled", t_max=1.7), "python", 1, 1),
+    "sampled": (hc.constant_cut(control="sampled", t_max=1.5), "python", 1, 1),
     "hardware": (HARDWARE, "python", 1, 1),
 }
 
@@ -62,7 +62,7 @@ def test_an_interrupted_record_is_the_beginning_of_the_whole_one(name):
 
 
 def test_an_instability_met_before_is_not_forgotten():
-    r = hc.simulate(hc.stability_test(25.0), progress=lambda t, x: t > 5.0)
+    r = hc.simulate(hc.stability_test(25.0), progress=lambda t, x: t > 2.5)
     assert r.status == f"interrupted at {r.t[-1]:.4f} s (x axis: growing oscillation)"
 
 

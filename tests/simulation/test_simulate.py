@@ -147,7 +147,7 @@ def test_any_stable_cut_without_shaping(b, K, f):
     assume(K < 0.6 * min(hc.theory.gain_limit("x", b), 3.0))
     Ky = 0.3 * min(hc.theory.gain_limit("y", b), 1.0)
     s = hc.constant_cut(b=b, gain=(K, Ky), force=(f, 0.0), t_max=3.0)
-    exact, *_ = nonlinear((0, b, 0), EDGES, s.gain, s.force, t_max=3.0, rtol=1e-9, atol=1e-11)
+    exact, *_ = nonlinear((0, b, 0), EDGES, s.gain, s.force, t_max=3.0, rtol=1e-7, atol=1e-9)
     r = hc.simulate(s)
     assume(len(r.crossings) == len(exact) and r.outcome.code != "diverged")
     np.testing.assert_allclose(times(r), exact, rtol=2e-3)
@@ -323,14 +323,14 @@ def test_speed_is_a_small_multiple_of_the_bare_engine():
     from benchmarks import throughput
 
     scene = throughput.SCENES["constant cut"]
-    ratio = min(throughput.loop(scene, 8000) / throughput.floor(scene, 8000) for _ in range(3))
+    ratio = min(throughput.loop(scene, 4000) / throughput.floor(scene, 4000) for _ in range(3))
     assert ratio < 60.0
 
 
 @pytest.mark.parametrize("engine", ["python", "auto"])
 def test_runs_within_and_beside_a_run_leave_it_as_it_is(engine):
     """Runs share engines one after the other, never at the same time."""
-    s = hc.constant_cut(t_max=1.6)  # one look at its progress
+    s = hc.constant_cut(t_max=1.5)  # one look at its progress
     alone = hc.simulate(s, engine=engine)
     inner = []
 
@@ -338,8 +338,8 @@ def test_runs_within_and_beside_a_run_leave_it_as_it_is(engine):
         inner.append(hc.simulate(hc.constant_cut(b=30.0, t_max=0.1), engine=engine))
 
     outer = hc.simulate(s, engine=engine, progress=progress)
-    with ThreadPoolExecutor(3) as pool:
-        beside = list(pool.map(lambda _: hc.simulate(s, engine=engine), range(4)))
+    with ThreadPoolExecutor(2) as pool:
+        beside = list(pool.map(lambda _: hc.simulate(s, engine=engine), range(3)))
     for r in (outer, *beside):
         np.testing.assert_array_equal(r.p, alone.p)
         assert r.energy == alone.energy and r.crossings == alone.crossings

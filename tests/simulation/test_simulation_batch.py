@@ -8,18 +8,18 @@ import pytest
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.simulation.stepwise import Sample
-from tests.simulation.test_stepwise import CUT, HARD, SCENES, fast
+from tests.simulation.test_stepwise import CUT, HARD, HELD, SCENES, fast
 
 pytestmark = pytest.mark.plain
-HELD = replace(CUT, control="sampled", Ts=7.2e-4)
+SAMPLED = replace(CUT, control="sampled", Ts=7.2e-4)
 YIELDS = replace(CUT, clay=hc.slab(hc.Flow(Fy=0.5, K=2.0, n=0.5), 0.001, 0.02))
 SOFT = hc.Groove((-0.03, 0.07), (-0.03, 0.03), 5e3, cells=(100, 60), tool=hc.Tool(0.01, 0.005))
 GROOVE = replace(CUT, clay=hc.Clay.of_groove(SOFT))
 KINDS = {
-    "operator": [replace(CUT, operator=x) for x in (hc.Operator(), hc.Operator(0.5, 5.0, 9.0))],
+    "operator": [HELD, replace(HELD, operator=hc.Operator(0.5, 5.0, 9.0))],
     "hardware": [
-        replace(HELD, hardware=HARD),
-        replace(HELD, hardware=replace(HARD, seed=5, delay=1.4e-3)),
+        replace(SAMPLED, hardware=HARD),
+        replace(SAMPLED, hardware=replace(HARD, seed=5, delay=1.4e-3)),
     ],
     "yields": [YIELDS, replace(YIELDS, clay=hc.slab(hc.Flow(Fy=0.8, K=1.0, n=0.8), 0.002, 0.02))],
     "groove": [GROOVE, replace(GROOVE, clay=hc.Clay.of_groove(replace(SOFT, cells=(90, 54))))],
@@ -74,7 +74,7 @@ def test_compiled_runs_of_one_kind_are_those_of_simulations(name):
 @fast
 def test_kinds_that_no_run_has_are_let_go():
     """As of an arm that is drawn anew at each reset."""
-    scene = KINDS["operator"][0]
+    scene = HELD
     with hc.SimulationBatch([scene] * 2, engine="native") as batch:
         for k in range(40):
             batch.reset(0, replace(scene, arm=hc.Arm(l1=0.25 + 1e-4 * k)))
@@ -106,9 +106,10 @@ def test_verdicts_come_when_a_simulation_has_them():
 def test_runs_of_any_kinds_stand_in_one_batch(engine):
     """With signals and controllers of one's own too, which are advanced one by one."""
     law = hc.Controller(lambda t, q, qd, fh, state, params: ((-qd[0], -qd[1]), ()))
-    kinds = ["cut", "hand", "driven", "driven sampled", "unstable"]
-    scenes = [SCENES[x] for x in (kinds if engine == "python" else kinds[:4])]
-    scenes += [replace(HELD, controller=law, render="physical")] if engine == "python" else []
+    scenes = [HELD, YIELDS, SCENES["driven"]]
+    if engine == "python":
+        scenes += [SCENES[x] for x in ("cut", "hand", "driven sampled", "unstable")]
+        scenes += [replace(SAMPLED, controller=law, render="physical")]
     single = [hc.Simulation(s, engine="python") for s in scenes]
     with hc.SimulationBatch(scenes, engine=engine) as batch:
         go_on(batch, single, 2, 8, 30)
