@@ -17,24 +17,46 @@ LEARNING = {*(ROOT / "examples" / "learning").glob("*.py")}  # need torch, and m
 EXAMPLES = sorted({*(ROOT / "examples").rglob("*.py")} - {*TUTORIALS} - LEARNING)
 PAGES = EXAMPLES + TUTORIALS
 IDS = [f"{page.parent.name}/{page.stem}" for page in PAGES]
-FEWER = {  # numbers of a program, and what they are in the suite: fewer, shorter or coarser runs
+# words of a program, and what they are in the suite: fewer, shorter or coarser runs, or in Python
+FEWER = {
+    "clay/dent": {"    t_max=2.0,": "    t_max=2.0,\n    dt=2e-3,"},
     "clay/sticking": {"t_max=4.0": "t_max=3.0, dt=1e-3"},
+    "parts/chirp": {"=30.0": "=10.0", "/ 30.0": "/ 10.0", "    t_max": "    dt=1e-3,\n    t_max"},
+    "parts/compensator": {"300.0, 400)": "300.0, 100)"},
+    "parts/controller": {"t_max=3.0": "t_max=1.0", "(scenario)": "(scenario, engine='python')"},
+    "parts/signals": {"4.0, 2001)": "4.0, 501)"},
     "robustness/gain_band": {"hands=60": "hands=20"},
     "runs/batch": {"1000.0, 25)": "1000.0, 7)"},
+    "runs/columns": {"0.8, 120)": "0.8, 30)", "200.0, 120)": "200.0, 30)"},
     "runs/energy": {"1e-3, 5e-4, 2.5e-4]": "1e-3]"},
-    "runs/many_step_by_step": {"t_max=8.0": "t_max=3.0"},
+    "runs/many_step_by_step": {"t_max=8.0": "t_max=1.0"},
     "runs/maneuver": {"stability_test(K)": "stability_test(K, t_max=5.0)"},
     "studies/fit_law": {"t_max=8.0": "t_max=4.0"},
+    "studies/measured_columns": {"    t_max=30.996": "    dt=1e-3,\n    t_max=30.996"},
+    "studies/stored_columns": {"0.5, 120)": "0.5, 30)", "0.7, 120)": "0.7, 30)"},
     "studies/sweep": {"1000:7log gain.y=0.1,0.2,0.4,0.8,1.6": "1000:3log gain.y=0.1,0.4,1.6"},
+    "symptoms/device_from_data": {"12.0, muscle": "8.0, muscle"},
     "symptoms/fast_enough": {"5000.0, 60)": "5000.0, 12)"},
-    "tutorials/t2_stability": {"3e4, 60)": "3e4, 12)"},
+    "symptoms/sticks_and_jumps": {"dt=1e-3": "dt=2e-3"},
+    "symptoms/wall_vibrates": {"scenario(0.6,": "scenario(0.3,", "t > 0.5": "t > 0.2"},
+    "tutorials/t2_stability": {"3e4, 60)": "3e4, 12)", "t_max=3.0": "t_max=1.0"},
+    "tutorials/t3_own_controller": {
+        "t_max=3.0": "t_max=1.2",
+        "record = hc.simulate(scenario)": "record = hc.simulate(scenario, engine='python')",
+        '{"hardware": hardware}))': '{"hardware": hardware}), engine="python")',
+    },
     "tutorials/t4_sweep": {
         "2000:7log gain.y=0.1,0.3,0.5,0.7,0.9,1.2": "2000:3log gain.y=0.1,0.5,1.2"
     },
-    "walls/client": {"range(300)": "range(120)"},
-    "walls/device_hand": {"(0.0, 3.0), ((0.0": "(0.0, 1.5), ((0.0", "url, 3.0,": "url, 1.5,"},
-    "walls/limits": {"5e-3, 101)": "5e-3, 21)"},
-    "walls/press": {"B=(0.0, 10.0), press": "B=(0.0,), press"},
+    "walls/client": {"range(300)": "range(60)"},
+    "walls/device_hand": {"(0.0, 3.0), ((0.0": "(0.0, 0.6), ((0.0", "url, 3.0,": "url, 0.6,"},
+    "walls/impedance": {"measure_impedance(wall)": "measure_impedance(wall, lines=5)"},
+    "walls/limits": {"5e-3, 101)": "5e-3, 11)"},
+    "walls/press": {
+        "(20e-6, 80e-6)": "(80e-6,)",
+        '"os"': '"o"',
+        "B=(0.0, 10.0), press": "B=(0.0,), press",
+    },
 }
 
 
@@ -48,15 +70,15 @@ def clean_figures(monkeypatch):
 
 
 def run(page):
-    """Runs a program as it stands, or in the suite with FEWER numbers."""
+    """Runs a program as it stands, or in the suite with FEWER steps."""
     fewer = FEWER.get(f"{page.parent.name}/{page.stem}")
     if not fewer or HUNTS:
         runpy.run_path(str(page), run_name="__main__")
         return
     text = page.read_text()
-    for number, less in fewer.items():
-        assert number in text
-        text = text.replace(number, less)
+    for words, less in fewer.items():
+        assert words in text
+        text = text.replace(words, less)
     exec(compile(text, str(page), "exec"), {"__name__": "__main__"})
 
 
