@@ -12,7 +12,7 @@ from tests.oracles import nonlinear, store
 
 EDGES, PUSH = (0.01, 0.02), (1.0, 0.0)
 TIMES = np.linspace(0.01, 0.1, 5)
-CASE = (0.0, 90.0), EDGES, (1.0, 0.5), PUSH, None, False, 1.0, TIMES
+CASE = (0.0, 90.0), EDGES, (1.0, 0.5), PUSH, None, False, 0.5, TIMES
 
 
 @pytest.fixture

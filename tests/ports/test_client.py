@@ -29,7 +29,7 @@ BY_MESSAGE = Limits(period=PERIOD, ramp=0.0)
 @contextmanager
 def device(answer):
     """A device that answers the k-th message with answer(k, force): a text, or None for none."""
-    sent = []
+    sent, threads = [], []
 
     def talk(socket):
         socket.send(frame_text(Frame("04EA", Cursor(REST), full=True)))
@@ -41,6 +41,7 @@ def device(answer):
                 socket.send(text)
 
     def run(socket):
+        threads.append(threading.current_thread())
         try:
             talk(socket)
         except ConnectionClosed:
@@ -51,7 +52,8 @@ def device(answer):
         thread.start()
         yield f"ws://127.0.0.1:{server.socket.getsockname()[1]}", sent
         server.shutdown()
-        thread.join()
+        for each in (thread, *threads):  # all messages have been read
+            each.join()
 
 
 STILL = frame_text(Frame("04EA", Cursor(REST)))
@@ -211,10 +213,10 @@ PATIENT = Limits(period=SLOW, largest_force=10.0, ramp=0.2, patience=1.0)  # of 
 @pytest.fixture(scope="module")
 def rendered():
     """The clay of a cut, at the hand of a simulated device that follows a line."""
-    hand = Trajectory((0.0, 3.0), ((0.0, 0.0), (0.14, 0.0)))
+    hand = Trajectory((0.0, 2.0), ((0.0, 0.0), (0.14, 0.0)))
     scene = hc.Scenario(operator=hc.Operator(0.25, 2.0, 300.0), force=(0.0, 0.0))
     with serve(scene, period=SLOW, hand=hand) as server:
-        return render(hc.constant_cut(b=30.0), server.url, 3.0, limits=PATIENT), server.exchanges[0]
+        return render(hc.constant_cut(b=30.0), server.url, 2.0, limits=PATIENT), server.exchanges[0]
 
 
 def test_the_force_of_the_coupling_reaches_the_device(rendered):
@@ -268,7 +270,7 @@ def test_a_hand_is_identified_from_what_a_device_exchanged(tmp_path):
     scene = hc.Scenario(operator=hand, force=(0.0, 0.0), origin=NOMINAL, length=None)
     rng = np.random.default_rng(2)
     with serve(scene, period=PERIOD) as server, connect(server.url, BY_MESSAGE) as client:
-        for push in np.repeat(rng.choice([-0.4, 0.4], 120), 8):
+        for push in np.repeat(rng.choice([-0.4, 0.4], 80), 8):
             client.exchange((float(push), 0.0, 0.0))
         client.log.save(tmp_path / "device.csv")
     words = ["identify", "--csv", str(tmp_path / "device.csv"), "--what", "S", "--held"]

@@ -18,8 +18,9 @@ F = np.sqrt(0.5)  # 1 N at 45 degrees, on each axis
 
 @functools.cache
 def without_growth(shaping):
-    """The variable cut in clay that does not grow."""
-    return hc.simulate(hc.variable_cut("none", inertia_shaping=shaping))
+    """The variable cut in clay that does not grow; to 1e-7 m with shaping, to 0.1 % without."""
+    dt = 3.6e-4 if shaping else 1e-3
+    return hc.simulate(hc.variable_cut("none", inertia_shaping=shaping, dt=dt))
 
 
 def crossings(r, axis):

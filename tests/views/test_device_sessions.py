@@ -151,7 +151,7 @@ LIMITS = Limits(period=PERIOD, largest_force=10.0, ramp=0.2, patience=1.0)
 @pytest.fixture
 def device_hand():
     """A simulated device whose hand follows a line."""
-    hand = Trajectory((0.0, 3.0), ((0.0, 0.0), (0.14, 0.0)))
+    hand = Trajectory((0.0, 2.0), ((0.0, 0.0), (0.14, 0.0)))
     with (
         serve(HAND, period=PERIOD, hand=hand) as server,
         DeviceClient(server.url, LIMITS) as client,
@@ -171,7 +171,7 @@ def slices(session, n):
 def test_the_device_pulls_the_handle_through_the_clay_and_feels_it(device_hand):
     hand, server = device_hand
     session = DeviceSession(hc.constant_cut(b=30.0), hand)
-    slices(session, 240)
+    slices(session, 140)
     record = session.record()
     inside = record.b[:, 0] > 0.0
     assert inside.any() and record.p[-1, 0] > 0.07
@@ -181,7 +181,7 @@ def test_the_device_pulls_the_handle_through_the_clay_and_feels_it(device_hand):
     v = record.v[-1, 0]
     assert -rows.asked[-1, 0] == pytest.approx((30.0 + 10.0) * v, rel=0.1)
     notes = record.notes["device"]
-    assert notes["exchanges"] > 240 and notes["coupling_K"] == 300.0
+    assert notes["exchanges"] > 140 and notes["coupling_K"] == 300.0
     place = np.array([r.position[0] for r in hand.client.log.rows])
     assert record.extra["target"][-1, 0] == pytest.approx(place[-1] - place[51], abs=2e-3)
 

@@ -215,7 +215,9 @@ def test_film_and_window_show_isotropic_clay_on_its_law():
 
 def test_table_advises_physical_clay_where_motors_would_have_to_hold_the_handle():
     clay = hc.slab(hc.materials.material("soft clay"), 0.05, 0.15)
-    s = dataclasses.replace(hc.constant_cut(t_max=1.0), clay=clay, control="sampled")
+    s = dataclasses.replace(
+        hc.constant_cut(start=(0.045, 0.0), t_max=0.4), clay=clay, control="sampled"
+    )
     assert "advice: --render physical" in run_table(hc.simulate(s))
     for other in (
         dataclasses.replace(s, render="physical"),
