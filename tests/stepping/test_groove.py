@@ -68,7 +68,7 @@ def same(a, b):
     assert a.crossings == b.crossings
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.3, math.pi / 4, 1.9])
+@pytest.mark.parametrize("angle", some([0.0, 0.3, math.pi / 4, 1.9], 3))
 def test_a_straight_cut_presses_with_its_cross_section(angle):
     """Width x depth x pressure, whatever the direction and the place among the cells."""
     c, s = math.cos(angle), math.sin(angle)
@@ -203,12 +203,12 @@ def test_sampled_control_tends_to_the_continuous():
     assert first.p[-1, 0] > 2e-3
     for render in ("held", "physical"):
         errors = []
-        for dt in (4e-4, 1e-4):
+        for dt in (4e-4, 2e-4):
             r = hc.simulate(grooved(BLOCK, dt=dt, control="sampled", render=render, **more))
             errors.append(np.abs(r.p[-1] - first.p[-1]).max())
             total = math.fsum([r.extra["removed"][-1], BLOCK.volume(r.ground)])
             assert abs(total - BLOCK.volume()) <= 1e-15 * BLOCK.volume()
-        assert errors[0] < 1e-4 and errors[1] < 0.5 * errors[0], errors
+        assert errors[0] < 1e-4 and errors[1] < 0.6 * errors[0], errors
 
 
 @pytest.mark.parametrize("control", [{}, dict(control="sampled", render="physical")])
@@ -230,9 +230,8 @@ def test_it_holds_the_tool_below_its_strength(angle, control):
 def test_it_lets_the_tool_go_back():
     """Pushed into the clay and held there, it is free to leave by its groove."""
     pulse = hc.Samples((0.0, 0.2, 0.21, 0.7), ((1.5, 0), (1.5, 0), (-0.3, 0), (-0.3, 0)))
-    r = hc.simulate(
-        grooved(BLOCK, force=(0, 0), muscle=pulse, length=None, inertia_shaping=True, t_max=0.7)
-    )
+    own = dict(force=(0, 0), muscle=pulse, length=None, inertia_shaping=True)
+    r = hc.simulate(grooved(BLOCK, t_max=0.7, dt=1e-3, **own))
     far = r.p[:, 0].max()
     back = (r.t > 0.35) & (r.p[:, 0] > 1e-3) & (r.p[:, 0] < far - 1e-3)
     assert far > 5e-3 and back.any() and np.abs(r.fe[back]).max() < 0.01

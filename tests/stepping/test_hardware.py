@@ -75,16 +75,16 @@ def test_an_ideal_interface_is_the_sampled_run_bit_for_bit(kw):
 
 def test_a_run_in_python_loads_nothing_that_compiles_or_readies_signals():
     code = (
-        "import sys, hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01, control={!r}), "
-        "engine='python'); print(*sorted(m.rpartition('.')[2] for m in sys.modules "
+        "import sys, hapticclay as hc; [hc.simulate(hc.constant_cut(t_max=0.01, control=x), "
+        "engine='python') for x in ('continuous', 'sampled')]; "
+        "print(*sorted(m.rpartition('.')[2] for m in sys.modules "
         "if m.startswith('hapticclay.stepping.')))"
     )
-    for control in ("continuous", "sampled"):
-        run = [sys.executable, "-c", code.format(control)]
-        out = subprocess.run(run, capture_output=True, text=True, check=True)
-        loaded = set(out.stdout.split())
-        assert {"path", "run"} < loaded
-        assert not loaded & {"cache", "compiled", "many", "own_law", "signal_ahead"}
+    run = [sys.executable, "-c", code]
+    out = subprocess.run(run, capture_output=True, text=True, check=True)
+    loaded = set(out.stdout.split())
+    assert {"path", "run"} < loaded
+    assert not loaded & {"cache", "compiled", "many", "own_law", "signal_ahead"}
 
 
 def test_random_effects_are_drawn_part_by_part(monkeypatch):
@@ -388,8 +388,8 @@ def test_the_run_decays_2_percent_inside_the_limit_and_grows_2_percent_outside(a
     limit = hc.theory.gain_limit(axis, b, Operator(), Ts=Ts, delay=delay)
     found = []
     for factor in (0.98, 1.02):
-        r = hc.simulate(ring(axis, factor * limit, b, hc.Hardware(delay=delay), dt=Ts, t_max=1.8))
-        found.append(growth(r, "xy".index(axis), 1.0))
+        r = hc.simulate(ring(axis, factor * limit, b, hc.Hardware(delay=delay), dt=Ts, t_max=1.4))
+        found.append(growth(r, "xy".index(axis), 0.8))
     assert found[0] < 0.0 < found[1]
     assert 0.0 < np.interp(0.0, found, [0.98, 1.02]) - 0.98 < 0.04
 
@@ -514,7 +514,7 @@ def test_clay_too_stiff_for_its_hold_is_bounded_by_the_controller(b):
     ],
 )
 def test_the_controller_leaves_passive_clay_alone(parts):
-    kw = dict(t_max=0.8, clay=(0.02, 0.15))
+    kw = dict(t_max=0.5, clay=(0.02, 0.15))
     a, b = (hc.simulate(cut(hc.Hardware(passivity=x, **parts), **kw)) for x in (False, True))
     np.testing.assert_array_equal(a.p, b.p)
     assert b.energy["passivity_controller"] == 0.0

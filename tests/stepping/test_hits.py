@@ -70,7 +70,7 @@ KINDS = "cut", "hit", "hit, hand", "layers", "grazing"
 def test_order_is_two_at_any_stiffness(kind, b):
     """Fitted to the largest error of border times over five steps; no motor at its limit."""
     steps = np.array([4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4])
-    errors = [hits.row(kind, b, "fast", float(dt))["crossing"] for dt in steps]
+    errors = [hits.row(kind, b, "fast, native", float(dt))["crossing"] for dt in steps]
     order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
     assert 1.7 < order < 2.3, errors
     assert errors[-1] < 2e-6

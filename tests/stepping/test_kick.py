@@ -59,6 +59,10 @@ CASES = {
     "formed": cut(compensator=ZEROS, force=(1.0, 0.3)),
     "all": cut(compensator=ZEROS, operator=HANDS, **OTHER),
 }
+NEAR = {  # the same, short of the border but for the heavy hand, which would tear itself away
+    name: dataclasses.replace(s, t_max=0.3, start=(0.0 if name == "heavy hand" else 0.045, 0.0))
+    for name, s in CASES.items()
+}
 fast = pytest.mark.skipif(
     importlib.util.find_spec("numba") is None, reason="needs numba: pip install hapticclay[fast]"
 )
@@ -197,15 +201,15 @@ def test_engine_does_what_the_kick_foretold(name, monkeypatch):
         return q, w
 
     monkeypatch.setattr(sampled, "stepped_arm", stepped)
-    hc.simulate(dataclasses.replace(CASES[name], t_max=0.8), engine="python")
+    hc.simulate(NEAR[name], engine="python")
     assert 0.0 < worst < 1e-11  # rounding of a 2x2 solve, conditioned by b dt/Lambda = 4e2 at most
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_steps_that_glide_are_those_with_a_look_at_their_end(name, monkeypatch):
-    gliding = hc.simulate(CASES[name], engine="python")
+    gliding = hc.simulate(NEAR[name], engine="python")
     monkeypatch.setattr(path, "run_whole_steps", lambda parts, s, e, room: s)
-    careful = hc.simulate(CASES[name], engine="python")
+    careful = hc.simulate(NEAR[name], engine="python")
     for field in ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta"):
         np.testing.assert_array_equal(getattr(gliding, field), getattr(careful, field), field)
     assert gliding.energy == careful.energy and gliding.crossings == careful.crossings
@@ -224,10 +228,10 @@ def test_recorded_clay_force_is_what_changed_the_engines_momentum(name, monkeypa
 
     monkeypatch.setattr(mujoco, "mj_step", spy)
     monkeypatch.setattr(runs, "_idle", [])  # engines that call the plain one
-    s = CASES[name]
+    s = dataclasses.replace(CASES[name], t_max=0.7)
     r = hc.simulate(s, engine="python")
     whole = [x for x in states if x[4] == s.dt]
-    assert len(whole) > 2500
+    assert len(whole) > 1800
     rows = {tuple(q): i for i, q in enumerate(r.q)}
     checked = 0
     for q, w, tau, w1, h in whole:
@@ -237,7 +241,7 @@ def test_recorded_clay_force_is_what_changed_the_engines_momentum(name, monkeypa
         fe = r.fh[i] - np.linalg.solve(Arm.jacobian(q).T, Arm.M @ (w1 - w) / h - tau)
         np.testing.assert_allclose(fe, r.fe[i], atol=2e-9)  # eps * q / h^2
         checked += 1
-    assert checked > 2500
+    assert checked > 1800
     assert np.max(np.abs(r.fe)) > 1.0
 
 
@@ -258,7 +262,7 @@ def numbers_in(value):
 @pytest.mark.parametrize("name", CASES)
 def test_a_run_in_python_holds_no_numpy_numbers(name):
     """They are several times slower in CPython, and divide by zero without an error."""
-    run = Run(CASES[name], 1)
+    run = Run(NEAR[name], 1)
     run.go(None)
     assert {type(x) for x in numbers_in(run.state)} == {int, float}
     assert {type(x) for x in numbers_in(run.views)} <= {int, float, memoryview}

@@ -19,11 +19,11 @@ from hapticclay.model.cells import Profile
 from hapticclay.model.clay import Clay
 from hapticclay.model.signals import Multisine
 from hapticclay.studies import boundary, growth
-from tests.hunt import some
+from tests.hunt import HUNTS, some
 from tests.oracles import parts, store
 from tests.stepping.test_compiled import fast, same
 
-SEEDS = some(np.arange(16).reshape(-1, 4), 2)  # orders 1 to 4 of C; first x, then y, twice
+SEEDS = some(range(16), 4)  # orders 1 to 4 of C in turns; four along x, four along y, twice
 TS = 3.6e-4
 FREE = dict(length=None, torque_limit=(1e5, 1e5))
 
@@ -140,49 +140,49 @@ def at(r, times):
 
 
 @fast
-@pytest.mark.parametrize("seeds", SEEDS, ids=lambda x: f"{x[0]}-{x[-1]}")
-def test_shaped_borders_to_1e_7_s_of_the_matrix_exponential(seeds):
+@pytest.mark.parametrize("seed", SEEDS)
+def test_shaped_borders_to_1e_7_s_of_the_matrix_exponential(seed):
     """The error is (h/tau)^2/12 of some 0.05 s, tau the times of servo and C, 10 ms and more.
 
     That of a border's crossing is that of p over the speed there. Halving the step quarters it; to
     a third where errors of two borders, or of the landing, are about to cancel.
     """
-    for seed in seeds:
-        s, (axis, b, edges) = passage(int(seed))
-        exact = store.solution(f"parts-passage-{seed}", parts.passed, s, axis, edges, b).t
-        assert len(exact) == 3
-        s = dataclasses.replace(s, t_max=exact[-1] + 0.01)
-        found = border_times([dataclasses.replace(s, dt=k * TS) for k in (1, 4)], axis, 3)
-        error = np.abs(found - exact).max(axis=1)
-        assert error[0] < 1e-7 and error[1] > 9.0 * error[0], (seed, error)
+    s, (axis, b, edges) = passage(seed)
+    exact = store.solution(f"parts-passage-{seed}", parts.passed, s, axis, edges, b).t
+    assert len(exact) == 3
+    s = dataclasses.replace(s, t_max=exact[-1] + 0.01)
+    found = border_times([dataclasses.replace(s, dt=k * TS) for k in (1, 4)], axis, 3)
+    error = np.abs(found - exact).max(axis=1)
+    assert error[0] < 1e-7 and error[1] > 9.0 * error[0], error
+
+
+TIMES = np.arange(1, 16) * 0.0288
 
 
 def both_ways(seed, **kw):
     """An unshaped run along x and y at once, through borders of both."""
-    s, b = some_scene(seed, force=(3.0, 2.0), t_max=0.73, **kw)
+    s, b = some_scene(seed, force=(3.0, 2.0), t_max=0.44, **kw)
     x, y = Profile((0.01, 0.03), b[:3]), Profile((0.008, 0.02), b[3:0:-1], along="y")
     return dataclasses.replace(s, clay=Clay(x, y))
 
 
 @fast
-@pytest.mark.parametrize("seeds", SEEDS, ids=lambda x: f"{x[0]}-{x[-1]}")
-def test_unshaped_runs_are_those_of_scipy(seeds):
+@pytest.mark.parametrize("seed", SEEDS)
+def test_unshaped_runs_are_those_of_scipy(seed):
     """Within 5e-7 m at 0.36 ms, 1e-7 m at 1.44 ms by the accurate method; both fall with the step.
 
     The arms' poses and rates add terms to what is said above; light arms make the largest errors.
     """
-    times = np.arange(1, 26) * 0.0288
-    for seed in seeds:
-        s = both_ways(int(seed))
-        exact = solved(f"both-ways-{seed}", s, times)
-        cases = ("fast", 1), ("fast", 4), ("accurate", 4), ("accurate", 1)
-        runs = [dataclasses.replace(s, integrator=x, dt=k * TS) for x, k in cases]
-        fine, coarse, accurate, most = (
-            np.abs(at(r, times) - exact).max() for r in hc.simulate_batch(runs)
-        )
-        assert fine < 5e-7 and 9.0 * fine < coarse < 25.0 * fine, (seed, fine, coarse)
-        # 1e-11: what SciPy leaves
-        assert accurate < 1e-7 and most < max(accurate / 10.0, 1e-11), (seed, accurate, most)
+    s = both_ways(seed)
+    exact = solved(f"both-ways-{seed}", s, TIMES)
+    cases = ("fast", 1), ("fast", 4), ("accurate", 4), ("accurate", 1)
+    runs = [dataclasses.replace(s, integrator=x, dt=k * TS) for x, k in cases]
+    fine, coarse, accurate, most = (
+        np.abs(at(r, TIMES) - exact).max() for r in hc.simulate_batch(runs)
+    )
+    assert fine < 5e-7 and 9.0 * fine < coarse < 25.0 * fine, (fine, coarse)
+    # 1e-11: what SciPy leaves
+    assert accurate < 1e-7 and most < max(accurate / 10.0, 1e-11), (accurate, most)
 
 
 OWN = {
@@ -204,7 +204,7 @@ GAIN = {"order 0": hc.Compensator((1e-3,), (1.0,))}
 @fast
 @pytest.mark.parametrize("name", some(OWN | GAIN, 5))
 def test_fitted_order_of_both_methods(name):
-    """2 from 0.18 to 2.88 ms, 4 from 0.36 to 1.44 ms.
+    """2 from 0.36 to 2.88 ms, 4 from 0.36 to 1.44 ms.
 
     There shorter steps err as SciPy does, and longer ones are divided.
     """
@@ -213,14 +213,13 @@ def test_fitted_order_of_both_methods(name):
     own = dict(arm=hc.Arm(0.3, 0.3), compensator=(OWN | GAIN)[name], operator=(None, hc.Operator()))
     s = dataclasses.replace(both_ways(0), clay=clay, **own)
     s = dataclasses.replace(s, gain=tuple(half_of_limit(s, axis, b) for axis in "xy"))
-    times = np.arange(1, 26) * 0.0288
-    exact = solved(f"order-{name}", s, times, rtol=1e-12, atol=1e-15)
+    exact = solved(f"order-{name}", s, TIMES, rtol=1e-12, atol=1e-15)
     for method, factors, order, within in (
-        ("fast", (0.5, 1, 2, 4, 8), 2.0, 0.2), ("accurate", (1, 2, 4), 4.0, 0.3)
+        ("fast", (1, 2, 4, 8), 2.0, 0.2), ("accurate", (1, 2, 4), 4.0, 0.3)
     ):  # fmt: skip
         steps = TS * np.array(factors)
         runs = [dataclasses.replace(s, integrator=method, dt=float(x)) for x in steps]
-        errors = [np.linalg.norm(at(r, times) - exact) for r in hc.simulate_batch(runs)]
+        errors = [np.linalg.norm(at(r, TIMES) - exact) for r in hc.simulate_batch(runs)]
         assert order_of(steps, errors) == pytest.approx(order, abs=within), (method, errors)
 
 
@@ -322,22 +321,25 @@ def test_sampled_arm_is_the_hybrid_system(seed):
     np.testing.assert_allclose(r.tau[:n], Q, atol=1e-3)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("make", (control.ss, signal.StateSpace, control.tf, signal.lti))
-def test_runs_with_a_gain_alone_answer_as_python_control(make, tmp_path):
+def test_a_gain_alone_is_taken_from_any_system_and_kept_by_a_file(make, tmp_path):
+    states = np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[2e-3]]
+    system = make(*states) if make in (control.ss, signal.StateSpace) else make([4e-3], [2.0])
+    hc.Scenario(compensator=system).save(tmp_path / "gain.toml")
+    assert hc.Scenario.load(tmp_path / "gain.toml").compensator == hc.Compensator((2e-3,), (1.0,))
+
+
+@pytest.mark.plain
+def test_runs_with_a_gain_alone_answer_as_python_control():
     """A handle on a spring of 1/K in clay: p = (K G + S)(uh - (Th + b s) p), to a step of uh.
 
     Fast within 5e-7 m and of second order, as above; accurate within 1e-9 m, near the roundings of
     either. Torques held for Ts come Ts/2 late, at 0.2 m/s at most, and half of that by half of Ts.
     """
-    states = np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[2e-3]]
-    system = make(*states) if make in (control.ss, signal.StateSpace) else make([4e-3], [2.0])
-    hc.Scenario(compensator=system).save(tmp_path / "gain.toml")
-    taken = hc.Scenario.load(tmp_path / "gain.toml").compensator
-    assert taken == hc.Compensator((2e-3,), (1.0,))
     hand, clay = hc.Operator(0.2, 4.0, 6.0), Clay(*(Profile((), (20.0,), x) for x in "xy"))
-    loop = dict(gain=(1.5, 0.0), force=(3.0, 0.0), operator=hand, clay=clay)
-    base = hc.Scenario(inertia_shaping=True, length=None, compensator=taken, t_max=0.18, **loop)
+    loop = dict(gain=(1.5, 0.0), force=(3.0, 0.0), operator=hand, clay=clay, t_max=0.18)
+    gain = hc.Compensator((2e-3,), (1.0,))
+    base = hc.Scenario(inertia_shaping=True, length=None, compensator=gain, **loop)
     G, S = base.servo[0].G, base.servo[0].S
     free = 1.5 * control.tf([2e-3], [1.0]) * control.tf([G.gain], [1.0, G.damping, G.stiffness])
     free += control.tf([S.gain], [1.0, S.damping, S.stiffness])
@@ -412,11 +414,12 @@ BORNE = "order 1, biproper", "order 2, biproper", "order 3", "order 4, biproper"
 
 @fast
 @pytest.mark.parametrize("limit", [(1e6, 1e6), (0.5, 0.3)], ids=["strong", "weak"])
-@pytest.mark.parametrize("b,turn", [(1e3, 0), (1e5, 3), (1e6, 1), (1e8, 2)], ids=str)
+@pytest.mark.parametrize("b,turn", [(1e3, 3), (1e5, 2), (1e6, 0), (1e8, 1)], ids=str)
 def test_stiff_clay_is_borne_whatever_the_compensator(b, turn, limit):
     """Run into at 0.1 m/s: finite, in balance but for roundings, fe = b v, the same both ways."""
-    # weak motors at their limits are dear: two compensators in each clay, each in two clays
-    names = BORNE if limit[0] > 1.0 else some(BORNE[turn:] + BORNE[:turn], 2)
+    # weak motors at their limits are dear, most of all in stiff clay behind compensators of order
+    # 3 and 4: each compensator in one clay
+    names = BORNE if HUNTS or limit[0] > 1.0 else BORNE[turn : turn + 1]
     for name in names:
         c = OWN[name]
         s = dataclasses.replace(
@@ -474,14 +477,13 @@ def test_torque_limits_with_another_arm():
         torque_limit=(0.3, 0.08),
         origin=(0.3, 0.25),
     )
-    times = np.arange(1, 26) * 0.0288
-    exact = solved("limits", s, times, rtol=1e-10, atol=1e-13)
+    exact = solved("limits", s, TIMES, rtol=1e-10, atol=1e-13)
     for change, within in (dict(), 4e-5), (dict(integrator="accurate", dt=TS / 2), 1e-7):
         r = hc.simulate(dataclasses.replace(s, **change))
         used = np.abs(r.tau) >= np.array(s.torque_limit)
         assert used.any(axis=0).all() and not used.all(axis=0).any()
         assert np.all(np.abs(r.tau) <= s.torque_limit)
-        np.testing.assert_allclose(at(r, times), exact, atol=within)
+        np.testing.assert_allclose(at(r, TIMES), exact, atol=within)
 
 
 @fast
@@ -489,7 +491,7 @@ def test_torque_limits_with_another_arm():
 def test_friction_with_another_arm(seed):
     """Joints that slide one way all along, as the hybrid system under their constant torques."""
     rubs = (0.02, 0.01)
-    s, b = some_scene(seed, control="sampled", force=(4.0, -3.0), t_max=0.16)
+    s, b = some_scene(seed, control="sampled", force=(4.0, -3.0), t_max=0.09)
     s = dataclasses.replace(
         s, operator=None, clay=Clay(Profile((), b[1:2]), Profile((), b[1:2])),
         hardware=hc.Hardware(friction=rubs),
@@ -498,7 +500,7 @@ def test_friction_with_another_arm(seed):
     later = slice(round(0.01 / s.dt), None)
     assert all(len(set(np.sign(r.qd[later, j]))) == 1 for j in (0, 1))
     way = np.sign(r.qd[-1])
-    P, V, _ = parts.sampled(s, 0.15, friction=rubs, way=way)
+    P, V, _ = parts.sampled(s, 0.08, friction=rubs, way=way)
     np.testing.assert_allclose(r.p[: len(P)], P, atol=1e-7)
     np.testing.assert_allclose(r.v[: len(P)], V, atol=2e-5)
 
@@ -543,7 +545,7 @@ def loops(n):
 @fast
 def test_boundary_by_runs_within_0_2_percent_of_python_control():
     """A step of 0.1 mN from rest leaves the arm linear; growth read by ESPRIT, and bracketed."""
-    for s, i, b, K, omega in some(loops(8), 6):
+    for s, i, b, K, omega in some(loops(8), 4):
         axis, wall = "xy"[i], Profile((), (b,))
         assert parts.growth(s, axis, 0.999 * K, b) < 0.0 < parts.growth(s, axis, 1.001 * K, b)
         run = dataclasses.replace(

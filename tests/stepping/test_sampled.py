@@ -146,7 +146,7 @@ def test_sampled_tends_to_continuous_as_the_sample_shrinks():
 
 
 def test_rendering_a_held_force_goes_unstable_where_physical_clay_does_not():
-    kw = dict(control="sampled", b=8000.0, start=(0.06, 0.0), t_max=2.0, gain=(1.0, 0.1))
+    kw = dict(control="sampled", b=8000.0, start=(0.06, 0.0), t_max=1.0, gain=(1.0, 0.1))
     assert hc.simulate(hc.constant_cut(render="physical", **kw)).outcome.code == "time limit"
     held = hc.simulate(hc.constant_cut(render="held", **kw))
     assert held.outcome.code == "limit cycle" and np.all(np.isfinite(held.p))
@@ -154,7 +154,7 @@ def test_rendering_a_held_force_goes_unstable_where_physical_clay_does_not():
 
 def test_balance_closes():
     for render in ("held", "physical"):
-        e = hc.simulate(hc.constant_cut(control="sampled", render=render, t_max=1.5)).energy
+        e = hc.simulate(hc.constant_cut(control="sampled", render=render, t_max=0.8)).energy
         assert abs(e["residual"]) < 1e-12 * e["throughput"]
 
 

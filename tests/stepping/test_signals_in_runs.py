@@ -162,9 +162,9 @@ def test_kick_is_of_second_order_under_any_signal(name, drive):
     """Jumps included, on the samples or off: each kick takes the exact mean.
 
     The constant of the error changes with the place of a jump within its step: error/dt^2 stays
-    within a factor of 3 while a loss of one order would make it 8.
+    within a factor of 3 while a loss of one order would make it 4.
     """
-    steps = np.array([4e-3, 3e-3, 2e-3, 1e-3, 5e-4])
+    steps = np.array([4e-3, 3e-3, 2e-3, 1e-3])
     constants = errors_of(name, drive, "fast", steps) / steps**2
     assert constants.max() < 3.0 * constants.min() and constants.max() < 400.0, constants
 
@@ -265,13 +265,14 @@ def test_a_recorded_force_replays_from_a_file(tmp_path):
 
 def test_growing_motion_under_a_constant_signal_is_instability():
     """It is not driven: a gain above its limit shows as under a constant force."""
-    s = hc.free(gain=(30.0, 1.0), operator=hc.Operator(), force=(0.0, 0.0), t_max=5.0)
-    s = dataclasses.replace(s, length=None)
+    s = hc.constant_cut(
+        gain=(30.0, 0.2), operator=hc.Operator(), force=(0.0, 0.0), start=(0.06, 0.0)
+    )
     a, b = (
         hc.simulate(dataclasses.replace(s, **kw))
         for kw in (dict(muscle=hc.Constant((1.0, 0.0))), dict(force=(1.0, 0.0)))
     )
-    assert a.outcome == b.outcome
+    assert a.outcome == b.outcome and a.outcome.code == "diverged"
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -84,18 +84,18 @@ def test_sampled_control_is_that_of_the_oracle(render):
 @pytest.mark.parametrize("render", ["held", "physical"])
 def test_sampled_control_tends_to_the_continuous(render):
     """Of first order in Ts."""
-    s = path_through(hc.Clay(*LAWS), control="sampled", render=render, t_max=0.8)
+    s = path_through(hc.Clay(*LAWS), control="sampled", render=render, t_max=0.4)
     truth, errors = exact(0.8), []
     for dt in (4e-4, 2e-4):
         r = hc.simulate(dataclasses.replace(s, dt=dt))
-        errors.append(np.abs(r.p[-1] - truth.p[-1]).max())
+        errors.append(np.abs(r.p[-1] - truth.p[0]).max())
     assert errors[0] < 1e-5 and errors[1] < 0.6 * errors[0]
 
 
 @pytest.mark.parametrize("name", METHODS)
 def test_the_record_holds_the_clay_of_the_place(name):
     """b by SciPy at the recorded places, to the rounding of values near 100; fe = b v."""
-    r = hc.simulate(path_through(hc.Clay(*LAWS), **METHODS[name], velocity=(0.3, 0.1), t_max=0.5))
+    r = hc.simulate(path_through(hc.Clay(*LAWS), **METHODS[name], velocity=(0.3, 0.1), t_max=0.3))
     want = np.array([[b(p) for b in SPLINES] for p in r.p[::7]])
     np.testing.assert_allclose(r.b[::7], want, rtol=0.0, atol=1e-11)
     if name != "late":  # there the motors' force, or the handle's, is beside the sample
@@ -120,7 +120,7 @@ def test_the_energy_closes(name):
 @pytest.mark.parametrize("name", METHODS)
 def test_smooth_clay_that_is_constant_is_the_layer(name):
     """One control point, or many alike; but for the rounding of b."""
-    layer, more = hc.Profile((), (90.0,)), dict(METHODS[name], t_max=0.12)
+    layer, more = hc.Profile((), (90.0,)), dict(METHODS[name], t_max=0.08)
     first = hc.simulate(path_through(hc.Clay(layer, layer), **more))
     assert first.p[-1].min() > 1e-4
     for values in ([[90.0]], np.full((4, 5), 90.0)):
@@ -138,7 +138,7 @@ def test_beside_clay_of_layers_that_grow_or_are_stiff():
         hc.Profile((0.01, 0.03), (10.0, 50.0, 20.0), growth=(0.0, 30.0, 10.0)),
         hc.Profile((0.01, 0.03), (10.0, 1e6, 20.0)),
     ):
-        r = hc.simulate(path_through(hc.Clay(LAWS[0], other)))
+        r = hc.simulate(path_through(hc.Clay(LAWS[0], other), dt=1e-3))
         assert [c.border for c in r.crossings] == [0.01, 0.03]
         want = [SPLINES[0](p) for p in r.p[::7]]
         np.testing.assert_allclose(r.b[::7, 0], want, rtol=0.0, atol=1e-11)

@@ -64,7 +64,7 @@ def test_a_second_push_meets_the_wall_in_its_dent():
     push = hc.Samples(t, tuple((f, 0.0) for f in (0.0, 0.0, 6.0, 6.0, -3.0, -3.0, 1.0, 1.0)))
     s = dataclasses.replace(
         hc.free(), clay=wall(hc.Spring(k=k, limit=Fp, unilateral=True), edges=(0.01,)),
-        force=(0.0, 0.0), muscle=push, t_max=2.5, length=None, stop_when_unstable=False,
+        force=(0.0, 0.0), muscle=push, t_max=2.5, length=None, stop_when_unstable=False, dt=1e-3,
     )  # fmt: skip
     r = hc.simulate(s)
     deepest = r.p[r.t < 1.0, 0].max()
@@ -82,10 +82,10 @@ def test_a_spring_that_sticks_to_the_tool_loses_a_loop_each_cycle():
     push = hc.Multisine((10.0, 0.0), 0.9, 1.1, 1.0, lines=1)
     s = dataclasses.replace(
         hc.free(), clay=hc.Clay(law, hc.Profile((), (0.0,))), force=(0.0, 0.0), gain=(0.3, 0.1),
-        muscle=push, t_max=8.0, length=None, stop_when_unstable=False, start=(0.1, 0.0), dt=1e-3,
+        muscle=push, t_max=4.0, length=None, stop_when_unstable=False, start=(0.1, 0.0), dt=1e-3,
     )  # fmt: skip
     r = hc.simulate(s)
-    last = r.t > 7.0
+    last = r.t > 3.0
     area = np.trapezoid(r.fe[last, 0], r.p[last, 0])
     swing = 0.5 * np.ptp(r.p[last, 0])
     assert area == pytest.approx(4.0 * Fp * (swing - Fp / k), rel=4e-3)  # corners between samples
@@ -99,7 +99,7 @@ def test_a_zener_wall_relaxes_to_its_lasting_spring():
     k, k1, tau, F = 1000.0, 4000.0, 0.2, 2.0
     s = dataclasses.replace(
         hc.free(), clay=wall(hc.Spring(k=k, k1=k1, tau=tau), b=200.0, edges=(0.005,)),
-        force=(F, 0.0), t_max=12.0, length=None, gain=(0.2, 0.2), stop_when_unstable=False, dt=2e-3,
+        force=(F, 0.0), t_max=10.0, length=None, gain=(0.2, 0.2), stop_when_unstable=False, dt=2e-3,
     )  # fmt: skip
     r = hc.simulate(s)
     # delta comes to rest where the clay bears all of the push
@@ -133,8 +133,8 @@ def without_samples():
         hc.Spring(k=2e3, limit=3.0, k1=500.0, tau=0.1), b=20.0, edges=(0.01,), Fy=(0.0, 0.3)
     )
     s = dataclasses.replace(
-        hc.free(), clay=clay, force=(2.0, 0.0), t_max=0.3, length=None, stop_when_unstable=False,
-        dt=1e-4,
+        hc.free(), clay=clay, force=(2.0, 0.0), t_max=0.2, length=None, stop_when_unstable=False,
+        dt=1e-4, start=(0.008, 0.0),
     )  # fmt: skip
     return hc.simulate(s)
 
@@ -188,7 +188,7 @@ def test_an_encoder_changes_yielding_and_relaxing_springs_by_its_rounding():
     # far finer than the motion: the same run as without one, to what a count does to the force
     spring = hc.Spring(k=2e3, limit=3.0, k1=500.0, tau=0.1, unilateral=True)
     s = dataclasses.replace(
-        hc.free(), clay=wall(spring, b=20.0, edges=(0.01,)), force=(4.0, 0.0), t_max=0.3,
+        hc.free(), clay=wall(spring, b=20.0, edges=(0.01,)), force=(4.0, 0.0), t_max=0.2,
         length=None, stop_when_unstable=False, dt=1e-4, Ts=5e-4, control="sampled", render="held",
     )  # fmt: skip
     exact = hc.simulate(s)

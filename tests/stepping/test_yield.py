@@ -146,19 +146,19 @@ def test_an_axis_that_is_held_beside_one_that_slides_does_not_drift():
 @pytest.mark.parametrize("dt", [1e-5, 3.6e-4, 1e-2])
 @pytest.mark.parametrize("Fy", [0.0, 0.1, 10.0, 1e4])
 def test_no_chatter_at_any_step_and_yield_force(dt, Fy):
-    # five periods of a sine of twice the yield force, 200 steps each: two turns a period, and at
+    # three periods of a sine of twice the yield force, 200 steps each: two turns a period, and at
     # each turn one stop at most
     period = 200.0 * dt
     push = hc.Multisine((max(2.0 * Fy, 0.1), 0.0), 0.9 / period, 1.1 / period, period, lines=1)
     s = dataclasses.replace(
         hc.free(), clay=hc.slab(hc.Flow(Fy=Fy, b=max(300.0, 100.0 * Fy))), dt=dt,
         force=(0.0, 0.0), muscle=push,
-        t_max=5.0 * period, length=None, stop_when_unstable=False, torque_limit=(1e6, 1e6),
+        t_max=3.0 * period, length=None, stop_when_unstable=False, torque_limit=(1e6, 1e6),
         gain=(0.05, 0.05),
     )  # fmt: skip
     r = hc.simulate(s)
     turns = np.count_nonzero(np.diff(np.sign(r.v[r.v[:, 0] != 0.0, 0])))
-    assert np.isfinite(r.p).all() and turns <= 11 and len(r.stops) <= 12
+    assert np.isfinite(r.p).all() and turns <= 7 and len(r.stops) <= 8
     assert (r.v[1:, 0] == 0.0).any() == (Fy > 0.0)
 
 
@@ -223,7 +223,7 @@ def test_clay_takes_energy_whatever_moves_in_it(scene):
 def test_step_by_step_it_is_the_same_run_and_a_file_keeps_it(tmp_path):
     s = dataclasses.replace(
         hc.constant_cut(), clay=hc.slab(hc.Flow(Fy=5.0, b=30.0), 0.05, 0.15), force=(4.0, 0.0),
-        t_max=2.5,
+        start=(0.048, 0.0), t_max=1.2,
     )  # fmt: skip
     whole = hc.simulate(s)
     with hc.Simulation(s) as sim:
@@ -276,7 +276,7 @@ def test_stiff_clay_with_a_consistency_creeps_evenly(law, push, isotropic):
     # Fy + K v^n + (b + 10/gain) v = push, with a K v^n that changes faster than b v
     v = brentq(lambda v: float(law.force(v)) + 10.0 / 0.3 * v - push, 0.0, push / law.b)
     profile = hc.Profile((), (law.b,), Fy=(law.Fy,), K=(law.K,), n=(law.n,))
-    for dt in (1e-2, 1e-3 if isotropic else 3.6e-4):
+    for dt in (1e-2, 1e-3):
         s = dataclasses.replace(
             hc.free(), clay=hc.Clay(profile, profile, isotropic=isotropic), force=(push, 0.0),
             gain=(0.3, 0.1), inertia_shaping=True, dt=dt, t_max=1.1, length=None,

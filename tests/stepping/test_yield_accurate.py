@@ -74,9 +74,9 @@ def test_a_slider_stops_when_and_where_it_should(flow):
     # 1e-9 but where nothing but K v^n stops it, n < 1: there what is left of the servo, 2.5e-10
     # m/s^2, outlasts the clay, and the steps beside rest are shares of the speed (modes.GRADE)
     thins = flow.n < 1.0 and not flow.Fy
-    most = [(1e-2, 2e-7), (1e-3, 2e-9), (3.6e-4, 1e-9)]
-    if HUNTS or flow.n == 2.0:
-        most += [(1e-4, 1e-9)]
+    most = [(1e-2, 2e-7), (1e-3, 2e-9)]
+    if HUNTS or flow.b == 5.0:
+        most += [(3.6e-4, 1e-9), (1e-4, 1e-9)]
     for dt, within in most:
         within *= 10.0 if thins and dt < 1e-2 else 1.0
         r = hc.simulate(slider(flow, dt, 1.1 * t + 2.0 * dt))
@@ -161,9 +161,15 @@ def exact(name):
 
 
 @functools.cache
+def run_of(name, dt):
+    """The case's run by the accurate method."""
+    return hc.simulate(scene(CASES[name], dt))
+
+
+@functools.cache
 def errors(name, dt):
     """Largest errors of positions, velocities, times of stops, and times of crossings."""
-    found, r = exact(name), hc.simulate(scene(CASES[name], dt))
+    found, r = exact(name), run_of(name, dt)
     i = np.rint(found.t / dt).astype(int)
     stops = [
         (("x", "y", "xy").index(x.axis), on, t)
@@ -201,25 +207,24 @@ def test_fourth_order_across_stops(name):
 
 @pytest.mark.parametrize("name", SMOOTH)
 def test_the_fast_method_is_of_second_order_beside_scipy(name):
-    steps = np.array([2e-3, 1e-3, 5e-4])
+    steps = np.array([4e-3, 2e-3, 1e-3])
     found, exactly = [], exact(name)
     for dt in steps:
         r = hc.simulate(scene(CASES[name], float(dt), integrator="fast"))
         found.append(np.abs(r.p[np.rint(exactly.t / dt).astype(int)] - exactly.p).max())
     # from step to step, where a stop falls in a step changes
-    assert found[1] < 5e-7 and 1.6 < np.polyfit(np.log(steps), np.log(found), 1)[0] < 2.6, found
+    assert found[2] < 5e-7 and 1.6 < np.polyfit(np.log(steps), np.log(found), 1)[0] < 2.6, found
 
 
 def test_one_axis_rests_exactly_while_the_other_slides():
     """Its velocity is 0.0, and it stays where it is but for a rounding or two of the angles."""
     for name, angle in (("coulomb", 0.0), ("turned", 0.5)):
-        s = scene(CASES[name], 1e-3)
-        r = hc.simulate(s)
+        r = run_of(name, 1e-3)
         c, d = math.cos(angle), math.sin(angle)
         axes = dict(x=(c, d), y=(-d, c))
         seen = 0
         for stop in r.stops:
-            end = stop.end or s.t_max
+            end = stop.end or r.scenario.t_max
             held = (r.t > stop.start) & (r.t < end)
             if held.sum() < 3:
                 continue
@@ -237,7 +242,7 @@ def test_below_the_yield_force_nothing_moves(along):
     wave = hc.Multisine(rms=(0.05, 0.05), high=3.0)
     s = dataclasses.replace(
         hc.free(), clay=clay, force=(0.2, 0.1), muscle=wave, integrator="accurate", dt=1e-3,
-        t_max=1.0, start=(0.05, 0.02),
+        t_max=0.5, start=(0.05, 0.02),
     )  # fmt: skip
     run = Run(s, 1)
     q = run.data.qpos.copy()
@@ -255,7 +260,7 @@ def test_energy_converges_at_fourth_order_and_none_is_made():
     for name in ("bingham", "turned", "along, bingham"):
         steps, rest = np.array([4e-3, 2e-3, 1e-3]), []
         for dt in steps:
-            r = hc.simulate(scene(CASES[name], dt))
+            r = run_of(name, dt)
             rest.append(abs(r.energy["residual"]) / r.energy["throughput"])
             assert np.all(np.sum(r.fe * r.v, axis=1) >= 0.0) and r.energy["clay"] > 0.0
         order = np.polyfit(np.log(steps), np.log(rest), 1)[0]
@@ -296,12 +301,12 @@ def test_the_clay_only_takes_energy(Fy, K, n, along, hand, x, dt):
 
 def test_the_motors_limits_hold_in_clay_that_yields():
     """Beside the fast method at small steps: the torques are cut, the stops are the same."""
-    kw = dict(torque_limit=(0.3, 0.2), t_max=1.0)
+    kw = dict(torque_limit=(0.3, 0.2), t_max=0.8)
     a = hc.simulate(scene(CASES["bingham"], 1e-3, **kw))
-    b = hc.simulate(scene(CASES["bingham"], 1e-4, integrator="fast", **kw))
+    b = hc.simulate(scene(CASES["bingham"], 1.25e-4, integrator="fast", **kw))
     assert np.all(np.abs(a.tau) <= kw["torque_limit"]) and np.any(np.abs(a.tau) >= (0.3, 0.2))
     # both are of second order across the corners of the limits
-    np.testing.assert_allclose(a.p, b.p[::10], atol=2e-6)
+    np.testing.assert_allclose(a.p, b.p[::8], atol=2e-6)
     first, second = ([(x.axis, x.start) for x in r.stops] for r in (a, b))
     for x, y in zip(first, second, strict=True):
         assert x[0] == y[0] and x[1] == pytest.approx(y[1], abs=1e-3)
