@@ -11,12 +11,19 @@ import sys
 import termios
 
 import pytest
+from matplotlib.figure import Figure
 
 import hapticclay as hc
 from hapticclay.cli import app, console
 from hapticclay.cli.words import ordered
 from hapticclay.simulation import record, simulate
 from hapticclay.views import run_figures
+
+
+@pytest.fixture(autouse=True)
+def no_layout(monkeypatch):
+    """Figures are written as they are."""
+    monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)
 
 
 def run(capsys, *args):

@@ -9,6 +9,7 @@ import sys
 from typing import Annotated
 
 import pytest
+from matplotlib.figure import Figure
 
 import hapticclay as hc
 from hapticclay.cli import app, commands
@@ -155,6 +156,12 @@ class ReachCommand:
         return 0
 ''',
 }
+
+
+@pytest.fixture(autouse=True)
+def no_layout(monkeypatch):
+    """Figures are written as they are."""
+    monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)
 
 
 @pytest.fixture

@@ -21,7 +21,6 @@ IDS = [f"{page.parent.name}/{page.stem}" for page in PAGES]
 FEWER = {
     "clay/dent": {"    t_max=2.0,": "    t_max=2.0,\n    dt=2e-3,"},
     "clay/sticking": {"t_max=4.0": "t_max=3.0, dt=1e-3"},
-    "parts/chirp": {"=30.0": "=10.0", "/ 30.0": "/ 10.0", "    t_max": "    dt=1e-3,\n    t_max"},
     "parts/compensator": {"300.0, 400)": "300.0, 100)"},
     "parts/controller": {"t_max=3.0": "t_max=1.0", "(scenario)": "(scenario, engine='python')"},
     "parts/signals": {"4.0, 2001)": "4.0, 501)"},
