@@ -13,12 +13,13 @@ from matplotlib.figure import Figure
 import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.errors import ParameterError
-from hapticclay.paper.comparison import SVG_COLORS, comparison_page, inline_svg
+from hapticclay.paper.comparison import SVG_COLORS, inline_svg
 from hapticclay.studies import comparison
 
 SCENES = {
     "printed": 'experiment = "constant"\nt_max = 0.5\n',
     "faster": 'experiment = "constant"\nt_max = 0.5\nb = 60\ngain = [2.0, 0.5]\n',
+    "wild": 'experiment = "constant"\nt_max = 0.5\ngain = [30.0, 0.5]\n',
 }
 WALLS = {
     "near": "K = 500\ndevice.damper = 1.0\n",
@@ -34,38 +35,32 @@ def files(folder, texts):
     return paths
 
 
-@pytest.fixture(scope="module")
-def controllers(tmp_path_factory):
-    return comparison.compare_files(files(tmp_path_factory.mktemp("c"), SCENES))
-
-
-@pytest.fixture
-def no_layout(monkeypatch):
-    """Figures are drawn as they are."""
-    monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)
-
-
-@pytest.fixture(scope="module")
-def commanded(tmp_path_factory):
-    """A folder that the command writes, what it says, and the walls that it compares."""
-    out, said, found = tmp_path_factory.mktemp("w"), io.StringIO(), []
-    paths = map(str, files(out, WALLS))
-    words = ["compare", *paths, "--format", "pdf", "--data", "--out", str(out / "o")]
+def commanded(folder, texts, *words):
+    """A folder that the command writes, what it says, and what it compares."""
+    out, said, found = folder / "o", io.StringIO(), []
     compare = comparison.compare_files
     with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(said):
+        # figures are drawn as they are
         patch.setattr(Figure, "get_layout_engine", lambda self: None)
         patch.setattr(comparison, "compare_files", lambda *a: found.append(compare(*a)) or found[0])
-        assert app.main(words) == 0
-    return out / "o", said.getvalue(), found[0]
+        assert (
+            app.main(["compare", *map(str, files(folder, texts)), *words, "--out", str(out)]) == 0
+        )
+    return out, said.getvalue(), found[0]
 
 
 @pytest.fixture(scope="module")
-def walls(commanded):
-    return commanded[-1]
+def controllers(tmp_path_factory):
+    return commanded(tmp_path_factory.mktemp("c"), SCENES)
+
+
+@pytest.fixture(scope="module")
+def walls(tmp_path_factory):
+    return commanded(tmp_path_factory.mktemp("w"), WALLS, "--format", "pdf", "--data")
 
 
 def test_numbers_are_those_of_the_analysis(controllers):
-    for x, (K, b) in zip(controllers, ((1.0, 90.0), (2.0, 60.0)), strict=True):
+    for x, (K, b) in zip(controllers[-1].files[:2], ((1.0, 90.0), (2.0, 60.0)), strict=True):
         n, m = x.numbers, hc.theory.margins("x", K, b, operator=None)
         assert n["gain K [1/kg]"] == K and n["clay b [N.s/m]"] == b
         # the arm's own mobility differs from the printed gain of Sh by some percent
@@ -84,7 +79,7 @@ def test_numbers_are_those_of_the_analysis(controllers):
 
 
 def test_numbers_of_walls_are_the_closed_forms(walls):
-    for x, (K, b, Ts) in zip(walls, ((500.0, 1.0, 1e-3), (300.0, 2.0, 2e-3)), strict=True):
+    for x, (K, b, Ts) in zip(walls[-1], ((500.0, 1.0, 1e-3), (300.0, 2.0, 2e-3)), strict=True):
         assert x.numbers["passive K, at most [N/m]"] == pytest.approx(2.0 * b / Ts)
         assert x.numbers["passivity margin [N.s/m]"] == pytest.approx(b - 0.5 * K * Ts)
         assert x.numbers["stable K, at most [N/m]"] >= 2.0 * b / Ts
@@ -98,11 +93,11 @@ def test_numbers_of_walls_are_the_closed_forms(walls):
 
 
 def test_only_fields_that_differ_are_told(controllers, walls):
-    fields = comparison.differing_fields(controllers)
-    layers = [[0.0, 90.0, 0.0], [0.0, 60.0, 0.0]]
-    gains = [[1.0, 0.5], [2.0, 0.5]]
+    fields = comparison.differing_fields(controllers[-1])
+    layers = [[0.0, 90.0, 0.0], [0.0, 60.0, 0.0], [0.0, 90.0, 0.0]]
+    gains = [[1.0, 0.5], [2.0, 0.5], [30.0, 0.5]]
     assert fields == {"gain": gains, "clay.x.values": layers, "clay.y.values": layers}
-    told = comparison.differing_fields(walls)
+    told = comparison.differing_fields(walls[-1])
     assert told == {"K": [500.0, 300.0], "device.damper": [1.0, 2.0], "Ts": [1e-3, 2e-3]}
 
 
@@ -121,11 +116,10 @@ class Page(HTMLParser):
             self.links += [value] * (name in ("src", "href", "xlink:href"))
 
 
-@pytest.mark.usefixtures("no_layout")
 @pytest.mark.parametrize("kind", ["controllers", "walls"])
 def test_the_page_needs_no_other_file(kind, request):
-    found = request.getfixturevalue(kind)
-    text = comparison_page(found)
+    out, _, found = request.getfixturevalue(kind)
+    text = (out / "compare.html").read_text(encoding="utf-8")
     page = Page(text)
     assert page.tags.count("svg") == {"controllers": 6, "walls": 5}[kind]
     assert all(link.startswith("#") for link in page.links)
@@ -145,8 +139,8 @@ def test_an_inline_picture_takes_the_colours_of_the_page():
     assert all(re.fullmatch("#[0-9a-f]{6}", color) for color in SVG_COLORS)
 
 
-def test_the_command_writes_page_numbers_and_figures(commanded):
-    out, said, _ = commanded
+def test_the_command_writes_page_numbers_and_figures(walls):
+    out, said, _ = walls
     names = {p.name for p in out.iterdir()}
     assert {"compare.html", "compare.json", "zwidth.pdf", "zwidth.csv"} <= names
     data = json.loads((out / "compare.json").read_text())
@@ -182,14 +176,10 @@ def test_the_command_refuses_in_one_line(words, told, tmp_path, capsys, monkeypa
     assert told in err and err.count("\n") == 1
 
 
-@pytest.mark.usefixtures("no_layout")
-def test_what_is_unstable_is_shown_as_such(tmp_path, capsys):
-    scenes = {"stable": SCENES["printed"], "wild": SCENES["printed"] + "gain = [30.0, 0.5]\n"}
-    words = map(str, files(tmp_path, scenes))
-    assert app.main(["compare", *words, "--out", str(tmp_path)]) == 0
-    out = capsys.readouterr().out
-    rows = {line[:38].strip(): line[38:].split() for line in out.splitlines()}
-    assert rows["phase margin [degrees]"][1] == "-" and "diverged" in out
+def test_what_is_unstable_is_shown_as_such(controllers):
+    _, said, _ = controllers
+    rows = {line[:38].strip(): line[38:].split() for line in said.splitlines()}
+    assert rows["phase margin [degrees]"][2] == "-" and "diverged" in said
 
 
 def test_the_run_changes_with_the_square_of_the_step():

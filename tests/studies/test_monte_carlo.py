@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.figure import Figure
 from scipy import stats
 
 import hapticclay as hc
@@ -79,19 +80,17 @@ def least_damped(loop):
     ids=["continuous", "sampled, late, at any pose, without shaping"],
 )
 def test_a_run_is_judged_as_its_eigenvalues_are(base, vary, n):
-    trials = hc.studies.Trials(base, vary, HANDS, runs=n, seed=5)
-    result = hc.studies.monte_carlo(trials)
-    rows = [dict(zip(trials.names, p, strict=True)) for p in result.points.tolist()]
-    rate = np.array([least_damped(trials.loop(row)) for row in rows])
-    # 0.01 1/s: what the steps of a run change in its rate, at most
-    clear = np.abs(rate) > 0.01
-    assert clear.sum() >= 0.97 * n and 0.1 * n < result.total.events < 0.9 * n
-    assert np.all((rate > 0.0)[clear] == (result.unstable == 1)[clear])
-    assert result.longer.mean() < 0.02  # nearly all are told by their maps
-    # and by the samples of a run where the push is given
-    pushed = hc.studies.monte_carlo(replace(trials, push=1e-6))
-    assert np.all((rate > 0.0)[clear] == (pushed.unstable == 1)[clear])
-    assert pushed.longer.mean() < 0.3
+    told = hc.studies.Trials(base, vary, HANDS, runs=n, seed=5)
+    # nearly all are told by their maps, and by the samples of a run where the push is given
+    for trials, most in ((told, 0.02), (replace(told, push=1e-6, runs=n // 2), 0.3)):
+        result = hc.studies.monte_carlo(trials)
+        rows = [dict(zip(trials.names, p, strict=True)) for p in result.points.tolist()]
+        rate = np.array([least_damped(trials.loop(row)) for row in rows])
+        # 0.01 1/s: what the steps of a run change in its rate, at most
+        clear = np.abs(rate) > 0.01
+        assert clear.mean() >= 0.97 and 0.1 < result.total.events / len(trials) < 0.9
+        assert np.all((rate > 0.0)[clear] == (result.unstable == 1)[clear])
+        assert result.longer.mean() < most
 
 
 @pytest.mark.parametrize("base", [PushedLoop("x"), SAMPLED, hc.VirtualWall(B=20.0)])
@@ -279,7 +278,8 @@ def test_a_disk_without_room_is_refused_before_the_runs(tmp_path, monkeypatch):
     assert not list((tmp_path / "data").glob("*"))
 
 
-def test_the_command_writes_what_it_found(tmp_path, capsys):
+def test_the_command_writes_what_it_found(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)
     words = ["robustness", "--out", str(tmp_path), "--runs", "3", "--grid", "K=2:6:3 b=50,200"]
     assert app.main([*words, "--band", "3", "--workers", "1", "--data"]) == 0
     told = capsys.readouterr()

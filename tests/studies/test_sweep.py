@@ -391,27 +391,28 @@ def spawn(*args, **kw):
     )
 
 
-def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path):
+@pytest.fixture(scope="module")
+def scheduler(tmp_path_factory):
+    """The process of a scheduler, and its address."""
+    file = tmp_path_factory.mktemp("scheduler") / "scheduler.json"
+    words = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
+    process = spawn("distributed.cli.dask_scheduler", *words)
+    try:
+        while not (file.is_file() and file.stat().st_size):
+            assert process.poll() is None
+            time.sleep(0.05)
+        yield process, json.loads(file.read_text())["address"]
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path, scheduler):
     """A real scheduler, two worker processes without a nanny, one killed with work in hand."""
     s = Sweep("constant", parse_grid("b=10:1000:12log gain.x=1:2:2"), {"t_max": 0.5}, chunk=1)
-    file = tmp_path / "scheduler.json"
-    scheduler = spawn(
-        "distributed.cli.dask_scheduler",
-        "--host",
-        "127.0.0.1",
-        "--port",
-        "0",
-        "--no-dashboard",
-        "--scheduler-file",
-        str(file),
-    )
+    _, address = scheduler
     workers = []
     try:
-        for _ in range(400):
-            if file.is_file() and file.stat().st_size:
-                break
-            time.sleep(0.05)
-        address = json.loads(file.read_text())["address"]
         workers = [
             spawn(
                 "distributed.cli.dask_worker",
@@ -437,7 +438,7 @@ def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path):
         sweep.run_sweep(s, here, workers=1)
         assert columns(sweep_store.read_sweep(far)) == columns(sweep_store.read_sweep(here))
     finally:
-        for p in (*workers, scheduler):
+        for p in workers:
             p.kill()
             p.wait()
 
@@ -450,23 +451,14 @@ def test_unreachable_scheduler_is_one_line(tmp_path):
     assert 2.0 * sweep.SCHEDULER_PATIENCE < 10.0  # dask tries for twice as long
 
 
-def test_a_scheduler_that_dies_is_one_line(tmp_path, capfd):
-    file = tmp_path / "scheduler.json"
-    words = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
-    scheduler = spawn("distributed.cli.dask_scheduler", *words)
-    try:
-        while not (file.is_file() and file.stat().st_size):
-            assert scheduler.poll() is None
-            time.sleep(0.05)
-        address = json.loads(file.read_text())["address"]
-        end = threading.Timer(1.0, scheduler.kill)  # no worker is there: it waits for results
-        end.start()
-        with pytest.raises(ConnectionError, match="has gone; the same command resumes"):
-            sweep.run_sweep(small(), tmp_path / "out", scheduler=address)
-        end.join()
-    finally:
-        scheduler.kill()
-        scheduler.wait()
+def test_a_scheduler_that_dies_is_one_line(tmp_path, capfd, scheduler):
+    """The last test that needs it."""
+    process, address = scheduler
+    end = threading.Timer(1.0, process.kill)  # no worker is there: it waits for results
+    end.start()
+    with pytest.raises(ConnectionError, match="has gone; the same command resumes"):
+        sweep.run_sweep(small(), tmp_path, scheduler=address)
+    end.join()
     assert capfd.readouterr().err == ""
 
 
@@ -512,7 +504,8 @@ def test_an_estimate_leaves_out_the_first_run_and_patience_is_limited(monkeypatc
 
 
 def test_an_estimated_size_is_that_of_the_files(tmp_path):
-    s = Sweep("constant", parse_grid("b=10:1000:16log gain.x=0.5:2:16"), {"t_max": 0.4}, chunk=64)
+    fixed = {"t_max": 0.4, "dt": 2e-3}
+    s = Sweep("constant", parse_grid("b=10:1000:16log gain.x=0.5:2:16"), fixed, chunk=64)
     guess = sweep.estimate_time(s)[1] * len(s)
     sweep.run_sweep(s, tmp_path, workers=1)
     size = sum(f.stat().st_size for f in (tmp_path / "data").iterdir())
