@@ -1,5 +1,6 @@
 """Baselines: what they know is right, and better knowledge earns more."""
 
+import functools
 import math
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import hapticclay as hc
+from hapticclay.cli import app
 from hapticclay.gym import adaptive_gain, baselines, probe_clay
 
 
@@ -55,11 +57,20 @@ def test_an_answer_names_the_clay_exactly():
     assert 1.5 * 10.0 ** (0.8 * y) == pytest.approx(2.2, rel=1e-14)
 
 
-def test_the_pd_law_follows_the_line_where_random_actions_do_not():
+def test_the_pd_law_follows_the_line_where_random_actions_do_not(monkeypatch, capsys):
+    """And the command prints what each earns."""
+    returns = functools.cache(baselines.returns)
     found = {
-        name: baselines.returns("CutLine-v0", maker, range(2), engine="python")
+        name: returns("CutLine-v0", maker, range(2), engine="python")
         for name, maker in baselines.BASELINES["CutLine-v0"].items()
     }
+    monkeypatch.setattr(baselines, "returns", returns)
+    line = ["gym", "baselines", "CutLine-v0", "--seeds", "2", "--engine", "python"]
+    assert app.main(line) == 0
+    rows = capsys.readouterr().out.splitlines()
+    for name, scores in found.items():
+        (row,) = [row for row in rows if name in row]
+        assert f"{scores.total.mean():.2f}" in row
     assert found["PD along the line"].info["is_success"].all()
     assert not found["random"].info["is_success"].any()
 

@@ -55,13 +55,6 @@ def test_snippets_of_the_page_of_the_suite_say_what_they_print():
     assert out.stdout.splitlines() == re.findall(r"print\(.*\)  # (.*)", code) != []
 
 
-def test_the_command_prints_the_baselines(capsys):
-    line = ["gym", "baselines", "CutLine-v0", "--seeds", "2", "--engine", "python"]
-    assert app.main(line) == 0
-    rows = capsys.readouterr().out.splitlines()
-    assert any("PD along the line" in row for row in rows)
-
-
 @pytest.mark.filterwarnings("ignore:Implicitly cleaning up:ResourceWarning")  # Minari's own folder
 def test_the_command_records_a_data_set(tmp_path, monkeypatch, capsys):
     minari = pytest.importorskip("minari")
