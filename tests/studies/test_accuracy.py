@@ -60,7 +60,8 @@ def test_sampled_control_is_off_by_its_hold(ladder):
 
 
 def test_a_sampled_scene_keeps_its_samples():
-    s = hc.constant_cut(control="sampled", dt=4e-3, length=0.02, clay=(0.01, 0.015))
+    changed = dict(control="sampled", dt=4e-3, length=0.02)
+    s = hc.constant_cut(clay=(0.01, 0.015), inertia_shaping=True, **changed)
     found = accuracy_ladder.accuracy_ladder(s)
     assert {x.series for x in found.settings} == {"fast"}
     assert [x.dt for x in found.settings] == [4e-3, 2e-3, 1e-3]
@@ -70,21 +71,24 @@ def test_a_sampled_scene_keeps_its_samples():
 
 
 def test_too_stiff_clay_has_no_accurate_settings():
-    s = hc.constant_cut(b=1e9, clay=(0.01, 0.02), length=0.015, t_max=0.5)
+    changed = dict(length=0.015, t_max=0.5)
+    s = hc.constant_cut(b=1e9, clay=(0.01, 0.02), inertia_shaping=True, **changed)
     found = accuracy_ladder.accuracy_ladder(s, quick=True)
     refused = [x for x in found.settings if x.wall is None]
     assert {x.series for x in refused} == {"accurate"} and "choose 'fast'" in refused[0].status
     assert found.reference.startswith("fast")
 
 
-def test_without_borders_there_are_positions_alone():
-    found = accuracy_ladder.accuracy_ladder(hc.stability_test(3.0, t_max=0.2), quick=True)
+def test_without_borders_in_reach_there_are_positions_alone():
+    found = accuracy_ladder.accuracy_ladder(dataclasses.replace(SHAPED, t_max=0.2), quick=True)
     assert found.units() == ["m"] and not found.notes
     assert len(accuracy_plots.accuracy_plot(found).axes) == 1
 
 
 def test_an_unstable_loop_is_noted():
-    found = accuracy_ladder.accuracy_ladder(hc.constant_cut(gain=(1.0, 1.0)), quick=True)
+    found = accuracy_ladder.accuracy_ladder(
+        hc.constant_cut(gain=(1.0, 1.0), inertia_shaping=True), quick=True
+    )
     assert found.notes and found.left["s"] is None
 
 

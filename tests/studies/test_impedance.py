@@ -99,7 +99,7 @@ def test_a_run_that_meets_the_limits_of_the_motors_is_refused():
 
 
 def test_what_has_not_settled_is_refused():
-    wall = hc.VirtualWall(300.0, 0.2, device=hc.Device(0.1, 0.0))  # rings for 100 s
+    wall = hc.VirtualWall(300.0, 0.2, device=hc.Device(0.1, 1e-3))  # rings for 100 s
     with pytest.raises(ParameterError, match="must settle"):
         measure_impedance(wall, lines=3, period=0.2, band=(5.0, 30.0))
 
@@ -117,7 +117,7 @@ def test_the_loop_of_a_scenario():
 
 
 def test_figures_and_tables_of_a_wall_and_of_the_arm():
-    for subject in (hc.VirtualWall(300.0, 2.0, device=DEVICE), PushedLoop(operator=TH, Ts=1e-3)):
+    for subject in (hc.VirtualWall(300.0, 2.0, device=DEVICE), PushedLoop(Ts=1e-3)):
         found = measure_impedance(subject, lines=5, period=2.0)
         figure = impedance_plots.impedance_plot(found)
         labels = {ax.get_ylabel().split(" [")[0] for ax in figure.axes}
