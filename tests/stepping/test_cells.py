@@ -7,13 +7,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.constants import GAIN, TS
-from tests.hunt import examples
+from tests.hunt import HUNTS
 from tests.oracles import piecewise_linear
 from tests.oracles.cells import cells
 
@@ -187,7 +187,7 @@ def test_a_handle_that_passes_many_cells_in_a_step_loses_none(engine):
 THS = {"": (None, 0.0), "hand": (hc.Operator(0.25, 2.0, 0.0), 2.0)}
 
 
-@examples(5)
+@settings(max_examples=80 if HUNTS else 5)
 @given(
     st.floats(0.0, 500.0), st.floats(0.0, 500.0), st.floats(-math.pi, math.pi),
     st.sampled_from(sorted(THS)), st.sampled_from(["default", "accurate", "held", "physical"]),
