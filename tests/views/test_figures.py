@@ -429,16 +429,15 @@ def assert_two_numbers(figure):
             assert len(some) >= 2, (ax, axis, some)
 
 
-# drawn by the function of another case, of a run or result of the same kind: in a hunt alone
-AGAIN = {
+AGAIN = {  # drawn by the function of another case, of a run or result of the same kind
     "variable velocity", "ground velocity", "constant force", "driven force_position",
     "map delay-damping", "identified Th", "sweep speed", "bode", "zwidth region",
     "impedance of wall", "transparency of wall", "instability line",
     *(n for n in CASES if re.match("compared walls: (spare|impedance|parts)", n)),
 }  # fmt: skip
 # in one column text has the least room
-ONCE = [n for n in CASES if HUNTS or n not in AGAIN]
-PRINTED = [(n, "print") for n in ONCE] + [(n, "print-wide") for n in some(ONCE, 12)]
+WIDE = CASES if HUNTS else some((n for n in CASES if n not in AGAIN), 12)
+PRINTED = [(n, "print") for n in CASES] + [(n, "print-wide") for n in WIDE]
 
 
 def test_figures_drawn_again_are_cases():
