@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -15,6 +16,7 @@ from hapticclay.cli import app
 from hapticclay.errors import ParameterError
 from hapticclay.paper.comparison import SVG_COLORS, inline_svg
 from hapticclay.studies import comparison
+from hapticclay.views.compare_plots import parts_overlay
 
 SCENES = {
     "printed": 'experiment = "constant"\nt_max = 0.5\n',
@@ -129,6 +131,13 @@ def test_the_page_needs_no_other_file(kind, request):
     assert "prefers-color-scheme: dark" in text and "@page" in text
     for x in found:
         assert text.count(x.name) >= 3
+
+
+def test_what_no_file_renders_has_no_panel(controllers):
+    """Of the three, the largest gain alone renders a stiffness."""
+    found = controllers[-1]
+    few = parts_overlay(replace(found, files=found.files[:2]))
+    assert [len(x.axes) for x in (few, parts_overlay(found))] == [2, 3]
 
 
 def test_an_inline_picture_takes_the_colours_of_the_page():
