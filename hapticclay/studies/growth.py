@@ -92,21 +92,28 @@ def _least_damped(v: np.ndarray, dt: float, slowest: float) -> float:
     r = max(1, min(int(np.sum(s > SINGULAR_SHARE * s[0])), rows // 3))
     z = np.linalg.eigvals(np.linalg.lstsq(u[:-1, :r], u[1:, :r])[0])
     z = z[np.abs(z) > 1e-6]
-    powers = np.exp(np.multiply.outer(np.arange(len(v)), np.log(z.astype(complex))))
-    amplitude = np.abs(np.linalg.lstsq(powers, v.astype(complex))[0])
-    rate, strong, swings = _judged(z, amplitude, len(v), dt, slowest)
+    weight = np.abs(np.linalg.lstsq(_motions(z, len(v)), v.astype(complex))[0])
+    rate, strong, swings = _judged(z, weight, dt, slowest)
     return float(rate[swings].max()) if swings.any() else -math.inf
 
 
+def _motions(z: np.ndarray, samples: int) -> np.ndarray:
+    """Samples of modes, with 1 as the largest of each, along a new axis before that of the modes.
+
+    Without this scale, one that grows fast would hide the others from a least-squares fit.
+    """
+    k = np.arange(samples)[:, None] - np.where(np.abs(z) > 1.0, samples - 1, 0)[..., None, :]
+    return np.exp(k * np.log(z.astype(complex))[..., None, :])
+
+
 def _judged(
-    z: np.ndarray, amplitude: np.ndarray, samples: int, dt: float, slowest: float
+    z: np.ndarray, weight: np.ndarray, dt: float, slowest: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Growth rates of modes [1/s]; which exceed rounding; which of these oscillate or diverge.
 
-    Modes lie along the last axis of z and amplitude.
+    Modes lie along the last axis of z and of weight, their largest magnitudes.
     """
     rate, omega = np.log(np.abs(z)) / dt, np.abs(np.angle(z)) / dt
-    weight = amplitude * np.maximum(np.abs(z) ** (samples - 1), 1.0)
     strong = weight > MODE_SHARE * weight.max(axis=-1, keepdims=True, initial=0.0)
     return rate, strong, strong & ((omega > slowest) | (rate > slowest))
 
@@ -162,7 +169,7 @@ def _least_damped_of(
         j, F = j[sound], F[sound]
         z = np.linalg.eigvals(F).astype(complex)
         z[np.abs(z) < 1e-6] = 1e-6  # decayed within a sample
-        powers = np.exp(np.log(z)[:, None, :] * np.arange(n)[None, :, None])
+        powers = _motions(z, n)
         q, R = np.linalg.qr(powers)
         ok = np.isfinite(R).all(axis=(1, 2)) & (
             np.abs(np.diagonal(R, axis1=1, axis2=2)).min(axis=1) > 1e-14
@@ -172,7 +179,7 @@ def _least_damped_of(
             continue
         weight = np.linalg.solve(R, q.conj().transpose(0, 2, 1) @ v[j].astype(complex)[..., None])
         miss[j] = np.abs((powers @ weight)[..., 0] - v[j]).max(axis=1)
-        growth, strong, swings = _judged(z, np.abs(weight[..., 0]), n, dt, SLOWEST_MODE)
+        growth, strong, swings = _judged(z, np.abs(weight[..., 0]), dt, SLOWEST_MODE)
         # A slowly growing mode aliased onto zero frequency may oscillate: undecided.
         doubtful = (strong & ~swings & (growth > LEAST_RATE)).any(axis=1)
         found = np.where(swings, growth, -np.inf).max(axis=1)

@@ -65,6 +65,18 @@ def test_growth_sees_half_the_sampling_frequency():
     assert growth.growth_rate(rec, "y") == pytest.approx(math.log(1.0005) / 1e-3, rel=1e-6)
 
 
+@pytest.mark.parametrize("late", range(1, 22, 2))
+def test_a_sample_that_is_off_near_the_end_is_no_growth(late):
+    """Its mode grows by up to 1e300 within the samples, and hides no other for that."""
+    t = np.arange(1250) * 1e-3
+    v = 1.5 + 0.39 * np.exp(-0.844 * t) * np.cos(51.7 * t)
+    v[-late - 1] += 1e-5  # a tenth of what is taken for a mode
+    rec = SimpleNamespace(
+        t=t, v=np.column_stack((v, v)), scenario=SimpleNamespace(dt=1e-3), outcome=None
+    )
+    assert growth.growth_rate(rec, "x") == pytest.approx(-0.844, abs=1e-5)
+
+
 @pytest.mark.parametrize("K", [2.0, 4.5])
 def test_growth_of_a_run_is_the_rightmost_oscillating_pole(K):
     r = hc.simulate(Loop(K=K).scenario())
