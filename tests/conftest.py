@@ -47,6 +47,9 @@ TOGETHER = {  # files that share a dear fixture, machine code or the processor's
     "simulation/test_column_batch.py": "batch",
     "simulation/test_simulation_batch.py": "step by step",
     "simulation/test_stepwise.py": "step by step",
+    "studies/test_impedance.py": "passivity",
+    "studies/test_passivity_runs.py": "passivity",
+    "studies/test_port_energy.py": "passivity",
     "system/test_page.py": "screen",
     "system/test_window.py": "screen",
 }

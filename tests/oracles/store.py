@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import dataclasses
+import functools
 import hashlib
 import inspect
 import os
@@ -24,7 +25,8 @@ import numpy as np
 FOLDER = Path(__file__).with_name("references")
 
 
-def sources(file: Path) -> set[Path]:
+@functools.cache  # files do not change while the tests run
+def sources(file: Path) -> frozenset[Path]:
     """Return a module's file, and those of the oracles' modules that it imports from."""
     found = {file}
     for node in ast.walk(ast.parse(file.read_text())):
@@ -32,7 +34,7 @@ def sources(file: Path) -> set[Path]:
             other = Path(__file__).with_name(f"{(node.module or '').rpartition('.')[2]}.py")
             if (node.level or (node.module or "").startswith("tests.oracles.")) and other.is_file():
                 found |= sources(other)
-    return found
+    return frozenset(found)
 
 
 def digest(oracle: Callable[..., Any], case: tuple[Any, ...]) -> str:
