@@ -2,8 +2,8 @@
 
 Workers are processes of pytest-xdist. The tests of a file share a worker, and with it fixtures,
 runs and machine code; so do those of some files (TOGETHER). A test marked `perf` compares run
-times: while it runs, the other workers wait. Tests marked `plain` test steps in Python: there
-`engine="auto"` takes no machine code.
+times: while it runs, the other workers wait. Tests marked `plain` test steps in Python, or would
+compile a kind of scene for longer than Python takes: there `engine="auto"` takes no machine code.
 """
 
 import contextlib

@@ -176,6 +176,7 @@ def test_removed_and_left_are_the_whole(steps, gradient, seed):
     assert abs(total - block.volume()) <= 1e-15 * block.volume()  # they cancel but for a few
 
 
+@pytest.mark.plain
 def test_a_run_conserves_the_volume():
     r = hc.simulate(grooved(BLOCK))
     total = math.fsum([r.extra["removed"][-1], BLOCK.volume(r.ground)])

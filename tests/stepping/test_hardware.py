@@ -491,6 +491,7 @@ def test_for_short_samples_it_is_hannaford_and_ryus_damper(energy, v, b):
     assert hardware.passivity_controller(energy, b * v, v, Ts, W) == pytest.approx(need, rel=1e-2)
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("b", [8e3, 1e6])
 def test_clay_too_stiff_for_its_hold_is_bounded_by_the_controller(b):
     kw = dict(b=b, start=(0.06, 0.0), gain=(1.0, 0.1), t_max=0.5)
@@ -520,6 +521,7 @@ def test_the_controller_leaves_passive_clay_alone(parts):
     assert b.energy["passivity_controller"] == 0.0
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("parts", [dict(encoder=65536), dict(velocity="difference")])
 def test_the_controller_acts_in_passive_clay_where_place_or_velocity_is_not_exact(parts):
     """On the idle axis, whose velocity passes zero: some 1e-7 J and 1e-6 m, of 5 N and 20 cm."""

@@ -29,6 +29,7 @@ def test_readme_snippet_runs_and_prints_what_it_says(block, tmp_path):
     assert (tmp_path / "out" / "record.npz").is_file()
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("page", ["stability", "limit_cycles", "hardware", "design"])
 def test_stability_pages_say_what_their_snippets_print(page, tmp_path):
     text = (ROOT / "docs" / f"{page}.md").read_text()
@@ -78,6 +79,7 @@ def test_a_symptom_page_shows_its_cause_in_a_few_lines(page, tmp_path):
     assert text.index("**Cause.**") < text.index("## Show it") and "](" in text
 
 
+@pytest.mark.plain
 def test_the_groove_page_says_what_it_prints(tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "groove.md").read_text(), re.S)
     out = printed_by(code, tmp_path)

@@ -17,6 +17,12 @@ LEARNING = {*(ROOT / "examples" / "learning").glob("*.py")}  # need torch, and m
 EXAMPLES = sorted({*(ROOT / "examples").rglob("*.py")} - {*TUTORIALS} - LEARNING)
 PAGES = EXAMPLES + TUTORIALS
 IDS = [f"{page.parent.name}/{page.stem}" for page in PAGES]
+# whose runs take Python less time than it takes to compile their kinds
+PLAIN = "clay/groove", "hardware/encoder", "hardware/sampled", "hardware/held_clay"
+RUN = [
+    pytest.param(page, id=name, marks=[pytest.mark.plain] if name in PLAIN else [])
+    for page, name in zip(PAGES, IDS, strict=True)
+]
 # words of a program, and what they are in the suite: fewer, shorter or coarser runs, or in Python
 FEWER = {
     "clay/dent": {"    t_max=2.0,": "    t_max=2.0,\n    dt=2e-3,"},
@@ -81,7 +87,7 @@ def run(page):
     exec(compile(text, str(page), "exec"), {"__name__": "__main__"})
 
 
-@pytest.mark.parametrize("page", PAGES, ids=IDS)
+@pytest.mark.parametrize("page", RUN)
 def test_runs_and_shows_a_figure(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run(page)

@@ -231,7 +231,8 @@ def test_mouse_cuts_through_the_clay(screen, tmp_path):
     inside = (record.b[:, 0] > 0.0) & (np.abs(record.v[:, 0]) > 1e-3)
     np.testing.assert_allclose(record.ratio(record.fe)[inside, 0], 90.0, rtol=0.01)
     way = np.linalg.norm(np.diff(record.p, axis=0), axis=1)[record.b[1:, 0] > 0.0].sum()
-    assert record.extra["removed"][-1] == pytest.approx(0.02 * 0.01 * way, rel=0.01)
+    # a hand that turns back cuts less than its way, but none less than the 0.1 m of the clay
+    assert 0.99 * 0.10 < record.extra["removed"][-1] / (0.02 * 0.01) < 1.01 * way
     assert sorted(os.listdir(tmp_path)) == ["o"]  # no MUJOCO_LOG.TXT
     assert sorted(os.listdir(tmp_path / "o")) == [
         "force.png",
