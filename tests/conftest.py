@@ -4,6 +4,7 @@ Workers are processes of pytest-xdist. The tests of a file share a worker, and w
 runs and machine code; so do those of some files (TOGETHER). A test marked `perf` compares run
 times: while it runs, the other workers wait. Tests marked `plain` test steps in Python, or would
 compile a kind of scene for longer than Python takes: there `engine="auto"` takes no machine code.
+Tests marked `compiled` have long runs of one kind: there it takes machine code at once.
 """
 
 import contextlib
@@ -112,9 +113,11 @@ def pytest_runtest_protocol(item):
 
 @pytest.fixture(autouse=True)
 def auto_engine(request, monkeypatch):
-    """Steps in Python where they are what is tested."""
+    """What `engine="auto"` takes in a test that is marked."""
     if request.node.get_closest_marker("plain"):
         monkeypatch.setattr(engines, "repays", lambda kind, time: False)
+    elif request.node.get_closest_marker("compiled"):
+        monkeypatch.setattr(engines, "repays", lambda kind, time: engines.has_numba())
 
 
 @pytest.fixture(scope="session")

@@ -19,8 +19,10 @@ PAGES = EXAMPLES + TUTORIALS
 IDS = [f"{page.parent.name}/{page.stem}" for page in PAGES]
 # whose runs take Python less time than it takes to compile their kinds
 PLAIN = "clay/groove", "hardware/encoder", "hardware/sampled", "hardware/held_clay"
+COMPILED = "walls/press", "parts/chirp"  # long runs of one kind
+MARKS = dict.fromkeys(PLAIN, pytest.mark.plain) | dict.fromkeys(COMPILED, pytest.mark.compiled)
 RUN = [
-    pytest.param(page, id=name, marks=[pytest.mark.plain] if name in PLAIN else [])
+    pytest.param(page, id=name, marks=[MARKS[name]] if name in MARKS else [])
     for page, name in zip(PAGES, IDS, strict=True)
 ]
 # words of a program, and what they are in the suite: fewer, shorter or coarser runs, or in Python
