@@ -24,11 +24,8 @@ demo: .venv/run.done  ## set up, run the constant cut, reproduce the paper, say 
 test: .venv/dev.done  ## set up and run all tests, on all cores
 	$(BIN)/python -m pytest --durations=20
 
-# tracing writes files where a disk is full, and handles SIGTERM itself
-UNDISTURBED := not beyond_the_limit_of_the_process and not full_disk_ends_no_run and not outlive_a_killed_parent and not keeps_its_samples
-
 coverage: .venv/dev.done  ## the same but what tracing disturbs, and which lines they reach: out/coverage/index.html
-	$(BIN)/python -m pytest -m "not perf" -k "$(UNDISTURBED)" --cov --cov-report=term --cov-report=html:out/coverage --cov-report=xml:out/coverage/coverage.xml
+	$(BIN)/python -m pytest -m "not perf and not untraced" --cov --cov-report=term --cov-report=html:out/coverage --cov-report=xml:out/coverage/coverage.xml
 
 check: .venv/dev.done  ## lint, types, layers
 	$(BIN)/ruff check .

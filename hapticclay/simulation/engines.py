@@ -9,13 +9,13 @@ from typing import Any
 from ..errors import ParameterError
 from ..scene.scenario import Scenario
 from ..stepping import scene
-from ..stepping.machine_code import LOADING, compile_time, is_kept, kind_of
+from ..stepping.machine_code import STARTING, compile_time, is_kept, kind_of, loading_time
 from ..stepping.run import PLAIN, Kernel, Run, plainly
 
 ENGINES = ("auto", "python", "native")
 # measured: time that machine code saves in a step, and in clay that stays cut; to import numba [s]
 SAVED, SAVED_IN_GROOVE = {"continuous": 50e-6, "sampled": 90e-6, "accurate": 150e-6}, 400e-6
-IMPORTING = 0.8
+IMPORTING = 0.4
 TRIED = 128  # rows made in CPython between two checks whether machine code repays itself
 saved: dict[Any, float] = {}  # time that it would have saved in this process, by kind of scene [s]
 
@@ -73,10 +73,15 @@ def outweighs(time: float, kind: Any) -> bool:
         time: the time [s].
         kind: from `kind_of`, or (CARRY, kind, ...).
     """
-    is_imported = sys.modules.get("hapticclay.stepping.compiled") is not None
-    if time < LOADING + (0.0 if is_imported else IMPORTING):
+    compiled = sys.modules.get("hapticclay.stepping.compiled")
+    if compiled is None:
+        time -= IMPORTING
+    if time < loading_time(kind):
         return False
-    return is_kept(kind) or time >= compile_time(kind)
+    if is_kept(kind):
+        return True
+    is_started = compiled is not None and compiled.ready
+    return time >= compile_time(kind) + (0.0 if is_started else STARTING)
 
 
 def pays(scenario: Scenario, steps: float) -> bool:

@@ -79,7 +79,15 @@ from . import (
 from . import hardware as wires
 from .engine import mujoco
 from .inlining import EntryCompiler, InlinedCompiler
-from .machine_code import COMPLETE, LOADING, cache_folder, compile_time, is_kept, mark
+from .machine_code import (
+    COMPLETE,
+    LOADING,
+    STARTING,
+    cache_folder,
+    compile_time,
+    is_kept,
+    mark,
+)
 from .notice import Notice
 
 SOURCES = (
@@ -639,7 +647,8 @@ def compiling(kinds: set[Any], kind: Any, what: str) -> Iterator[None]:
         kind: of the scene.
         what: is compiled, in words.
     """
-    with Notice(what, compile_time(kind)) as notice, signals_held():
+    expected = compile_time(kind) + (0.0 if ready else STARTING)
+    with Notice(what, expected) as notice, signals_held():
         if not isinstance(WHOLE_STEPS._cache, cache.FileCache):  # without a home none can miss it
             notice.begin()
         before, collects = cache.on_miss.set(notice.begin), gc.isenabled()

@@ -16,16 +16,18 @@ from typing import Any
 from . import parts as p_
 
 # measured: time to load machine code of a kind where numba is imported; to compile the whole steps
-# of the plain cut, and what a part adds to it [s]
-LOADING, COMPILING = 0.03, 3.5
+# of the plain cut, what a part adds to it, and what numba needs for its own part before it compiles
+# for the first time in a process [s]
+LOADING, COMPILING, STARTING = 0.03, 1.3, 1.2
 COMPILING_PART = {
-    p_.Form: 0.2, p_.Special: 0.7, p_.Flow: 0.9, p_.Groove: 0.4, p_.Sampler: 0.8,
-    p_.Converter: 1.2, p_.Delay: 0.7, p_.Passivity: 0.5, p_.Modal: 2.7,
+    p_.Form: 1.2, p_.Special: 0.2, p_.Signal: 1.0, p_.Flow: 1.4, p_.Stiff: 1.2, p_.Sampler: 1.4,
+    p_.Converter: 0.3, p_.Delay: 0.9, p_.Passivity: 0.4, p_.Modal: 2.0,
 }  # fmt: skip
+LAW = 0.5  # measured: time to compile a law of the user's own, which no process stores [s]
 # what begins the kind of more than whole steps; times that it takes as long to compile
 CARRY, COMPLETE = "many runs made together", "steps that may cross borders"
 STEPWISE = "many runs made step by step"
-TIMES = {CARRY: 2.8, COMPLETE: 1.2, STEPWISE: 2.5}
+TIMES = {CARRY: 2.7, COMPLETE: 1.6, STEPWISE: 2.5}
 MARK = ".kind"  # ending of a file that names a kind of scene with stored machine code
 
 
@@ -88,6 +90,15 @@ def is_kept(kind: Any) -> bool:
     with contextlib.suppress(OSError, RuntimeError):
         return mark(kind).exists()
     return False
+
+
+def loading_time(kind: Any) -> float:
+    """Time to load stored machine code of a kind, and to compile its law [s].
+
+    Args:
+        kind: as in `compile_time`.
+    """
+    return LOADING + (LAW if p_.Own in leaves(kind) else 0.0)
 
 
 def compile_time(kind: Any) -> float:

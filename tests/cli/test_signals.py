@@ -30,6 +30,7 @@ sys.exit(app.main())
 """
 
 
+@pytest.mark.untraced
 @pytest.mark.parametrize(  # ignored: Ctrl-C, as a shell's background jobs do
     "how, ignored", [(signal.SIGTERM, True), (signal.SIGHUP, False)]
 )

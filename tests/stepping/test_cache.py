@@ -78,6 +78,7 @@ def test_where_nothing_can_be_written_functions_are_compiled_all_the_same(tmp_pa
     assert told.count("machine code is not kept") == 1 and told.count("\n") == 1
 
 
+@pytest.mark.untraced
 def test_a_full_disk_ends_no_run_and_leaves_nothing(tmp_path):
     """A limit on the size of files fails in the middle of a write, as a full disk does."""
     code = (

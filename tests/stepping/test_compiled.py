@@ -231,18 +231,29 @@ def test_auto_takes_machine_code_once_what_was_run_of_a_kind_repays_it(monkeypat
     kind = machine_code.kind_of(scene.parts_of(cut))
     per_run = 0.5 * engines.saved_in_a_step(cut) * cut.t_max / cut.dt
     asked = [engines.pays(cut, cut.t_max / cut.dt) for _ in range(20)]
-    cost = machine_code.compile_time(kind)
+    cost = engines.IMPORTING + machine_code.STARTING + machine_code.compile_time(kind)
     assert asked == [(i + 1) * per_run >= cost for i in range(20)]
     assert not engines.pays(hc.free(t_max=0.1), 100.0)  # of another kind
     machine_code.mark(kind).touch()
     monkeypatch.setattr(engines, "saved", {})
     asked = [engines.pays(cut, cut.t_max / cut.dt) for _ in range(20)]
-    cost = engines.IMPORTING + engines.LOADING
+    cost = engines.IMPORTING + machine_code.LOADING
     assert asked == [(i + 1) * per_run >= cost for i in range(20)]
     monkeypatch.setitem(sys.modules, "hapticclay.stepping.compiled", SimpleNamespace(ready=set()))
     monkeypatch.setattr(engines, "saved", {})
     assert not engines.pays(cut, 1000.0) and engines.pays(cut, 300.0)  # 25 ms, 32.5 ms
     assert engines.kernel_for(cut, "python") is run.PLAIN
+
+
+@fast
+def test_a_law_of_ones_own_is_compiled_in_each_process_which_counts(monkeypatch):
+    held = hc.constant_cut(control="sampled")
+    own = dataclasses.replace(held, controller=hc.Controller(lambda t, *x: ((0.0, 0.0), ())))
+    monkeypatch.setattr(engines, "is_kept", lambda kind: True)
+    monkeypatch.setitem(sys.modules, "hapticclay.stepping.compiled", SimpleNamespace(ready=set()))
+    for s, cost in ((held, machine_code.LOADING), (own, machine_code.LOADING + machine_code.LAW)):
+        kind = machine_code.kind_of(scene.parts_of(s))
+        assert engines.outweighs(cost, kind) and not engines.outweighs(0.99 * cost, kind)
 
 
 @fast
@@ -259,7 +270,7 @@ def test_auto_takes_machine_code_in_the_middle_of_a_run_to_the_same_bits(name, m
     # half of the run and two chunks repay it
     cost = per_step * (0.5 * s.t_max / s.dt + chunk - 1)
     monkeypatch.setattr(engines, "compile_time", lambda kind: cost)
-    monkeypatch.setattr(engines, "LOADING", 0.0)
+    monkeypatch.setattr(engines, "STARTING", 0.0)
     seen, plainly = [], engines.plainly
     monkeypatch.setattr(engines, "plainly", lambda r, room: (seen.append(r), plainly(r, room)))
     r = hc.simulate(s)

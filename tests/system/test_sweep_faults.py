@@ -136,6 +136,7 @@ def test_a_disk_that_is_full_from_the_start_is_one_line(small_disk):
     assert not temporary(small_disk / "o")
 
 
+@pytest.mark.untraced
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_file_beyond_the_limit_of_the_process_is_one_line(tmp_path, whole, workers):
     """The full disk without a mount: sweep.json fits into 2 kB, a part does not."""
@@ -178,6 +179,7 @@ def at_work(out, t_max=0.3, chunk=4):
             p.kill()
 
 
+@pytest.mark.untraced
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
 def test_a_killed_parent_is_outlived_by_no_worker_and_no_lock(tmp_path, how):
     ours = plan(t_max=2.0, chunk=1)
