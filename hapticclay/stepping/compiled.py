@@ -106,6 +106,7 @@ ENTRY: Any = {
 }  # fmt: skip
 SIGNALS = [getattr(signal, x) for x in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, x)]
 CAREFUL = 2.5e-4  # measured: time that machine code saves in a careful step [s]
+IN_A_ROW = 64  # most steps made in CPython between two calls of machine code that make none
 
 
 # ---- numbers at an address -----------------------------------------------------------------------
@@ -556,17 +557,45 @@ def natively(r: run.Run, room: int) -> None:
         r: the run.
         room: largest number of rows.
     """
-    kind, parts = r.kind, own_law.called(r.parts)
-    while r.state.status.code == run.OPEN and path.has_room(r.parts.time, r.state, r.e, room):
+    kind, parts, careful = r.kind, own_law.called(r.parts), 1
+    while is_open(r, room):
         if met.get(kind, 0) > enough(kind):
             with first_call(complete, (COMPLETE, kind), "borders and hits of such runs"):
                 r.state = ADVANCE(parts, r.state, r.native, room)
             continue
+        before = r.state.filled.steps
         with first_call(ready, kind, "runs of this kind"):
             r.state = WHOLE_STEPS(parts, r.state, r.native, room)
-        if path.has_room(r.parts.time, r.state, r.e, room):
-            run.one_plainly(r, path.step_to_event)
-            met[kind] = met.get(kind, 0) + 1
+        careful = 1 if r.state.filled.steps > before else min(2 * careful, IN_A_ROW)
+        met[kind] = met.get(kind, 0) + carefully(r, room, careful)
+
+
+def carefully(r: run.Run, room: int, most: int) -> int:
+    """Makes steps in CPython, the first of which machine code did not make.
+
+    Args:
+        r: the run.
+        room: largest number of rows.
+        most: number of steps.
+
+    Returns:
+        The number of steps that it made.
+    """
+    for n in range(most):
+        if not is_open(r, room):
+            return n
+        run.one_plainly(r, path.step if n else path.step_to_event)
+    return most
+
+
+def is_open(r: run.Run, room: int) -> bool:
+    """Whether a run goes on, and has room.
+
+    Args:
+        r: the run.
+        room: largest number of rows.
+    """
+    return r.state.status.code == run.OPEN and path.has_room(r.parts.time, r.state, r.e, room)
 
 
 def row_of(r: run.Run) -> vector.Row:

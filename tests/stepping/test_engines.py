@@ -291,6 +291,22 @@ def test_all_engines_make_the_same_run(kind, monkeypatch):
             same(hc.simulate(s, engine="native"), r, name)
 
 
+@fast
+def test_machine_code_that_makes_no_step_is_not_asked_at_each(monkeypatch):
+    """Against a spring every step is a careful one: calls would take as long as the steps."""
+    from hapticclay.stepping import compiled
+
+    monkeypatch.setattr(compiled, "enough", lambda kind: np.inf)
+    s, asked, whole = KINDS["fast: springs"]["lasts"], [], compiled.WHOLE_STEPS
+    hc.simulate(s, engine="native")
+    monkeypatch.setattr(compiled, "WHOLE_STEPS", lambda *x: (asked.append(x), whole(*x))[1])
+    careful = compiled.met[kind_of(parts_of(s))]
+    r = hc.simulate(s, engine="native")
+    careful = compiled.met[kind_of(parts_of(s))] - careful
+    assert r.steps > careful > 500 and len(asked) < careful / 20
+    same(r, hc.simulate(s, engine="python"), "lasts")
+
+
 def test_the_kinds_have_every_part_with_every_method_that_takes_it():
     has = set()
     for scenes in KINDS.values():
