@@ -87,15 +87,22 @@ def timed(function, *args, **kw) -> tuple[np.ndarray, Any]:
 
 def warm(todo: list[hc.Scenario]) -> None:
     """Compiles all that runs like these may need, so that no timing has it in it."""
-    from hapticclay.stepping import many, scene
+    from hapticclay.stepping import scene
+
+    warm_together(todo)
+    for s in {scene.traits(s): s for s in todo}.values():
+        common.warm_throughout(s)
+
+
+def warm_together(todo: list[hc.Scenario]) -> None:
+    """Compiles what makes many runs like these together."""
+    from hapticclay.stepping import many
 
     pool = batch.BatchPool(1)
     for key, s in {many.kind_key(s): s for s in todo}.items():
         if key is not None:
             pool.many([s] * many.FEWEST, [key] * many.FEWEST)
             batch.carried.add(pool.lane().patterns.of(key, s).kind)
-    for s in {scene.traits(s): s for s in todo}.values():
-        common.warm_throughout(s)
 
 
 def native(scenario: hc.Scenario, steps: int) -> tuple[float, float, float]:

@@ -19,7 +19,7 @@ from hypothesis import settings
 os.environ.setdefault("MPLBACKEND", "agg")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: workers share the cores
 
-from hapticclay.simulation import engines  # noqa: E402
+from hapticclay.simulation import batch, engines  # noqa: E402
 from hapticclay.stepping.notice import Notice  # noqa: E402
 from tests.hunt import EXAMPLES, HUNTS, MORE  # noqa: E402
 
@@ -117,7 +117,8 @@ def auto_engine(request, monkeypatch):
     if request.node.get_closest_marker("plain"):
         monkeypatch.setattr(engines, "repays", lambda kind, time: False)
     elif request.node.get_closest_marker("compiled"):
-        monkeypatch.setattr(engines, "repays", lambda kind, time: engines.has_numba())
+        for place, name in ((engines, "repays"), (batch, "outweighs")):
+            monkeypatch.setattr(place, name, lambda *kind_and_time: engines.has_numba())
 
 
 @pytest.fixture(scope="session")
