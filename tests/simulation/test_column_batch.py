@@ -66,7 +66,7 @@ def test_columns_give_the_bits_of_scenarios(base, monkeypatch):
 def test_clay_that_is_stiffer_for_some_rows(monkeypatch):
     monkeypatch.setattr(column_batch.batch.Plan, "_repay", repay)
     base = replace(SHORT, start=(0.051, 0.0))
-    b = np.geomspace(1.0, 1e5, N)
+    b = np.concatenate([np.geomspace(90.0, 2e3, N // 2), np.geomspace(4e3, 1e5, N - N // 2)])
     given = {"clay.x.values.1": b, "clay.y.values.1": np.where(np.arange(N) % 7, 90.0, b)}
     drawn = column_batch.Columns(base, given)
     good = drawn.of_kind(drawn.draws(0, N))
