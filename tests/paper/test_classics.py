@@ -18,10 +18,7 @@ from tests.hunt import some
 PAGES = Path(__file__).parents[2] / "docs" / "classics"
 
 
-LONG = {"chawda2015": pytest.mark.compiled}  # long runs of two kinds
-
-
-@pytest.mark.parametrize("name", [pytest.param(x, marks=LONG.get(x, ())) for x in CLASSICS])
+@pytest.mark.parametrize("name", CLASSICS)
 def test_quick_runs_agree_with_every_claim(name, monkeypatch):
     monkeypatch.setattr(chawda2015, "PRESSES", some(chawda2015.PRESSES, 2))
     told = []
