@@ -86,6 +86,7 @@ def pytest_collection_finish():
     """Takes what was collected out of the search for cycles: it stays to the end."""
     gc.collect()
     gc.freeze()
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # which a trace of lines handles
 
 
 @contextlib.contextmanager
