@@ -83,10 +83,14 @@ def pytest_collection_modifyitems(items):
 
 
 def pytest_collection_finish():
-    """Takes what was collected out of the search for cycles: it stays to the end."""
+    """Takes what was collected out of the search for cycles: it stays to the end.
+
+    A trace of lines handles SIGTERM from the beginning of the session on; tests are about the
+    default.
+    """
     gc.collect()
     gc.freeze()
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # which a trace of lines handles
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 @contextlib.contextmanager

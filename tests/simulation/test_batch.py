@@ -23,7 +23,6 @@ WIRED = dataclasses.replace(CUT, control="sampled", hardware=hc.Hardware(delay=2
 HELD = dataclasses.replace(CUT, operator=hc.Operator())
 # kinds compiled here, some 20 s each
 REPAID = [HELD, dataclasses.replace(WIRED, operator=hc.Operator(), hardware=GUARDED)]
-KIND_OF_HELD = kind_of(scene.parts_of(HELD))
 
 
 @pytest.fixture
@@ -319,8 +318,8 @@ def test_short_runs_cost_little_more_than_their_steps():
     """
     from benchmarks import throughput
 
-    drawn = throughput.monte_carlo(2000, "continuous")
-    scenes = [s for s in drawn if kind_of(scene.parts_of(s)) == KIND_OF_HELD]  # compiled above
+    drawn, held = throughput.monte_carlo(2000, "continuous"), kind_of(scene.parts_of(HELD))
+    scenes = [s for s in drawn if kind_of(scene.parts_of(s)) == held]  # compiled above
     throughput.warm_together(scenes)
     ratios = []
     for _ in range(3):
