@@ -314,7 +314,7 @@ def test_what_a_generator_raises_or_gives_wrongly_reaches_the_caller():
 def test_short_runs_cost_little_more_than_their_steps():
     """A guard, not the measurement: benchmarks/throughput.py measures 1.2 for a million runs.
 
-    Of a thousand it is 1.6 to 2.1; runs alone take five times as long as together.
+    Of some 1,500 of one kind it is 1.4; runs alone take five times as long as together.
     """
     from benchmarks import throughput
 
@@ -329,4 +329,4 @@ def test_short_runs_cost_little_more_than_their_steps():
         took = time.process_time() - begin
         bare = 0.5 * (before + throughput.floor(scenes[0], 20_000, time.process_time))
         ratios.append(took / (bare * found["steps"].sum()))
-    assert min(ratios) < 3.0
+    assert min(ratios) < 2.0
