@@ -9,7 +9,7 @@ from typing import Any
 from ..errors import ParameterError
 from ..scene.scenario import Scenario
 from ..stepping import scene
-from ..stepping.machine_code import STARTING, compile_time, is_kept, kind_of, loading_time
+from ..stepping.machine_code import kind_of, loading_time, ready_time
 from ..stepping.run import PLAIN, Kernel, Run, plainly
 
 ENGINES = ("auto", "python", "native")
@@ -76,12 +76,9 @@ def outweighs(time: float, kind: Any) -> bool:
     compiled = sys.modules.get("hapticclay.stepping.compiled")
     if compiled is None:
         time -= IMPORTING
-    if time < loading_time(kind):
+    if time < loading_time(kind):  # too short even if it is stored, which takes longer to find
         return False
-    if is_kept(kind):
-        return True
-    is_started = compiled is not None and compiled.ready
-    return time >= compile_time(kind) + (0.0 if is_started else STARTING)
+    return time >= ready_time(kind, started=compiled is not None and bool(compiled.ready))
 
 
 def pays(scenario: Scenario, steps: float) -> bool:

@@ -81,12 +81,10 @@ from .engine import mujoco
 from .inlining import EntryCompiler, InlinedCompiler
 from .machine_code import (
     COMPLETE,
-    LOADING,
-    STARTING,
     cache_folder,
     compile_time,
-    is_kept,
     mark,
+    ready_time,
 )
 from .notice import Notice
 
@@ -558,7 +556,7 @@ def natively(r: run.Run, room: int) -> None:
         room: largest number of rows.
     """
     kind, parts, careful = r.kind, own_law.called(r.parts), 1
-    while is_open(r, room):
+    while run.is_open(r, room):
         if met.get(kind, 0) > enough(kind):
             with first_call(complete, (COMPLETE, kind), "borders and hits of such runs"):
                 r.state = ADVANCE(parts, r.state, r.native, room)
@@ -582,20 +580,10 @@ def carefully(r: run.Run, room: int, most: int) -> int:
         The number of steps that it made.
     """
     for n in range(most):
-        if not is_open(r, room):
+        if not run.is_open(r, room):
             return n
         run.one_plainly(r, path.step if n else path.step_to_event)
     return most
-
-
-def is_open(r: run.Run, room: int) -> bool:
-    """Whether a run goes on, and has room.
-
-    Args:
-        r: the run.
-        room: largest number of rows.
-    """
-    return r.state.status.code == run.OPEN and path.has_room(r.parts.time, r.state, r.e, room)
 
 
 def row_of(r: run.Run) -> vector.Row:
@@ -663,8 +651,7 @@ def enough(kind: Any) -> float:
     Args:
         kind: of the scene.
     """
-    more = COMPLETE, kind
-    return (LOADING if is_kept(more) else compile_time(more)) / CAREFUL
+    return ready_time((COMPLETE, kind)) / CAREFUL
 
 
 @contextlib.contextmanager
@@ -676,8 +663,7 @@ def compiling(kinds: set[Any], kind: Any, what: str) -> Iterator[None]:
         kind: of the scene.
         what: is compiled, in words.
     """
-    expected = compile_time(kind) + (0.0 if ready else STARTING)
-    with Notice(what, expected) as notice, signals_held():
+    with Notice(what, compile_time(kind, started=bool(ready))) as notice, signals_held():
         if not isinstance(WHOLE_STEPS._cache, cache.FileCache):  # without a home none can miss it
             notice.begin()
         before, collects = cache.on_miss.set(notice.begin), gc.isenabled()

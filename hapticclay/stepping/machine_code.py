@@ -16,14 +16,13 @@ from typing import Any
 from . import parts as p_
 
 # measured: time to load machine code of a kind where numba is imported; to compile the whole steps
-# of the plain cut, what a part adds to it, and what numba needs for its own part before it compiles
-# for the first time in a process [s]
-LOADING, COMPILING, STARTING = 0.03, 1.3, 1.2
+# of the plain cut; what numba needs for its own part before it compiles for the first time in a
+# process; to compile a law of the user's own, which is not stored; what a part adds [s]
+LOADING, COMPILING, STARTING, LAW = 0.03, 1.3, 1.2, 0.5
 COMPILING_PART = {
     p_.Form: 1.2, p_.Special: 0.2, p_.Signal: 1.0, p_.Flow: 1.4, p_.Stiff: 1.2, p_.Sampler: 1.4,
-    p_.Converter: 0.3, p_.Delay: 0.9, p_.Passivity: 0.4, p_.Modal: 2.0,
+    p_.Converter: 0.3, p_.Delay: 0.9, p_.Passivity: 0.4, p_.Modal: 2.0, p_.Own: LAW,
 }  # fmt: skip
-LAW = 0.5  # measured: time to compile a law of the user's own, which no process stores [s]
 # what begins the kind of more than whole steps; times that it takes as long to compile
 CARRY, COMPLETE = "many runs made together", "steps that may cross borders"
 STEPWISE = "many runs made step by step"
@@ -101,15 +100,26 @@ def loading_time(kind: Any) -> float:
     return LOADING + (LAW if p_.Own in leaves(kind) else 0.0)
 
 
-def compile_time(kind: Any) -> float:
+def compile_time(kind: Any, started: bool = True) -> float:
     """Time to compile the steps of a kind, measured [s].
 
     Args:
         kind: from `kind_of`, for whole steps; (CARRY or COMPLETE, kind, ...) for more.
+        started: whether this process has compiled or loaded machine code.
     """
-    if kind[0] in TIMES:
-        return TIMES[kind[0]] * compile_time(kind[1])
-    return COMPILING + sum(COMPILING_PART.get(x, 0.0) for x in leaves(kind))
+    times, whole = (TIMES[kind[0]], kind[1]) if kind[0] in TIMES else (1.0, kind)
+    time = COMPILING + sum(COMPILING_PART.get(x, 0.0) for x in leaves(whole))
+    return times * time + (0.0 if started else STARTING)
+
+
+def ready_time(kind: Any, started: bool = True) -> float:
+    """Time to load machine code of a kind, or to compile it where none is stored [s].
+
+    Args:
+        kind: as in `compile_time`.
+        started: as there.
+    """
+    return loading_time(kind) if is_kept(kind) else compile_time(kind, started)
 
 
 def leaves(kind: Any) -> Iterator[Any]:

@@ -114,8 +114,18 @@ def plainly(run: Run, room: int) -> None:
         run: the run.
         room: largest number of rows.
     """
-    while run.state.status.code == OPEN and path.has_room(run.parts.time, run.state, run.e, room):
+    while is_open(run, room):
         one_plainly(run, path.step)
+
+
+def is_open(run: Run, room: int) -> bool:
+    """Whether a run goes on, and has room.
+
+    Args:
+        run: the run.
+        room: largest number of rows.
+    """
+    return run.state.status.code == OPEN and path.has_room(run.parts.time, run.state, run.e, room)
 
 
 def bias(model: Any, data: Any, accelerated: int, to: Any) -> None:  # noqa: ARG001

@@ -231,7 +231,7 @@ def test_auto_takes_machine_code_once_what_was_run_of_a_kind_repays_it(monkeypat
     kind = machine_code.kind_of(scene.parts_of(cut))
     per_run = 0.5 * engines.saved_in_a_step(cut) * cut.t_max / cut.dt
     asked = [engines.pays(cut, cut.t_max / cut.dt) for _ in range(20)]
-    cost = engines.IMPORTING + machine_code.STARTING + machine_code.compile_time(kind)
+    cost = engines.IMPORTING + machine_code.compile_time(kind, started=False)
     assert asked == [(i + 1) * per_run >= cost for i in range(20)]
     assert not engines.pays(hc.free(t_max=0.1), 100.0)  # of another kind
     machine_code.mark(kind).touch()
@@ -249,11 +249,15 @@ def test_auto_takes_machine_code_once_what_was_run_of_a_kind_repays_it(monkeypat
 def test_a_law_of_ones_own_is_compiled_in_each_process_which_counts(monkeypatch):
     held = hc.constant_cut(control="sampled")
     own = dataclasses.replace(held, controller=hc.Controller(lambda t, *x: ((0.0, 0.0), ())))
-    monkeypatch.setattr(engines, "is_kept", lambda kind: True)
     monkeypatch.setitem(sys.modules, "hapticclay.stepping.compiled", SimpleNamespace(ready=set()))
-    for s, cost in ((held, machine_code.LOADING), (own, machine_code.LOADING + machine_code.LAW)):
+    compiling = machine_code.STARTING + machine_code.compile_time(
+        machine_code.kind_of(scene.parts_of(held))
+    )
+    for s, law in ((held, 0.0), (own, machine_code.LAW)):
         kind = machine_code.kind_of(scene.parts_of(s))
-        assert engines.outweighs(cost, kind) and not engines.outweighs(0.99 * cost, kind)
+        for kept, cost in ((True, machine_code.LOADING + law), (False, compiling + law)):
+            monkeypatch.setattr(machine_code, "is_kept", lambda kind, kept=kept: kept)
+            assert engines.outweighs(cost, kind) and not engines.outweighs(0.99 * cost, kind)
 
 
 @fast
@@ -266,11 +270,9 @@ def test_auto_takes_machine_code_in_the_middle_of_a_run_to_the_same_bits(name, m
     per_step, chunk = engines.saved_in_a_step(s), engines.TRIED
     monkeypatch.setattr(engines, "saved", {})
     monkeypatch.setattr(compiled, "ready", set())
-    monkeypatch.setattr(engines, "is_kept", lambda kind: False)
     # half of the run and two chunks repay it
     cost = per_step * (0.5 * s.t_max / s.dt + chunk - 1)
-    monkeypatch.setattr(engines, "compile_time", lambda kind: cost)
-    monkeypatch.setattr(engines, "STARTING", 0.0)
+    monkeypatch.setattr(engines, "ready_time", lambda kind, started: cost)
     seen, plainly = [], engines.plainly
     monkeypatch.setattr(engines, "plainly", lambda r, room: (seen.append(r), plainly(r, room)))
     r = hc.simulate(s)
