@@ -70,6 +70,21 @@ def test_thinned_solves_its_equation(q, k, n):
         assert abs(m + k * m**n - q) <= 1e-14 * (1.0 + n) * q
 
 
+def test_a_motion_too_slow_for_numbers_is_none():
+    # m = (q/k)^(1/n) is 1e-1500: no double
+    assert flow.thinned(1e-145, 1e5, 0.1) == 0.0
+    B, q = (0.01, 0.0, 0.0, 0.01), 1e-145
+    mx, my = flow.slowed(B, q, -q, 1.0, 0.0, 1e7, 0.1)
+    assert abs(mx) <= q and abs(my) <= q and mx >= 0.0 >= my
+
+
+def test_a_kick_that_cancels_the_motion_ends_at_rest():
+    # without yield force and consistency nothing resists; the whole of v is gone at the very end
+    B, v = (0.02, 0.0, 0.0, 0.02), (0.3, -0.4)
+    fx, fy, span = flow.force_along(B, v, (-0.3, 0.4), (-15.0, 20.0), 1.0, 0.0, 0.0, 1.0)
+    assert span == 1.0 and abs(fx) < 1e-12 and abs(fy) < 1e-12
+
+
 @st.composite
 def kicks(draw):
     """A kick: B, v, its end without clay, and a law of both axes."""

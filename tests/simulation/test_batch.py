@@ -235,6 +235,19 @@ class Compiled:
         self.warmed.append(s)
 
 
+def test_compensators_of_another_shape_are_never_made_together(monkeypatch):
+    monkeypatch.setattr(batch, "outweighs", lambda time, kind: True)
+    monkeypatch.setattr(batch, "pays", lambda s, steps: False)
+    shaped = dataclasses.replace(CUT, compensator=hc.Compensator((1.0, 20.0), (1.0, 40.0, 0.0)))
+    jobs = [dataclasses.replace(shaped, gain=(0.2 + 0.1 * i, 0.2)) for i in range(many.FEWEST)]
+    plan = batch.Plan(batch.BatchPool(1), jobs, True)
+    assert [(j.key, j.kernel) for j in plan.jobs(jobs)] == [(None, run.PLAIN)] * len(jobs)
+    keys = [many.kind_key(s) for s in jobs]
+    assert len(set(keys)) == 1 and keys[0] is not None
+    done, left = batch.BatchPool(1).many(jobs, keys)
+    assert not done and left == list(range(len(jobs)))
+
+
 @pytest.mark.usefixtures("repaid")
 def test_resting_handles_are_told_as_the_monitor_tells_them():
     still = dataclasses.replace(CUT, force=(0.0, 0.0))

@@ -7,6 +7,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
+from hapticclay.simulation import vectored
 from hapticclay.simulation.stepwise import Sample
 from tests.hunt import some
 from tests.simulation.test_stepwise import CUT, HARD, HELD, SCENES, fast
@@ -70,6 +71,23 @@ def test_compiled_runs_of_one_kind_are_those_of_simulations(name):
     with hc.SimulationBatch(scenes, engine="native", workers=2) as batch:
         assert all(v is batch._runs.of[0] is not None for v in batch._runs.of)
         go_on(batch, single, 1, 14, 40)
+
+
+@fast
+@pytest.mark.parametrize("loads", [True, False])
+def test_runs_are_compiled_where_this_pays_and_the_compiler_loads(loads, monkeypatch):
+    monkeypatch.setattr(vectored, "repay", lambda run, steps: steps > 100.0)
+    if not loads:
+        monkeypatch.setattr(vectored, "load_compiled", lambda: None)
+    scenes = KINDS["operator"]
+    single = [hc.Simulation(s, engine="python") for s in scenes]
+    with hc.SimulationBatch(scenes) as batch:
+        for n in (900, 900, 400, 300):
+            batch.advance(n, force=[(1.5, 0.2)] * 2)
+            for sim in single:
+                sim.advance(n, force=(1.5, 0.2))
+            assert_alike(batch, single)
+        assert [v is not None for v in batch._runs.of] == [loads] * 2
 
 
 @fast

@@ -10,7 +10,9 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
+from hapticclay.simulation import stepwise
 from hapticclay.simulation.engines import has_numba
+from hapticclay.stepping.run import PLAIN
 
 pytestmark = pytest.mark.plain
 fast = pytest.mark.skipif(not has_numba(), reason="needs numba: pip install hapticclay[fast]")
@@ -187,16 +189,58 @@ def test_many_steps_at_once_are_as_many_single_ones(name):
     same(sim.record(), hc.simulate(s, engine="python"))
 
 
+def visited(sim):
+    """What is read of a run, on a way on which it is set, returns to a snapshot, and ends."""
+    seen, taken = [], None
+    for i in range(60):
+        sim.advance(1 + 30 * (i % 3), force=(1.0 + 0.05 * i, 0.1))
+        if i % 4:  # samples one after the other, and now and then none
+            seen.append(sim.numbers())
+        if i == 20:
+            taken = sim.snapshot()
+        if i == 25:
+            sim.restore(taken)
+        if i == 35:
+            sim.set(gain=(0.9, 1.1))
+        if i == 45:
+            sim.set(b=1.2)
+    for n in (1, 4000, *[500] * 20):  # past looks of the monitor, to the end
+        sim.advance(n)
+        seen.append([*sim.state.p, *sim.numbers()])
+    assert sim.outcome is not None
+    return sim.record(), np.concatenate(seen)
+
+
 @fast
 @pytest.mark.parametrize("s", [HELD, SCENES["hardware"]], ids=["held", "hardware"])
 def test_compiled_steps_give_the_same_bits(s):
-    records = []
-    for engine in ("python", "native"):
+    s = replace(s, t_max=2.0, length=None)
+    found = []
+    for engine in ("python", "native", "native"):  # the last finds its code ready
         with hc.Simulation(s, engine=engine) as sim:
-            for i in range(40):
-                sim.advance(1 + 30 * (i % 3), force=(1.0 + 0.05 * i, 0.1))
-            records.append(sim.record())
-    same(*records)
+            found.append(visited(sim))
+    (want, told), *others = found
+    for got, seen in others:
+        same(want, got)
+        assert np.array_equal(told, seen, equal_nan=True)
+
+
+@fast
+@pytest.mark.parametrize(
+    "s", [replace(HELD, length=0.012), replace(HELD, t_max=0.3)], ids=["to a place", "to a time"]
+)
+def test_a_run_that_is_compiled_where_this_pays_goes_on_to_the_same_end(s, monkeypatch):
+    asked = []
+    monkeypatch.setattr(stepwise, "TOLD", 300)
+    monkeypatch.setattr(stepwise, "repay", lambda run, steps: asked.append(steps) or True)
+    with hc.Simulation(s) as sim, hc.Simulation(s, engine="python") as plain:
+        while plain.outcome is None:
+            for each in (sim, plain):
+                each.advance(120, force=(2.0, 0.1))
+            assert sim.numbers() == plain.numbers() or plain.outcome
+            assert (sim._run.kernel is not PLAIN) == bool(asked)
+        assert len(asked) == 1 and asked[0] == 360
+        same(sim.record(), plain.record())
 
 
 def held(sim, n, force):
