@@ -70,8 +70,8 @@ def test_thinned_solves_its_equation(q, k, n):
         assert abs(m + k * m**n - q) <= 1e-14 * (1.0 + n) * q
 
 
-def test_a_motion_too_slow_for_numbers_is_none():
-    # m = (q/k)^(1/n) is 1e-1500: no double
+def test_a_motion_below_the_smallest_number_is_none():
+    # m = (q/k)^(1/n) would be 1e-1500
     assert flow.thinned(1e-145, 1e5, 0.1) == 0.0
     B, q = (0.01, 0.0, 0.0, 0.01), 1e-145
     mx, my = flow.slowed(B, q, -q, 1.0, 0.0, 1e7, 0.1)

@@ -190,7 +190,7 @@ def test_many_steps_at_once_are_as_many_single_ones(name):
 
 
 def visited(sim):
-    """What is read of a run, on a way on which it is set, returns to a snapshot, and ends."""
+    """The record of a run that is changed and returned to a snapshot, and the samples read."""
     seen, taken = [], None
     for i in range(60):
         sim.advance(1 + 30 * (i % 3), force=(1.0 + 0.05 * i, 0.1))
