@@ -82,11 +82,7 @@ def test_runs_are_compiled_where_this_pays_and_the_compiler_loads(loads, monkeyp
     scenes = KINDS["operator"]
     single = [hc.Simulation(s, engine="python") for s in scenes]
     with hc.SimulationBatch(scenes) as batch:
-        for n in (900, 900, 400, 300):
-            batch.advance(n, force=[(1.5, 0.2)] * 2)
-            for sim in single:
-                sim.advance(n, force=(1.5, 0.2))
-            assert_alike(batch, single)
+        go_on(batch, single, 3, 9, 1200)
         assert [v is not None for v in batch._runs.of] == [loads] * 2
 
 

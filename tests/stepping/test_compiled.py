@@ -250,9 +250,8 @@ def test_a_law_of_ones_own_is_compiled_in_each_process_which_counts(monkeypatch)
     held = hc.constant_cut(control="sampled")
     own = dataclasses.replace(held, controller=hc.Controller(lambda t, *x: ((0.0, 0.0), ())))
     monkeypatch.setitem(sys.modules, "hapticclay.stepping.compiled", SimpleNamespace(ready=set()))
-    compiling = machine_code.STARTING + machine_code.compile_time(
-        machine_code.kind_of(scene.parts_of(held))
-    )
+    held_kind = machine_code.kind_of(scene.parts_of(held))
+    compiling = machine_code.compile_time(held_kind, started=False)
     for s, law in ((held, 0.0), (own, machine_code.LAW)):
         kind = machine_code.kind_of(scene.parts_of(s))
         for kept, cost in ((True, machine_code.LOADING + law), (False, compiling + law)):

@@ -339,12 +339,11 @@ def test_interrupted_and_killed_sweeps_go_on(tmp_path, capsys, how, code):
 
 
 def test_command_draws_maps_and_complains_in_one_line(tmp_path, capsys, monkeypatch):
-    args = ["sweep", "--grid", GRID, "--fixed", "t_max=0.02", "--workers", "1", "--out"]
-    assert app.main([*args, str(tmp_path)]) == 0
+    args = ["sweep", "--grid", GRID, "--fixed", "t_max=0.02", "--out", str(tmp_path)]
+    assert app.main([*args, "--workers", "1"]) == 0
     assert "6 runs" in capsys.readouterr().out and (tmp_path / "status.png").stat().st_size > 5000
     monkeypatch.setattr(sweep, "run_chunk", None)  # nothing is left to make, whatever the workers
-    again = ["sweep", "--grid", GRID, "--fixed", "t_max=0.02", "--no-maps", "--out", str(tmp_path)]
-    assert app.main(again) == 0 and "6 runs" in capsys.readouterr().out
+    assert app.main([*args, "--no-maps"]) == 0 and "6 runs" in capsys.readouterr().out
     for extra, word in (
         (["--grid", "b=1:2"], "b = "),
         (["--grid", "b=1", "--runs", "3"], "runs"),

@@ -9,7 +9,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.simulation.engines import has_numba
-from hapticclay.stepping.run import PLAIN
+from hapticclay.stepping.run import CHUNK, PLAIN
 from hapticclay.views.clock import FRAME_TIME, LONGEST_SLICE, Clock
 from hapticclay.views.live_run import played
 from hapticclay.views.player import Player
@@ -61,8 +61,10 @@ def test_pull_is_the_impedance_towards_the_point():
 def test_slices_are_no_part_of_the_result():
     """With a still target, slices of any length and a headless run with that force agree."""
     ends, endless = [], dataclasses.replace(hc.constant_cut(dt=1e-3), length=None)
-    # and slices shorter than a step, and one as long as the rows between two looks
-    for frame, end in ((FRAME_TIME, 1.2), (0.0005, 1.2), (LONGEST_SLICE, 1.2), (4.095, 4.095)):
+    # some are shorter than a step, and one is as long as the rows between two looks
+    looks = 1e-3 * (CHUNK - 1)
+    frames = dict.fromkeys((FRAME_TIME, 0.005, 0.0005, LONGEST_SLICE), 1.2) | {looks: looks}
+    for frame, end in frames.items():
         session = Session(endless, stiffness=10.0)
         session.pull((0.0, 0.0))
         session.push((2.0, 0.0))
