@@ -183,7 +183,7 @@ def loop_table(lines: np.ndarray, pieces: np.ndarray, slack: float) -> np.ndarra
         slack: a jump within this time after an instant counts as being at that instant [s].
     """
     table = np.zeros((1 + len(lines) + len(pieces), PIECE))
-    table[0, :2] = len(lines), slack
+    table[0, :3] = len(lines), slack, len(table)
     table[1 : 1 + len(lines), :5] = lines
     table[1 + len(lines) :] = pieces
     return table

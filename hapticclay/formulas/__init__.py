@@ -1,0 +1,1 @@
+"""Formulas of floats: what CPython runs and Cython compiles. Each stands once."""

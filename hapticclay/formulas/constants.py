@@ -1,0 +1,3 @@
+"""Bounds that formulas share."""
+
+B_MAX = 1e9  # [N.s/m] largest damping of the clay

@@ -1,0 +1,7 @@
+from . cimport cmath
+
+cdef inline long long whole(double x) noexcept nogil:
+    return <long long>x if -9.0e15 < x and x < 9.0e15 else 0
+
+cdef inline double nearest(double x) noexcept nogil:
+    return cmath.rint(x) + 0.0 if -9.0e15 < x and x < 9.0e15 else x

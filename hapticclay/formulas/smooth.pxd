@@ -1,0 +1,3 @@
+from .numbers cimport whole
+
+cdef double smooth_damping(double *table, long at, double x, double y) noexcept nogil

@@ -1,0 +1,80 @@
+"""The start of a run: arm at its place, clay around it, and controller."""
+
+import math
+
+from ..formulas import arm as arm_law
+from ..formulas import regions
+from . import arm, borders, groove, hardware, memory, methods, sampled, viscous, watch, yielding
+
+
+def begin(m, s, px, py, vx, vy):
+    """Puts a state to the start of a run, the handle at p with velocity v."""
+    memory.cleared(s)
+    s.q1, s.q2 = arm_law.inverse_kinematics(m.ox + px, m.oy + py, m.links)
+    u = s.k.u
+    u[0], u[1], u[2], u[3] = arm_law.jacobian(s.q1, s.q2, m.links)
+    r1, r2 = arm_law.joint_velocity(vx, vy, u, 1.0)
+    s.w1, s.w2 = r1, r2 - r1
+    s.fine = s.resolved = s.mode_step = math.inf
+    s.form_before = s.form_after = -1.0
+    arm.put(m, s)
+    for i in range(2):
+        put_axis(m, s, i, py if i else px, vy if i else vx)
+    put_clay(m, s, px, py)
+    watch.begin(s.watch)
+    if m.method == methods.SAMPLED:
+        put_machine(m, s, px, py)
+
+
+def put_axis(m, s, i, p, v):
+    """Compensator, reference model and clay of an axis in steady motion."""
+    c, z, a = m.axis[i].servo, s.axis[i], s.mode[i]
+    z.delta, z.rate, z.y, z.yrate = (p + c[1] / c[2] * v) / c[0], v / c[0], p, v
+    if m.formed:
+        z.rate = 0.0
+        memory.copied4(z.z, m.axis[i].z0)
+    z.n = z.old_n = a.n = a.mode = 1.0
+    z.anchor = z.cut = math.nan
+
+
+def put_clay(m, s, px, py):
+    """The clay around the handle."""
+    ix, iy = regions.region_of(m.table, (px, py))
+    k, seen = s.k, s.seen
+    arm.handle_at(m, k, s.q1, s.q2, s.w1, s.w1 + s.w2)
+    borders.enter(m, s, ix, iy, k.x.p, k.y.p, -1, 1.0)
+    viscous.age(s)
+    if m.groove:
+        groove.move(m, s, k.x.p, k.y.p, k.x.v, k.y.v)
+    if m.flow:
+        yielding.age(s)
+    seen[0], seen[1], seen[2], seen[3] = ix, ix, iy, iy
+
+
+def put_machine(m, s, px, py):
+    """Controller and hardware; fills past samples into the rings of the sensors."""
+    now = s.now
+    for i in range(2):
+        z, a, p = now.axis[i], s.axis[i], py if i else px
+        if not m.own:
+            z.delta, z.rate, z.y, z.yrate, z.start = a.delta, a.rate, a.y, a.yrate, a.delta
+            memory.copied4(z.z, a.z)
+        z.place, z.tool, z.w = p, p, s.w2 if i else s.w1
+    now.due = now.due_then = math.inf
+    sampled.put_times(m, now, 0)
+    if m.window > 0:
+        fill_angles(m, s)
+    if m.guard:  # before the start the motors have held nothing
+        for j in range(2 * (m.guard_whole + 2)):
+            m.forces[j] = 0.0
+    memory.copied(s.next, now)
+
+
+def fill_angles(m, s):
+    """Past angles: before the start the joints have long turned at their rates."""
+    ring = m.angles
+    for j in range(m.window):
+        n = j - m.window
+        q1, q2 = s.q1 + n * m.Ts * s.w1, s.q2 + n * m.Ts * s.w2
+        ring[3 * j] = 1.0 * n
+        ring[3 * j + 1], ring[3 * j + 2] = hardware.encoded(m, q1), hardware.encoded(m, q2)

@@ -1,0 +1,182 @@
+"""The hardware between computer and arm in a sample: one function for each imperfection."""
+
+import math
+
+from ..formulas import hardware as law
+from . import arm
+
+QUEUED = 11  # numbers of an entry: time, then torques, force, guard, pull and velocity of its tool
+CHANCE = 4  # numbers of a sample: its delay [s], whether it is lost, noise (x, y) [N]
+
+
+# ---- chance --------------------------------------------------------------------------------------
+
+
+def lateness(m, k):
+    """How late a sample is [s]."""
+    return m.chances[CHANCE * (k - m.chance_first)] if m.chance else 0.0
+
+
+def is_lost(m, k):
+    """Whether a sample is lost."""
+    return m.chance and m.chances[CHANCE * (k - m.chance_first) + 1] > 0.0
+
+
+def noise(m, k, i):
+    """Noise of a sample on an axis of the force [N]."""
+    return m.chances[CHANCE * (k - m.chance_first) + 2 + i]
+
+
+# ---- force ---------------------------------------------------------------------------------------
+
+
+def measured(m, s, i, f):
+    """An axis of the force as the computer gets it [N]: with noise, filtered, converted."""
+    if m.chance:
+        f += noise(m, s.now.k, i)
+    if m.filtered:
+        z, to = s.now.axis[i].filter, s.next.axis[i].filter
+        to[0], to[1] = law.filter_step(m.filter, z[0], z[1], f)
+        f = z[0]
+    return law.quantize(f, m.adc_bits, m.adc_range)
+
+
+# ---- joints --------------------------------------------------------------------------------------
+
+
+def encoded(m, q):
+    """A joint angle as its encoder reads it [rad]."""
+    return law.encode(q, m.encoder)
+
+
+def differenced(m, s, q1, q2):
+    """Joint rates by the difference of measured angles [rad/s]."""
+    ring, now, after = m.angles, s.now, s.next
+    row, k = 3 * now.oldest, 1.0 * now.k
+    w1, w2 = law.velocity_difference(
+        ring[row], (ring[row + 1], ring[row + 2]), k, (q1, q2), m.Ts
+    )
+    if m.cutoff > 0.0:
+        span = (k - ring[3 * ((now.oldest + m.window - 1) % m.window)]) * m.Ts
+        w1 = law.low_pass(now.x.w, w1, m.cutoff, span)
+        w2 = law.low_pass(now.y.w, w2, m.cutoff, span)
+    after.x.w, after.y.w = w1, w2
+    after.oldest = (now.oldest + 1) % m.window
+    return w1, w2
+
+
+def note_angles(m, s):
+    """Stores the angles of the next sample."""
+    ring, row = m.angles, 3 * s.now.oldest
+    ring[row], ring[row + 1], ring[row + 2] = 1.0 * s.now.k, encoded(m, s.q1), encoded(m, s.q2)
+
+
+# ---- torques -------------------------------------------------------------------------------------
+
+
+def drive(m, s, t1, t2):
+    """Gives torques to the motors, within their limits and after the converter."""
+    t1, t2 = arm.clipped(t1, m.limit1), arm.clipped(t2, m.limit2)
+    s.next.x.tau = law.quantize(t1, m.dac_bits, m.dac_range1)
+    s.next.y.tau = law.quantize(t2, m.dac_bits, m.dac_range2)
+
+
+# ---- the rendered clay ---------------------------------------------------------------------------
+
+
+def couple(m, s, k, bx, by):
+    """Force of the clay through the coupling, (x, y) [N]; moves its tool."""
+    now, after, c, d, T = s.now, s.next, m.coupling_spring, m.coupling_damper, m.Ts
+    x, y = k.x, k.y
+    if m.flow:
+        a, b = s.x, s.y
+        fyk = a.Fy, a.Kn, a.n, b.Fy, b.Kn, b.n
+        tool = now.x.tool, now.y.tool
+        ux, uy, fx, fy = law.tool_that_yields(
+            tool, (x.p, y.p), (x.v, y.v), (bx, by), fyk, m.flow == 2, c, d, T
+        )
+        after.x.tool, after.y.tool = now.x.tool + T * ux, now.y.tool + T * uy
+    else:
+        after.x.tool, ux = law.virtual_coupling(now.x.tool, x.p, x.v, bx, c, d, T)
+        after.y.tool, uy = law.virtual_coupling(now.y.tool, y.p, y.v, by, c, d, T)
+        fx, fy = bx * ux, by * uy
+    after.x.pull, after.y.pull, after.x.pull_rate, after.y.pull_rate = fx, fy, ux, uy
+    return fx, fy
+
+
+def guarded(m, s, k, i, f):
+    """An axis of the force of the clay after the passivity controller [N]."""
+    o, z, to, ring, n = k.axis[i], s.now.axis[i], s.next.axis[i], m.forces, m.guard_whole + 2
+    # since the last sample the motors have held one force, then another
+    a = 2 * ((s.now.newest - m.guard_whole + n) % n)
+    b = 2 * ((s.now.newest - m.guard_whole - 1 + n) % n)
+    mean = (1.0 - m.guard_share) * ring[a + i] + m.guard_share * ring[b + i]
+    to.energy, to.place = z.energy + mean * (o.p - z.place), o.p
+    made = law.passivity_controller(to.energy, f, o.v, m.Ts, k.Wyy if i else k.Wxx)
+    to.guard = made - f
+    return made
+
+
+def note_force(m, s):
+    """Stores the force that a sample requests."""
+    row = 2 * s.next.newest
+    m.forces[row], m.forces[row + 1] = s.asked[2], s.asked[3]
+
+
+# ---- delay ---------------------------------------------------------------------------------------
+
+
+def queue(m, s, now):
+    """Advances the queue of torques, and holds those that are due."""
+    ring, q, after = m.queue, s.now, s.next
+    time, n = q.when + m.delay, 0
+    while n < q.n and ring[QUEUED * ((q.first + n) % m.queue_rows)] <= now:
+        n += 1
+    waits = s.shown
+    if n == q.n and s.shown and time <= now:
+        waits = 0
+    elif n > 0:
+        hold(after, ring, QUEUED * ((q.first + n - 1) % m.queue_rows) + 1)
+    else:
+        for i in range(2):
+            z, to = q.axis[i], after.axis[i]
+            to.tau, to.force, to.guard = z.tau, z.force, z.guard
+            to.pull, to.pull_rate = z.pull, z.pull_rate
+    after.first, left = q.first + n, q.n - n
+    after.due = entry(m, after.first, left, 0, waits, time)
+    after.due_then = entry(m, after.first, left, 1, waits, time)
+    after.n = left + 1 if waits else left
+
+
+def hold(machine, of, j):
+    """Lets the motors hold the ten numbers of an output, from index j on."""
+    for i in range(2):
+        to = machine.axis[i]
+        to.tau, to.force, to.guard = of[j + i], of[j + 2 + i], of[j + 4 + i]
+        to.pull, to.pull_rate = of[j + 6 + i], of[j + 8 + i]
+
+
+def ask(s):
+    """Notes the output that a sample requests."""
+    for i in range(2):
+        z, to = s.next.axis[i], s.asked
+        to[i], to[2 + i], to[4 + i], to[6 + i], to[8 + i] = (
+            z.tau, z.force, z.guard, z.pull, z.pull_rate
+        )  # fmt: skip
+
+
+def entry(m, first, n, i, waits, time):
+    """When the i-th of n entries is due, with one behind them where one waits [s]."""
+    if i < n:
+        return m.queue[QUEUED * ((first + i) % m.queue_rows)]
+    return time if i == n and waits else math.inf
+
+
+def note_hold(m, s):
+    """Writes the output that a sample requests into the queue, where it comes later."""
+    end = s.next.first + s.next.n
+    if end != s.now.first + s.now.n:
+        ring, j = m.queue, QUEUED * ((end - 1) % m.queue_rows)
+        ring[j] = s.now.when + m.delay
+        for i in range(QUEUED - 1):
+            ring[j + 1 + i] = s.asked[i]

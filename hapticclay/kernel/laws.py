@@ -1,0 +1,89 @@
+"""Laws of the clay beside plain damping: a line each, in the order in which they act.
+
+| law | module | enter | load | resist | moved | force |
+|---|---|---|---|---|---|---|
+| yields | `yielding` | its numbers | | after the kick is solved | ages | on a moving handle |
+| springs back | `springs` | rest and dent | x | | x | x |
+| stays cut | `groove` | damping of the groove | | by `yielding` | cuts | by `yielding` |
+| of a user | `own_laws` | | x | | x | x |
+"""
+
+import math
+
+from ..formulas import flow
+from . import groove, own_laws, springs, viscous, yielding
+
+
+def enter(m, s, px, py, crossed):
+    """In a region that the handle enters over a border of coordinate `crossed`, -1 for none."""
+    if m.flow and not m.groove:
+        yielding.enter(m, s)
+    if m.springs:
+        springs.enter(m, s, px, py, crossed)
+    if m.groove:
+        groove.enter(m, s)
+    if m.smooth:
+        viscous.smoothed(m, s, px, py)
+
+
+def moved(m, s, px, py, vx, vy, h):
+    """After a step of length h that led the handle there."""
+    if m.springs:
+        springs.move(m, s, px, py, h)
+    if m.groove:
+        groove.move(m, s, px, py, vx, vy)
+    if m.laws:
+        own_laws.move(m, px, py, vx, vy, h)
+    if m.flow:
+        yielding.age(s)
+    if m.smooth:
+        viscous.smoothed(m, s, px, py)
+
+
+# ---- at an instant -------------------------------------------------------------------------------
+
+
+def without_clay(m, s, k, fx, fy):
+    """A force on the handle less that of the clay before the sample that does not yield [N]."""
+    x, y = k.x, k.y
+    bx, by = viscous.force(m, viscous.now(m, s, 0, 1), viscous.now(m, s, 1, 1), x.v, y.v)
+    fx, fy = fx - bx, fy - by
+    if m.special and (m.springs or m.laws):
+        ax, ay = (s.x.force_before, s.y.force_before) if m.springs else (0.0, 0.0)
+        gx, gy = own_laws.force(m, x.p, y.p, x.v, y.v, 0.0) if m.laws else (0.0, 0.0)
+        fx, fy = fx - (ax + gx), fy - (ay + gy)
+    return fx, fy
+
+
+def seen_force(m, s, px, py, vx, vy, pullx, pully):
+    """Force of the clay as the controller evaluates it [N]; pull is that of physical yielding."""
+    if not m.clay:
+        return 0.0, 0.0
+    x, y = viscous.force(m, viscous.now(m, s, 0, 0), viscous.now(m, s, 1, 0), vx, vy)
+    if not m.special:
+        return x, y
+    fx, fy = motion_force(m, s, vx, vy, pullx, pully) if m.flow else (0.0, 0.0)
+    if m.springs:
+        fx, fy = fx + springs.seen_force(m, s, 0, px), fy + springs.seen_force(m, s, 1, py)
+    if m.laws:
+        gx, gy = own_laws.force(m, px, py, vx, vy, 0.0)
+        fx, fy = fx + gx, fy + gy
+    return x + fx, y + fy
+
+
+def motion_force(m, s, vx, vy, pullx, pully):
+    """Force of yielding clay, in addition to b v, on a moving handle; none at rest, (x, y) [N].
+
+    For physical clay this is the force that holds the handle, which is given.
+    """
+    if m.acts:
+        return pullx, pully
+    law = yielding.laws_of_motion(m, s, vx, vy)
+    ax, ay = viscous.along(m, vx, vy)
+    ax, ay = flow.motion_force(law, m.flow == 2, ax, ay)
+    return viscous.across(m, ax, ay)
+
+
+def is_calm(s):
+    """Whether no law needs short steps."""
+    return s.resolved == math.inf

@@ -1,0 +1,440 @@
+"""Judges a run in progress: whether it is still good, and whether an axis is unstable."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..arguments import named
+from ..model.clay import Clay
+from ..model.constants import AXES
+from ..model.signals import Multisine
+from ..model.traits import Hold
+from ..scene.scenario import Scenario
+from ..theory import gain_limits
+
+LIMITS = "oscillation against the torque limits"
+FOLD = math.sin(math.radians(1.0))  # out of reach: elbow within 1 degree of stretched or folded
+SPEED = 20.0  # [m/s] beyond any hand
+FLOOR = 1e-9  # [m/s] swings below this are rounding
+SWING_GROWTH = 30.0  # an oscillation that has grown this much, swing by swing, is unstable
+STEP_GROWTH = 2.0  # growth of one swing counts to this factor: a crossed border is no instability
+SWINGS = 6  # consecutive swings that a verdict of growth needs
+SWING_SPACING = 5.0  # samples a swing must last for that: faster is chatter over a border
+TRANSFER = 3.0  # swing over that of the other axis whose energy it takes: > sqrt(Lambda_y/Lambda_x)
+CYCLE = 30  # consecutive swings into the torque limits that do not decay are a limit cycle
+MEMORY = 200  # swings stored
+STILL = 1e-5  # [m/s] a handle slower than this ...
+WHILE = 1.0  # ... for so long at the time limit is stalled; motors at their limits, saturated [s]
+QUIET = 9 + SWINGS + 1  # numbers per axis that `is_quiet` carries from one call to the next
+MOST_CLAYS = 33  # clays per axis whose gain limits are computed; of more, the nearest of so many
+OFTEN = 0.1  # share of the last WHILE at the torque limits that makes an unstable run a limit cycle
+
+
+class StabilityMonitor:
+    """Searches the rows of a run, chunk by chunk, for the end of its good part.
+
+    An axis is unstable if the swings of its velocity (from one turning point to the next) grow one
+    by one, SWINGS of them at least and by SWING_GROWTH together; or if CYCLE of them in a row drive
+    a motor into its torque limit without decay; or if the handle swings out of reach while its gain
+    is above the limit of its loop in some clay that it has visited. Under a muscle force or a
+    command that varies, growth counts only above that limit: the handle may swing as it is driven.
+    Below the limit, the axis must grow beyond what the other axis may have passed to it.
+
+    Args:
+        scenario: the scenario of the run.
+    """
+
+    def __init__(self, scenario: Scenario):
+        self.scenario = scenario
+        self.past = np.zeros((2, 2))  # last two velocities seen [m/s]
+        self.turn = [0.0, 0.0]  # velocity at the last turning point [m/s]
+        self.hits = [0, 0]  # samples since then with a motor in its limit
+        self.since = [0, 0]  # samples since then
+        self.seen = 0  # samples
+        # where the handle has been [m]
+        self.least, self.most = [math.inf, math.inf], [-math.inf, -math.inf]
+        self.moved = -1  # last sample with the handle faster than STILL
+        self.unbound = -1  # last sample with no motor at its limit
+        self.bound = np.zeros(0, dtype=bool)  # whether a motor is in its limit, of the last WHILE
+        self.often = 0  # samples with a motor in its limit
+        self.onset: Outcome | None = None  # of an instability that did not end the run
+        # of the present growth: size [m/s], whether a motor was in its limit, samples
+        self.swings: list[list[tuple[float, bool, int]]] = [[], []]
+        self.largest = [0.0, 0.0]  # swing so far [m/s]
+        self._limits: dict[tuple[int, float], float] = {}  # of axis and clay, worked out so far
+
+    def look(self, rows: np.ndarray, first: int) -> tuple[int, Outcome | None]:
+        """Judges the next rows.
+
+        Args:
+            rows: (q, p, v, fh, tau, delta), shape (12, n).
+            first: index of the first row.
+
+        Returns:
+            (number of good rows, outcome that ends the run there or None).
+        """
+        dt = self.scenario.dt
+        v, q2 = rows[4:6], rows[1]
+        good = rows.shape[1]
+        # first a cheap test: is anything wrong at all?
+        bend = np.abs(np.sin(q2))
+        if good and not (
+            np.isfinite(rows.sum()) and np.abs(v).max() <= SPEED and bend.min() >= FOLD
+        ):
+            bad = ~np.isfinite(rows).all(axis=0) | (np.abs(v) > SPEED).any(axis=0) | (bend < FOLD)
+            good = int(bad.argmax()) if bad.any() else good
+        if good:
+            for i in (0, 1):
+                self.least[i] = min(self.least[i], float(rows[2 + i, :good].min()))
+                self.most[i] = max(self.most[i], float(rows[2 + i, :good].max()))
+        found = self._unstable(rows[:, :good])
+        if found is not None:
+            n, axis, cause = found
+            step = first + n - 1
+            code = "limit cycle" if cause == LIMITS else "diverged"
+            verdict = Outcome(code, step * dt, step, axis, cause, self._advice(axis))
+            if self.scenario.stop_when_unstable:
+                return n, verdict
+            self.onset = self.onset or verdict
+        if good == rows.shape[1]:
+            return good, None
+        step = max(first + good - 1, 0)
+        count = [len(x) for x in self.swings]
+        above = [i for i in (0, 1) if count[i] and self._above_limit(i)]
+        axis = self._blame(above) if max(count) >= 3 or any(count[i] >= 2 for i in above) else ""
+        if axis:
+            return good, Outcome(
+                "diverged", step * dt, step, axis, "oscillation out of reach", self._advice(axis)
+            )
+        if abs(math.sin(q2[good])) < FOLD:
+            stretched = math.cos(q2[good]) > 0.0
+            code, where = ("out of reach", "stretched") if stretched else ("singular", "folded")
+            low, high = self.scenario.arm.reach
+            reach = f"within {low:.3g} to {high:.3g} m of the shoulder"
+            advice = f"choose a force, start or origin that keeps the handle {reach}"
+            return good, Outcome(code, step * dt, step, "", f"the arm is {where}", advice)
+        axis = AXES[int(np.argmax(np.nan_to_num(np.abs(v[:, good]), nan=np.inf)))]
+        return good, Outcome(
+            "diverged", step * dt, step, axis, f"faster than {SPEED:g} m/s", self._advice(axis)
+        )
+
+    def end(self, outcome: Outcome) -> Outcome:
+        """The final outcome of a run, after all its rows.
+
+        Args:
+            outcome: how the run came to its end.
+
+        Returns:
+            The outcome, with code, cause and advice from the whole run.
+        """
+        s = self.scenario
+        if outcome.code == "interrupted":
+            since = self.onset
+            return replace(outcome, cause=f"{since.axis} axis: {since.cause}") if since else outcome
+        if self.onset is not None:
+            cycles = self.bound.sum() > OFTEN * len(self.bound)
+            cause = (
+                f"{self.onset.cause}, bounded by the torque limits" if cycles else self.onset.cause
+            )
+            return replace(self.onset, code="limit cycle" if cycles else "diverged", cause=cause)
+        if outcome.code == "unresolved":
+            return outcome
+        if outcome.code == "time limit":
+            saturated, stalled = at_rest(self.seen, self.moved, self.unbound, s.dt)
+            if saturated:
+                least = "rms" if isinstance(s.muscle, Multisine) else "the force"
+                advice = f"{self._raise_limit()}, or lower {least}"
+                return replace(
+                    outcome, code="saturated", cause="a motor stays in its limit", advice=advice
+                )
+            if stalled:
+                return replace(
+                    outcome,
+                    code="stalled",
+                    cause=f"slower than {STILL:g} m/s",
+                    advice=self._why_still(),
+                )
+        share = self.often / max(self.seen, 1)
+        if share >= 0.01:
+            return replace(
+                outcome, cause=f"motors in their limits for {100.0 * share:.0f} % of the time"
+            )
+        return outcome
+
+    def _why_still(self) -> str:
+        s = self.scenario
+        if isinstance(s.muscle, Multisine):
+            return "raise rms"
+        if any(th and th.spring for th in s.operators):
+            holds = "the spring of the hand holds the muscle's force"
+            return f"{holds}: raise force, or lower operator.spring"
+        if not any(s.force):
+            return "give a force"
+        way = int(abs(s.force[1]) > abs(s.force[0]))
+        hold = s.clay.hold(way) if s.clay else Hold(0.0)
+        push = math.hypot(*s.force) if hold.together else abs(s.force[way])
+        if push > hold.force:
+            return "raise force, or lower b"
+        return f"raise the force above the yield force, {hold.force:.6g} N, or lower {hold.field}"
+
+    def _count(self, v: np.ndarray, bound: np.ndarray) -> None:
+        """Notes when the handle last moved, and when the motors were at their limits."""
+        last = len(bound) - 1
+        fast = np.abs(v).max(axis=0) > STILL
+        if fast.any():
+            self.moved = self.seen + last - int(fast[::-1].argmax())
+        if not bound.all():
+            self.unbound = self.seen + last - int((~bound)[::-1].argmax())
+        self.often += int(bound.sum())
+        self.seen += last + 1
+        if not self.scenario.stop_when_unstable:
+            last = max(1, round(WHILE / self.scenario.dt))
+            self.bound = np.concatenate((self.bound, bound))[-last:]
+
+    def _unstable(self, rows: np.ndarray) -> tuple[int, str, str] | None:
+        verdicts = {}
+        v = np.concatenate((self.past, rows[4:6]), axis=1)
+        self.past = v[:, -2:]
+        tau, limit = np.abs(rows[8:10]), np.reshape(self.scenario.torque_limit, (2, 1))
+        hit = np.zeros(v.shape[1], dtype=int)
+        bound = np.zeros(rows.shape[1], dtype=bool)
+        if np.any(tau.max(axis=1, initial=0.0) >= limit[:, 0]):
+            bound = np.asarray((tau >= limit).any(axis=0))
+            hit[2:] = np.cumsum(bound)
+        if len(bound):
+            self._count(rows[4:6], bound)
+        for i in range(2):
+            rise = v[i, 1:] > v[i, :-1]
+            turns = np.flatnonzero(rise[1:] != rise[:-1]) + 1
+            if not len(turns):
+                self.hits[i] += int(hit[-1])
+                self.since[i] += rows.shape[1]
+                continue
+            spans = np.diff(turns, prepend=1 - self.since[i])
+            self.since[i] = v.shape[1] - 1 - int(turns[-1])
+            hits = np.diff(hit[turns], prepend=-self.hits[i])
+            sizes = np.abs(np.diff(v[i, turns], prepend=self.turn[i]))
+            self.turn[i] = float(v[i, turns[-1]])
+            self.hits[i] = int(hit[-1] - hit[turns[-1]])
+            big = np.flatnonzero(sizes >= FLOOR)
+            before = -1
+            for j in big:
+                if j != before + 1:
+                    self.swings[i] = []
+                before = j
+                self._swing(i, float(sizes[j]), bool(hits[j]), int(spans[j]))
+                cause = "" if self.onset or i in verdicts else self._verdict(i)
+                if cause:
+                    verdicts[i] = (max(int(turns[j]) - 1, 1), cause)
+                    if self.scenario.stop_when_unstable:
+                        break
+            if before != len(turns) - 1 and i not in verdicts:
+                self.swings[i] = []
+        if not verdicts:
+            return None
+        growing = [i for i in (0, 1) if len(self.swings[i]) >= 3]
+        axis = self._blame([i for i in growing if self._above_limit(i)] or list(verdicts))
+        n, cause = min(verdicts.values())
+        return n, axis, cause
+
+    def _swing(self, i: int, size: float, saturated: bool, span: int) -> None:
+        last = self.swings[i][-1][0] if self.swings[i] else 0.0
+        if size < (0.8 if saturated else 1.0) * last:
+            self.swings[i] = []
+        self.swings[i].append((size, saturated, span))
+        self.largest[i] = max(self.largest[i], size)
+        del self.swings[i][:-MEMORY]
+
+    def _verdict(self, i: int) -> str:
+        swings = self.swings[i]
+        if len(swings) < SWINGS:
+            return ""
+        cycle = swings[-CYCLE:]
+        if len(cycle) == CYCLE and all(x[1] for x in cycle) and cycle[-1][0] >= 0.95 * cycle[0][0]:
+            if cycle[-1][0] >= self.largest[1 - i] or self._above_limit(i):
+                return LIMITS
+        sizes = [x[0] for x in swings]
+        if sum(x[2] for x in swings[-SWINGS:]) < SWING_SPACING * SWINGS:
+            return ""
+        steps = zip(sizes, sizes[1:], strict=False)
+        if math.prod(min(b / a, STEP_GROWTH) for a, b in steps) <= SWING_GROWTH:
+            return ""
+        driven = self.scenario.driven
+        if (driven or sizes[-1] < TRANSFER * self.largest[1 - i]) and not self._above_limit(i):
+            return ""
+        return "growing oscillation"
+
+    def _blame(self, axes: list[int]) -> str:
+        return AXES[max(axes, key=lambda i: self.swings[i][-1][0])] if axes else ""
+
+    def _limit(self, i: int, values: list[float]) -> tuple[float, float]:
+        """The clay with the lowest gain limit of the linear loop of axis i, and this limit."""
+        for b in values:
+            if (i, b) not in self._limits:
+                self._limits[i, b] = gain_limits.continuous_limit(self.scenario, AXES[i], b)
+        return min(((b, self._limits[i, b]) for b in values), key=lambda x: x[1])
+
+    def _dampings(self, i: int, visited: bool) -> list[float]:
+        """Dampings that may resist axis i [N.s/m]: of all clay, or of that visited.
+
+        Of more than MOST_CLAYS in all, the nearest of so many between least and most are used: the
+        visited range grows with each check, and must not add new values for ever.
+        """
+        clay = self.scenario.clay
+        if clay is None:
+            return [0.0]
+        everywhere = [-math.inf] * 2, [math.inf] * 2
+        levels = _within(clay, i, *everywhere)
+        values = _within(clay, i, self.least, self.most) if visited else levels
+        if len(levels) <= MOST_CLAYS:
+            return values.tolist()
+        few = np.linspace(levels[0], levels[-1], MOST_CLAYS)
+        return np.unique(few[np.abs(values[:, None] - few).argmin(axis=1)]).tolist()
+
+    def _above_limit(self, i: int) -> bool:
+        return self.scenario.gain[i] > self._limit(i, self._dampings(i, True))[1]
+
+    def _raise_limit(self) -> str:
+        shoulder, elbow = self.scenario.torque_limit
+        return f"raise torque_limit from {shoulder:g}, {elbow:g} N.m"
+
+    def _advice(self, axis: str) -> str:
+        s = self.scenario
+        i = AXES.index(axis)
+        b, limit = self._limit(i, self._dampings(i, False))
+        if s.gain[i] > limit:
+            return (
+                f"lower gain[{axis}] from {s.gain[i]:g} to less than {limit:.4g}, "
+                f"the limit of the linear loop at b = {b:g} N.s/m"
+            )
+        if any(x[1] for x in self.swings[i]):
+            return f"{self._raise_limit()}: the motors saturate"
+        if s.controller is not None:
+            return "change the controller, or lower dt or Ts"
+        if not s.inertia_shaping:
+            changes = "the arm's inertia changes along the path"
+            return f"turn shaping on: the loop is stable at the nominal pose, {changes}"
+        return f"lower dt from {s.dt:g} s, or gain[{axis}] from {s.gain[i]:g}"
+
+
+class RangeMonitor(StabilityMonitor):
+    """Ends a run only out of reach or above the largest speed; gives no verdict on stability."""
+
+    def _unstable(self, rows: np.ndarray) -> None:
+        return None
+
+
+def _within(clay: Clay, i: int, low: list[float], high: list[float]) -> np.ndarray:
+    """Dampings that may resist axis i in a box [N.s/m], ascending."""
+    laws = clay.laws_on(i)
+    corners = (low[0], low[1]), (high[0], high[1])
+    return np.unique([b for law in laws for b in law.within(*corners)])
+
+
+def at_rest(seen: Any, moved: Any, unbound: Any, dt: float) -> tuple[Any, Any]:
+    """How a handle rests at the time limit, if it does. Numbers, or arrays over runs.
+
+    Args:
+        seen: samples.
+        moved: last sample with the handle faster than STILL.
+        unbound: last sample with no motor at its limit.
+        dt: length of a sample [s].
+
+    Returns:
+        Whether motors stay at their limits; whether the handle has been still for long.
+    """
+    recent = np.maximum(1, np.minimum(seen, round(WHILE / dt)))
+    return seen - 1 - unbound >= recent, seen - 1 - moved >= recent
+
+
+def is_quiet(rows, n, limit1, limit2, swings, seen):
+    """Whether the monitor can have nothing to report on the next n rows: a cheaper test.
+
+    False where a row is no longer good, or where consecutive swings have grown, or have driven a
+    motor into its limit, as much as in an unstable run.
+
+    Args:
+        rows: shape (m, 14), m >= n.
+        n: number of rows.
+        limit1: torque limit of the shoulder [N.m].
+        limit2: torque limit of the elbow [N.m].
+        swings: of each axis, shape (2, QUIET): last two velocities, velocity at the last turn
+            [m/s], size of the last swing [m/s], number of swings that did not shrink, samples since
+            the turn with a motor at its limit, growth of those swings together, at least, how many
+            of the last ones had a motor at its limit; samples up to the last turn and to those
+            before it, one a swing.
+        seen: counts of the monitor, shape (4,): seen, moved, unbound, often.
+    """
+    for j in range(n):
+        row = rows[j]
+        vx, vy = abs(row[4]), abs(row[5])
+        bound = abs(row[8]) >= limit1 or abs(row[9]) >= limit2
+        if not (vx <= SPEED and vy <= SPEED and abs(math.sin(row[1])) >= FOLD):
+            return False
+        if vx > STILL or vy > STILL:
+            seen[1] = seen[0]
+        if bound:
+            seen[3] += 1
+        else:
+            seen[2] = seen[0]
+        seen[0] += 1
+        for i in range(2):
+            s, v = swings[i], row[4 + i]
+            s[5] += bound
+            if (v > s[0]) != (s[0] > s[1]):
+                size = abs(s[0] - s[2])
+                grown = s[4] + 1.0 if size >= (0.8 if s[5] else 1.0) * s[3] else 1.0
+                if size < FLOOR:
+                    grown = 0.0
+                if grown > 1.0 and s[3] > 0.0:
+                    s[6] *= max(1.0, min(size / s[3], STEP_GROWTH))
+                else:
+                    s[6], s[7], s[9] = 1.0, 0.0, s[8]
+                s[7] = s[7] + 1.0 if s[5] else 0.0
+                s[8] = float(seen[0])
+                s[9 + int(grown) % (SWINGS + 1)] = s[8]
+                slow = s[8] - s[9 + (int(grown) + 1) % (SWINGS + 1)] + 2.0 >= SWING_SPACING * SWINGS
+                s[2], s[3], s[4], s[5] = s[0], size if grown else 0.0, grown, 2.0 * bound
+                # except for rounding of the product
+                if grown >= SWINGS and slow and s[6] > 0.999 * SWING_GROWTH:
+                    return False
+                if s[7] >= CYCLE:
+                    return False
+            s[1] = s[0]
+            s[0] = v
+    return True
+
+
+@named
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended.
+
+    Attributes:
+        code: "finished", "time limit"; "stalled" (at rest at the time limit), "saturated" (at rest
+            with a motor at its limit); "diverged", "limit cycle" (an unstable axis, bounded by the
+            torque limits); "out of reach" (the arm is stretched), "singular" (it is folded);
+            "unresolved" (one sample takes too many steps); "interrupted" (on request of progress).
+        time: simulated time of the end, or of the verdict on an unstable run that went on [s].
+        step: index of the last good sample.
+        axis: the unstable axis, "" if none.
+        cause: what happened, in words.
+        advice: what to change, in words.
+    """
+
+    code: str
+    time: float
+    step: int
+    axis: str = ""
+    cause: str = ""
+    advice: str = ""
+
+    def __str__(self) -> str:
+        where = f": {self.axis} axis" if self.axis else ""
+        return f"{self.code}{where} at {self.time:.4f} s" + (
+            f" ({self.cause})" if self.cause else ""
+        )

@@ -1,0 +1,136 @@
+"""The engine that moves the arm, as the kernel calls it: from CPython, and by address."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..scene.scenario import Scenario
+from . import engine, layout, records
+from .engine import mujoco
+
+STORED = 8  # movers per store
+CALLS = {  # fields of Engine, and functions of the engine
+    "step": "mj_step",
+    "kinematics": "mj_kinematics",
+    "com_pos": "mj_comPos",
+    "inertia": "mj_makeM",
+    "com_vel": "mj_comVel",
+    "bias": "mj_rne",
+}
+ARRAYS = {  # fields of Engine, and arrays of the engine's data
+    "q": "qpos",
+    "w": "qvel",
+    "ctrl": "ctrl",
+    "applied": "qfrc_applied",
+    "M": "M",
+    "forces": "qfrc_bias",
+}
+_asking = threading.Lock()
+
+
+@functools.cache
+def library() -> ctypes.CDLL:
+    """The engine's library, which the package mujoco has loaded."""
+    folder = Path(mujoco.__file__).parent
+    (file,) = (x for x in folder.glob("*mujoco.*") if x.name.startswith(("lib", "mujoco.dll")))
+    return ctypes.CDLL(str(file))
+
+
+def address(name: str) -> int:
+    """Address of a function of the engine."""
+    found = ctypes.cast(getattr(library(), name), ctypes.c_void_p).value
+    assert found is not None
+    return found
+
+
+def addresses_of(model: Any, data: Any) -> tuple[int, int]:
+    """Addresses of a model and its data: the engine passes them to a callback."""
+    found: list[int] = []
+    kind = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+    note = kind(lambda model, data: found.extend((model, data)))
+    with _asking:
+        before = mujoco.get_mjcb_passive()
+        mujoco.set_mjcb_passive(note)
+        try:
+            mujoco.mj_passive(model, data)
+        finally:
+            mujoco.set_mjcb_passive(before)
+    return found[0], found[1]
+
+
+class Mover:
+    """An arm of the engine: its model and data, and the records by which rows call it."""
+
+    def __init__(self, scenario: Scenario):
+        self.model = engine.build(scenario)
+        self.data = mujoco.MjData(self.model)
+        self.out = np.zeros(2)
+        self.places: dict[str, np.ndarray] = {
+            name: getattr(self.data, of).reshape(-1) for name, of in ARRAYS.items()
+        }
+        self.places["timestep"] = engine.timestep_view(self.model)
+        self.places["ranges"] = self.model.actuator_ctrlrange.reshape(-1)
+        self.places["out"] = self.out
+        self._plain: Any = None
+        self._row: Any = None
+
+    @property
+    def plain(self) -> Any:
+        """The record for CPython."""
+        if self._plain is None:
+            made = records.Engine()
+            for name, function in CALLS.items():
+                setattr(made, name, getattr(mujoco, function))
+            made.bias = bias
+            made.model, made.data = self.model, self.data
+            for name, array in self.places.items():
+                setattr(made, name, memoryview(array))
+            self._plain = made
+        return self._plain
+
+    @property
+    def row(self) -> np.ndarray:
+        """The record for compiled code, shape (1,)."""
+        if self._row is None:
+            made = np.zeros(1, layout.dtype_of(records.Engine))
+            for name, function in CALLS.items():
+                made[name] = address(function)
+            made["model"], made["data"] = addresses_of(self.model, self.data)
+            for name, array in self.places.items():
+                made[name] = array.ctypes.data
+            self._row = made
+        return self._row
+
+    def rest(self, scenario: Scenario) -> None:
+        """Puts the engine to a scenario, at rest."""
+        engine.rotate_dampers(self.model, scenario)
+        mujoco.mj_resetData(self.model, self.data)
+
+
+def bias(model: Any, data: Any, accelerated: int, _: Any) -> None:
+    """mj_rne, into data.qfrc_bias."""
+    mujoco.mj_rne(model, data, accelerated, data.qfrc_bias)
+
+
+class Movers:
+    """Movers that successive runs share: one for each arm, with clay and without."""
+
+    def __init__(self):
+        self.known: dict[Any, Mover] = {}
+
+    def of(self, scenario: Scenario) -> Mover:
+        """The mover of a scenario, at rest."""
+        clay = scenario.clay
+        key = None if clay is None else clay.angle, scenario.arm
+        if key not in self.known:
+            if len(self.known) >= STORED:
+                del self.known[next(iter(self.known))]  # the oldest one
+            self.known[key] = Mover(scenario)
+        self.known[key].rest(scenario)
+        return self.known[key]

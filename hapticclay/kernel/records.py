@@ -1,0 +1,565 @@
+"""The records of a run: Model (what does not change), State, and the value of a Kick.
+
+Units stand beside the names. A flag is 1 or 0; a number that only one part of a scene uses is 0
+without that part, and no function reads it then.
+"""
+
+from .layout import Kind, floats, many, real, record, thing, whole, wholes
+
+CONTROLLER_ORDER = 4  # most states of a compensator
+LAWS = 4  # most laws of the clay of a user in a scene
+engine_step, engine_bias = Kind("engine_step"), Kind("engine_bias")
+own_control, law_load = Kind("own_control"), Kind("law_load")
+law_moved, law_force = Kind("law_moved"), Kind("law_force")
+engine_of = Kind("Engine_s *")
+FUNCTIONS = """\
+typedef void (*engine_step)(void *, void *);
+typedef void (*engine_bias)(void *, void *, int, double *);
+typedef void (*own_control)(double *);
+typedef void (*law_load)(double *, Kick_s *);
+typedef void (*law_moved)(double *, double, double, double, double, double);
+typedef void (*law_force)(double *, double, double, double, double, double *);
+"""
+TYPES = """\
+    ctypedef void (*engine_step)(void *, void *) noexcept nogil
+    ctypedef void (*engine_bias)(void *, void *, int, double *) noexcept nogil
+    ctypedef void (*own_control)(double *) noexcept nogil
+    ctypedef void (*law_load)(double *, Kick_s *) noexcept nogil
+    ctypedef void (*law_moved)(double *, double, double, double, double, double) noexcept nogil
+    ctypedef void (*law_force)(double *, double, double, double, double, double *) noexcept nogil
+"""
+
+
+@record
+class Engine:
+    """The physics engine that moves the arm: its functions, and the numbers that it shares."""
+
+    step: engine_step  # mj_step
+    kinematics: engine_step  # mj_kinematics, and what else gives inertia and bias
+    com_pos: engine_step
+    inertia: engine_step
+    com_vel: engine_step
+    bias: engine_bias  # mj_rne
+    model: thing
+    data: thing
+    q: floats
+    w: floats
+    ctrl: floats
+    applied: floats
+    timestep: floats
+    ranges: floats  # of the torques
+    M: floats
+    forces: floats  # of bias
+    out: floats  # of the force of a user's law
+
+
+@record
+class ModelAxis:
+    """One axis of the handle."""
+
+    servo: real[6]  # static gain, damping [1/s], stiffness [1/s^2] of G; gain, damping, stiffness of Sh
+    K: real  # gain of the compensator [1/kg]
+    pole: real  # of the compensator K/(s (s + pole)) [rad/s]
+    z0: real[4]  # states of one of another shape, of a handle in steady motion
+    memory: real[48]  # compensator and reference over a control sample: rows of `over_sample`
+    mass: real  # of the hand [kg]; 0 without one, as damper and spring
+    damper: real  # [N.s/m]
+    spring: real  # [N/m]
+    push: real  # constant muscle force [N]
+    push_rate: real  # its rate [N/s]
+
+
+@record
+class LawSlot:
+    """A law of the clay that is functions of a user."""
+
+    load: law_load  # load(z, k): adds its load to that of a kick
+    moved: law_moved  # moved(z, px, py, vx, vy, h): its state after a step
+    force: law_force  # force(z, px, py, vx, vy, out): its force at an instant [N]
+    z: floats  # its numbers: parameters and state
+    scratch: floats  # the same, for a state that is tried
+    size: whole
+
+
+@record
+class Span:
+    """Numbers of a scene that steps write."""
+
+    at: floats
+    kept: floats  # room for a copy
+    size: whole
+
+
+@record
+class Model:
+    """A scene: what a run does not change."""
+
+    # times
+    dt: real  # [s]
+    t_max: real  # [s]
+    last: whole  # number of whole steps
+    method: whole  # see methods
+    # arm
+    links: real[5]  # Arm.links
+    ox: real  # world position of p = 0 [m]
+    oy: real
+    limit1: real  # of the torques [N.m]
+    limit2: real
+    # loop
+    shaping: whole  # inertia is shaped
+    formed: whole  # compensators have another shape than K/(s (s + pole))
+    order: whole  # of these, the higher one
+    form: real[50]  # of these, compensator.form_numbers of x and of y
+    hand: whole
+    longer: whole  # a kick counts the spring of the hand by the longer step around it
+    push_since: real  # [s]
+    # signals over the next steps, see Drives
+    muscle: whole
+    muscle_table: floats
+    muscle_ahead: floats
+    muscle_halves: floats  # in sampled control
+    muscle_first: whole
+    command: whole
+    command_table: floats
+    command_ahead: floats
+    command_first: whole
+    # clay
+    clay: whole
+    acts: whole  # it acts on the handle; else the motors render it
+    special: whole  # more than viscous
+    table: floats  # regions
+    rotated: whole
+    cosine: real  # of the angle between its axes and x, y
+    sine: real
+    grows: whole
+    smooth: whole  # which axes are: 1 x, 2 y, 3 both
+    stiff: whole
+    mobility: real  # largest acceleration of handle and hand per unit of force [1/kg]
+    hits: whole
+    first_hit: real  # first step of a hit, times the damping [s.N.s/m]
+    flow: whole  # 1 yields by axis, 2 along the motion
+    springs: whole  # 1 physical, 2 rendered
+    spring_step: real  # longest step that resolves the springs [s]
+    groove: whole
+    grid: real[10]  # Groove.numbers
+    drags: whole  # it damps
+    drag: real  # damping per cross-section [N.s/m^3]
+    ground: floats  # remaining share of each cell
+    relief: floats  # height of the cells [m]
+    rim: floats  # clay in front of the tool
+    removed: floats  # volume [m^3], and its rounding
+    laws: whole  # number of laws of a user
+    law: many(LawSlot, 4)
+    # sampled control
+    ratio: whole  # steps in a control sample
+    Ts: real  # [s]
+    uneven: whole  # events may lie between the steps
+    told: whole  # the force of the clay is recorded: b v does not give it
+    holds: whole  # it is recorded as the motors hold it
+    chance: whole
+    chances: floats  # four numbers a sample
+    chance_first: whole
+    encoder: whole  # counts per turn, 0 for none
+    window: whole  # samples of the difference, 0 for exact rates
+    cutoff: real  # of the low-pass behind it [Hz], 0 for none
+    angles: floats  # ring of past angles
+    filtered: whole
+    filter: real[6]
+    adc_bits: whole
+    adc_range: real  # [N]
+    dac_bits: whole
+    dac_range1: real  # [N.m]
+    dac_range2: real
+    delay: real  # of the torques [s], 0 for none
+    queue: floats  # ring of torques on their way
+    queue_rows: whole
+    friction: whole
+    slip: real[2]  # Coulomb torques [N.m]
+    guard: whole  # passivity controller
+    guard_whole: whole  # whole samples of the delay
+    guard_share: real  # the rest of it
+    forces: floats  # ring of past forces
+    coupling: whole
+    coupling_spring: real  # [N/m]
+    coupling_damper: real  # [N.s/m]
+    own: whole  # the user's own controller
+    control: own_control
+    buffer: floats
+    buffer_size: whole  # its numbers of state
+    hardware: whole  # the ledger counts it
+    # accurate method
+    substeps: whole  # engine steps per sample
+    blocks: wholes  # the same by block of samples, where the clay grows
+    ahead: whole  # signals drive the run
+    times: floats  # starts and middles of the next steps [s]
+    times_count: whole
+    breaks: floats  # times at which a step must end [s]
+    breaks_count: whole
+    slack: real  # times that differ by no more are equal [s]
+    modal: whole  # clay that yields: 1 by axis, 2 along the motion
+    modal_rotated: whole
+    lightness: real  # largest acceleration per unit of force, by way of C too [1/kg]
+    # what a run fills
+    engine: engine_of
+    spans: whole  # of numbers of the scene that steps write
+    span: many(Span, 12)
+    rows: floats
+    crossings: floats
+    stops: floats
+    rendered: floats
+    most_crossings: whole
+    most_stops: whole
+    axis: many(ModelAxis, 2)
+
+
+@record
+class KickAxis:
+    """One axis of the handle in a kick."""
+
+    p: real  # position [m]
+    v: real  # velocity before [m/s]
+    c: real  # centripetal acceleration [m/s^2]
+    uh: real  # muscle force [N]
+    b0: real  # damping of the clay on the velocity before [N.s/m]
+    b1: real  # on that after
+    share: real  # of the slow force of stiff clay, owed to the next kick
+    soft: real  # 1/b where both steps are stiff [m/(N.s)]
+    f: real  # load f - d u [N]
+    d: real  # [N.s/m]
+    clay: real  # force of the clay on the velocity before [N]
+    clay_d: real  # and damping on that after [N.s/m]
+    damped: real  # force of the dampers behind the sample [N]
+    n: real  # law n u = a + S (f - d u) [1/s]
+    a: real  # [m/s^2]
+    rest: real  # a of a handle at rest
+    u: real  # velocity after [m/s]
+    net: real  # net force [N]
+    fe: real  # mean force of the clay [N]
+    pull: real  # of its springs [N]
+    back: real  # what stiff clay returns less what it owes [N]
+    owed0: real  # impulse owed before [N.s]
+    owed: real  # and after
+    stuck0: real  # rests in clay that yields, before
+    stuck: real  # after
+    anchor0: real  # where it came to rest [m]
+    anchor: real
+    mean: real  # force of yielding [N]
+    sv: real  # velocity at the sample [m/s]
+    sf: real  # force of yielding there [N]
+    stop: real  # when it came to rest after the sample [s]
+    delta: real  # compensator output at the sample, without the force of the kick [m]
+    feed: real  # what each unit of that force adds [m/N]
+    ref: real  # rate of the reference, without that force [m/s]
+    ref_feed: real  # and with each unit of it [m/(N.s)]
+    next_delta: real  # compensator and reference behind the step
+    next_rate: real
+    next_y: real
+    next_yrate: real
+    z: real[4]  # compensator of another shape, behind the step
+
+
+@record
+class Kick:
+    """A kick: scratch; the run uses the last one."""
+
+    H: real  # its length [s]
+    L: real  # share before the sample
+    R: real  # share after
+    before: real  # step before [s]
+    after: real  # step after [s]
+    u: real[4]  # arm.jacobian [m]
+    Wxx: real  # mobility [1/kg]
+    Wxy: real
+    Wyy: real
+    Sxx: real  # that of the law
+    Sxy: real
+    Syy: real
+    dxy: real  # of the load [N.s/m]
+    clay_dxy: real  # of it, of the clay
+    over: real  # whether stiff clay is split
+    still: real  # whether clay holds the handle
+    o1: real  # joint rates before [rad/s]
+    o2: real
+    w1: real  # after
+    w2: real
+    g1: real  # link accelerations [rad/s^2]
+    g2: real
+    tau1: real  # torques of the motors [N.m]
+    tau2: real
+    slip1: real  # of friction [N.m]
+    slip2: real
+    axis: many(KickAxis, 2)
+
+
+@record
+class StateAxis:
+    """One axis of controller and clay."""
+
+    delta: real  # compensator [m]; of another shape, start and command alone
+    rate: real
+    y: real  # reference model [m]
+    yrate: real
+    z: real[4]  # states of a compensator of another shape
+    index: whole  # of the region
+    low: real  # its borders [m]
+    high: real
+    b: real  # damping; at t = 0 where it grows [N.s/m]
+    b_rate: real
+    old: real  # of the clay before the sample
+    old_rate: real
+    owed: real
+    stuck: real
+    anchor: real
+    Fy: real  # clay that yields
+    Kn: real
+    n: real
+    old_Fy: real
+    old_Kn: real
+    old_n: real
+    k: real  # spring of the clay
+    k_limit: real
+    k1: real
+    tau: real
+    way: real
+    rest: real
+    stretch: real
+    at: real
+    force: real
+    force_before: real
+    cut: real  # place of the last cut [m]
+    bare: real  # clay without a groove [N.s/m]
+
+
+@record
+class MachineAxis:
+    """One axis, or joint, of controller and hardware."""
+
+    delta: real  # compensator
+    rate: real
+    y: real  # reference model
+    yrate: real
+    z: real[4]  # compensator of another shape
+    start: real  # its start and command [m]
+    tau: real  # that a joint holds [N.m]
+    force: real  # of the clay as rendered [N]
+    guard: real  # of it, from the passivity controller [N]
+    pull: real  # of the virtual coupling [N]
+    pull_rate: real  # velocity of its tool [m/s]
+    net: real  # given to the compensator [N]
+    w: real  # joint rate as measured [rad/s]
+    filter: real[2]  # of the force
+    energy: real  # that the passivity observer counts [J]
+    place: real  # of the handle at the last sample [m]
+    tool: real  # of the coupling [m]
+
+
+@record
+class Machine:
+    """Controller and hardware of sampled control."""
+
+    k: whole  # index of the next sample
+    when: real  # its time [s]
+    then: real  # of the one after it
+    oldest: whole  # row of the ring of angles
+    newest: whole  # row of the ring of forces
+    first: whole  # queue of torques
+    n: whole
+    due: real
+    due_then: real
+    axis: many(MachineAxis, 2)
+
+
+@record
+class Work:
+    """The ledger [J]."""
+
+    muscle: real
+    motors: real
+    clay: real
+    hand: real
+    through: real
+    friction: real
+    guard: real
+    coupling: real
+
+
+@record
+class PointAxis:
+    """One axis of compensator and reference at a stage of a step."""
+
+    delta: real
+    rate: real
+    y: real
+    yrate: real
+    z: real[4]
+
+
+@record
+class Point:
+    """A stage of a step of the accurate method."""
+
+    q1: real
+    q2: real
+    w1: real
+    w2: real
+    axis: many(PointAxis, 2)
+
+
+@record
+class GripAxis:
+    """What yielding clay does to one of its axes at an instant."""
+
+    a: real  # acceleration of the handle without its force [m/s^2]
+    v: real  # velocity [m/s]
+    f: real  # its force [N]
+
+
+@record
+class Grip:
+    """What yielding clay does at an instant."""
+
+    B: real[4]  # acceleration removed per unit of its force (xx, xy, yx, yy) [1/kg]
+    axis: many(GripAxis, 2)
+
+
+@record
+class InstantAxis:
+    """One axis of the loop at an instant."""
+
+    b: real  # damping of the clay [N.s/m]
+    fe: real  # its force [N]
+    fh: real  # of the hand [N]
+    shown: real  # output of the compensator [m]
+    ddelta: real  # delta''
+    dy: real  # y''
+    dz: real[4]  # rates of a compensator of another shape
+    r: real  # force of yielding [N]
+    acc: real  # acceleration [m/s^2]
+
+
+@record
+class Instant:
+    """The loop at an instant."""
+
+    tau1: real
+    tau2: real
+    push1: real  # joint torques of hand and clay [N.m]
+    push2: real
+    power: real[5]  # muscle, motors, clay, damper of the hand, sum of the magnitudes [W]
+    grip: Grip
+    axis: many(InstantAxis, 2)
+
+
+@record
+class Sums:
+    """Sums over the stages of a step."""
+
+    first: real[6]  # accelerations of the joints, delta and y of x, of y: all but the last stage
+    last: real[6]  # all but the first
+    z: real[8]
+    power: real[5]
+
+
+@record
+class ModeAxis:
+    """How yielding clay acts on one of its axes; along the motion, the first one counts."""
+
+    Fy: real
+    Kn: real
+    n: real
+    mode: real  # 0 at rest, or the sign of the velocity; along the motion see modes.SLIDING
+    way: real  # direction of a handle that slides slowly, or begins to slide
+    anchor: real  # where an axis that rests came to rest [m]
+    ended: real  # what ended the step before, see modes.RESTS
+    ends: real  # what ends this one
+    stuck: real  # noted as stopped
+
+
+@record
+class Stride:
+    """A step of the accurate method: scratch."""
+
+    length: real
+    p1: real  # position at its start [m]
+    p2: real
+    v1: real
+    v2: real
+    now: Instant  # at the stage worked on
+    shown: Instant  # at its start
+    last: Grip  # at its last stage
+    z: Point
+    begin: Point
+    end: Point
+    sums: Sums
+    work: Work
+
+
+@record
+class Watch:
+    """What the quick test of the monitor carries from one look to the next."""
+
+    quiet: whole  # nothing to report so far
+    seen: whole[4]  # samples; last one that moved, last one below the torque limits; samples at them
+    swings: real[32]  # 16 of x, then of y
+
+
+@record
+class State:
+    """A run between two steps."""
+
+    t: real  # [s]
+    i: whole  # sample at or before now
+    before: real  # length of the step that led here [s]
+    q1: real  # joints
+    q2: real
+    w1: real
+    w2: real
+    g1: real
+    g2: real
+    fine: real  # longest step after a hit [s]
+    struck: real  # the handle has just entered this clay
+    lost: real  # energy of springs [J]
+    stored: real
+    resolved: real  # longest step that resolves them [s]
+    drag: real  # damping of a groove [N.s/m]
+    form_kick: real[50]  # compensator.form_kick of x and of y, for these steps:
+    form_before: real
+    form_after: real
+    form_work: real[64]
+    code: whole
+    closing: whole  # why the next row is the last, OPEN where it is not
+    careful: whole  # steps with event detection since the last sample
+    landings: whole  # returns to a region since then
+    seen: whole[4]  # regions since then: least and most index along x, then y
+    steps: whole  # since the last look
+    row: whole
+    crossing: whole
+    stopped: whole
+    # sampled control
+    on: whole  # an event begins the step
+    shown: whole  # its sample asks torques
+    asked: real[10]  # torques, force, guard, pull and velocity of its tool asked
+    fh1: real  # force of the hand in the kick to the event
+    fh2: real
+    show1: real  # compensator at the sample
+    show2: real
+    # accurate method
+    left: whole  # steps to the next sample; 0 where they must be counted again
+    share: real  # length of each but the last [s]
+    mode_step: real  # longest step that the modes allow [s]
+    axis: many(StateAxis, 2)
+    mode: many(ModeAxis, 2)
+    work: Work
+    early: Work  # with the kick to the event
+    now: Machine
+    next: Machine  # after the event
+    k: Kick  # of the step
+    e: Kick  # to the event
+    a: Stride
+    watch: Watch
+
+
+RECORDS = (
+    Engine, ModelAxis, KickAxis, Kick, LawSlot, Span, Model, StateAxis, MachineAxis, Machine, Work,
+    PointAxis, Point, GripAxis, Grip, InstantAxis, Instant, Sums, ModeAxis, Stride, Watch, State,
+)  # fmt: skip

@@ -1,0 +1,104 @@
+"""What a run keeps of a kick: its row of the record, and its entry in the ledger."""
+
+from ..formulas import arm as arm_law
+from . import hand, kick, laws, methods, own_laws, sampled, springs, viscous
+
+ROW = 16  # floats of a row: q, p, v, fh, tau, delta, b, q', two axes each
+
+
+def write(m, s, k, after):
+    """Writes the row of a kick before a step of length `after`, 0 at the end of a run."""
+    x, y, end = k.x, k.y, 1 if after == 0.0 else 0
+    yields = m.acts and m.special and m.flow
+    vx, vy = kick.velocity(m, k, 0), kick.velocity(m, k, 1)
+    fx, fy = x.sf if yields else 0.0, y.sf if yields else 0.0
+    if end:
+        vx, vy, fx, fy = arrived(m, s, vx, vy, fx, fy)
+    bx, by = viscous.now(m, s, 0, end), viscous.now(m, s, 1, end)
+    hx, hy = hand.force(m, k, 0), hand.force(m, k, 1)
+    if m.ratio:
+        dx, dy, share = sampled.shown(s, after)
+        hx, hy = hx + share * (s.fh1 - hx), hy + share * (s.fh2 - hy)
+        if m.special and m.flow:
+            fx, fy = x.sf + share * (s.e.x.sf - x.sf), y.sf + share * (s.e.y.sf - y.sf)
+            fx, fy = laws.motion_force(m, s, vx, vy, fx, fy)
+    else:
+        dx, dy = kick.shown_delta(k, 0), kick.shown_delta(k, 1)
+    r1, r2 = arm_law.joint_velocity(vx, vy, k.u, 1.0)
+    row, n = m.rows, ROW * s.row
+    row[n], row[n + 1], row[n + 2], row[n + 3] = s.q1, s.q2, x.p, y.p
+    row[n + 4], row[n + 5], row[n + 6], row[n + 7] = vx, vy, hx, hy
+    row[n + 8], row[n + 9], row[n + 10], row[n + 11] = k.tau1, k.tau2, dx, dy
+    row[n + 12], row[n + 13], row[n + 14], row[n + 15] = bx, by, r1, r2 - r1
+    if m.told:
+        write_force(m, s, k, vx, vy, bx, by, fx, fy)
+    if m.holds:
+        machine, out = sampled.machine_of(s, after), m.rendered
+        out[3 * s.row], out[3 * s.row + 1] = machine.x.force, machine.y.force
+
+
+def write_force(m, s, k, vx, vy, bx, by, fx, fy):
+    """Writes the force of the clay where b v does not give it; f is that of yielding."""
+    out, n = m.rendered, 3 * s.row
+    x, y = viscous.force(m, bx, by, vx, vy)
+    x, y = x + fx, y + fy
+    if m.springs:
+        x, y = x + springs.force(s, 0, k.L), y + springs.force(s, 1, k.L)
+    if m.laws:
+        ax, ay = own_laws.force(m, k.x.p, k.y.p, vx, vy, 0.0)
+        x, y = x + ax, y + ay
+    out[n], out[n + 1] = x, y
+    if m.groove:
+        out[n + 2] = m.removed[0] + m.removed[1]
+
+
+def arrived(m, s, vx, vy, fx, fy):
+    """Velocity and force of yielding at the end of a step, from those of half a kick.
+
+    Half a kick holds too little of stiff clay: there they are those of a whole one, with the step
+    before it repeated.
+    """
+    if not (m.acts and m.special and m.stiff) or s.before == 0.0:
+        return vx, vy, fx, fy
+    k = s.e
+    methods.repeat(m, s, k, s.before)
+    if k.x.soft > 0.0:
+        vx, fx = kick.velocity(m, k, 0), k.x.sf if m.flow else 0.0
+    if k.y.soft > 0.0:
+        vy, fy = kick.velocity(m, k, 1), k.y.sf if m.flow else 0.0
+    return vx, vy, fx, fy
+
+
+# ---- the ledger ----------------------------------------------------------------------------------
+
+
+def add_work(m, of, to, k, w1, w2, machine):
+    """The ledger `of` with the works of a kick, into `to`.
+
+    w1 and w2 are the joint rates before it, `machine` is the one whose torques act in it.
+    """
+    x, y, H = k.x, k.y, k.H
+    vx, vy = 0.5 * (x.v + x.u), 0.5 * (y.v + y.u)
+    muscle = H * (x.uh * vx + y.uh * vy)
+    motors = 0.5 * H * (k.tau1 * (w1 + k.w1) + k.tau2 * (w2 + k.w2))
+    clay = H * (x.fe * vx + y.fe * vy)
+    taken = H * (m.x.damper * vx * vx + m.y.damper * vy * vy)
+    to.muscle, to.motors, to.clay = of.muscle + muscle, of.motors + motors, of.clay + clay
+    to.hand, to.through = of.hand + taken, of.through + (abs(muscle) + abs(motors))
+    if m.hardware:
+        a, b = machine.x, machine.y
+        r1, r2 = 0.5 * (w1 + k.w1), 0.5 * (w2 + k.w2)
+        to.friction = of.friction - H * (k.slip1 * r1 + k.slip2 * r2)
+        to.guard = of.guard + H * (a.guard * vx + b.guard * vy)
+        to.coupling = of.coupling + H * (a.pull * (vx - a.pull_rate) + b.pull * (vy - b.pull_rate))
+
+
+def keep(m, s, k, after, shows):
+    """Keeps the results of a kick: its row, if now is a sample, and its works."""
+    if shows:
+        write(m, s, k, after)
+        s.row += 1
+    if sampled.is_early(s, after):
+        add_work(m, s.early, s.work, k, s.e.w1, s.e.w2, s.next)
+    else:
+        add_work(m, s.work, s.work, k, s.w1, s.w2, s.now)

@@ -1,0 +1,402 @@
+"""Sampled control: a machine around the kick. It senses, computes, queues and holds.
+
+At an event (a control sample or a change of the torques) the kick is split in two. The first, under
+the old torques, brings the velocity to the sample, where it is measured. The second is under the
+new torques.
+"""
+
+import math
+
+from ..formulas import arm as arm_law
+from ..formulas import compensator, controller
+from . import arm, friction, hand, hardware, kick, laws, memory, rows, servo, signals
+from . import viscous, yielding
+
+SLACK = 1e-9  # share of dt: events so close count as one
+REACTION = 1e-9  # [s] a force within this time after a sample counts as that at it
+STATE = 9  # where the state of the user's own controller begins in its buffer
+NOT_FINITE = 3
+
+
+# ---- a kick under held torques -------------------------------------------------------------------
+
+
+def is_early(s, after):
+    """Whether the kick before a step begins at an event."""
+    return s.on and after > 0.0
+
+
+def machine_of(s, after):
+    """The machine whose torques act in the kick before a step of length `after`."""
+    return s.next if is_early(s, after) else s.now
+
+
+def by_hold(m, s, k, after):
+    """The kick under the torques that the motors hold: from an event, else across the sample."""
+    if is_early(s, after):
+        kick.begin(k, 0.0, after)
+        from_event(s.e, k)
+        push(m, s, k, s.next)
+    else:
+        across(m, s, k, after)
+
+
+def across(m, s, k, after):
+    """The same across the sample, whatever begins there."""
+    kick.begin(k, s.before, after)
+    kick.take_up(s, k)
+    r1, r2 = s.w1, s.w1 + s.w2
+    arm.handle_at(m, k, s.q1, s.q2, r1, r2)
+    arm.turning(k, r1, r2)
+    push(m, s, k, s.now)
+
+
+def push(m, s, k, machine):
+    """Motion in a kick under the torques of a machine."""
+    kick.act(m, s, k)
+    k.tau1, k.tau2 = machine.x.tau, machine.y.tau
+    k.slip1 = k.slip2 = 0.0
+    if m.friction:
+        friction.find(m, s, k, k.tau1, k.tau2)
+        friction.drive(m, s, k, k.tau1 + k.slip1, k.tau2 + k.slip2)
+    else:
+        friction.drive(m, s, k, k.tau1, k.tau2)
+
+
+def from_event(e, k):
+    """Begins where the kick to an event ended."""
+    memory.copied4(k.u, e.u)
+    k.Wxx, k.Wxy, k.Wyy = e.Wxx, e.Wxy, e.Wyy
+    k.o1, k.o2 = e.w1, e.w2
+    for i in range(2):
+        o, z = k.axis[i], e.axis[i]
+        o.p, o.v, o.c, o.owed0, o.stuck0, o.anchor0 = z.p, z.v, z.c, z.owed, z.stuck, z.anchor
+
+
+# ---- an event ------------------------------------------------------------------------------------
+
+
+def act(m, s):
+    """What the controller does at the beginning of a step."""
+    now = s.t + SLACK * m.dt
+    samples = s.now.when <= now
+    if samples or (m.delay > 0.0 and s.now.due <= now):
+        event(m, s, 1 if samples else 0, now)
+    else:
+        s.on = 0
+
+
+def event(m, s, samples, now):
+    """The kick that leads to an event, the measurement, and the torques after it."""
+    e = s.e
+    s.fh1 = s.fh2 = 0.0
+    e.tau1 = e.tau2 = e.slip1 = e.slip2 = 0.0
+    s.on = 0
+    if s.before > 0.0:
+        across(m, s, e, 0.0)
+        s.fh1, s.fh2 = hand.force(m, e, 0), hand.force(m, e, 1)
+        rows.add_work(m, s.work, s.early, e, e.o1, e.o2, s.now)
+    else:
+        rest(m, s, e)
+        memory.copied(s.early, s.work)
+    arm.at_rates(e, e.w1, e.w2)
+    memory.copied(s.next, s.now)
+    s.show1, s.show2 = s.now.x.delta, s.now.y.delta
+    s.on, s.shown = 1, 0
+    if samples:
+        sample(m, s)
+    if m.delay > 0.0:
+        hardware.queue(m, s, now)
+
+
+def rest(m, s, e):
+    """A kick of no length."""
+    kick.take_up(s, e)
+    arm.handle_at(m, e, s.q1, s.q2, s.w1, s.w1 + s.w2)
+    e.w1, e.w2 = s.w1, s.w2
+    for i in range(2):
+        o = e.axis[i]
+        o.u, o.owed, o.stuck, o.anchor, o.sf, o.stop = o.v, o.owed0, o.stuck0, o.anchor0, 0.0, 0.0
+
+
+def put_times(m, machine, k):
+    """Puts sample k and the one after it into a machine."""
+    machine.k = k
+    machine.when = k * m.ratio * m.dt + hardware.lateness(m, k)
+    machine.then = (k + 1) * m.ratio * m.dt + hardware.lateness(m, k + 1)
+
+
+def sample(m, s):
+    """Sense, compute, hold."""
+    seen = s.k
+    w1, w2 = see(m, s, seen)
+    ux, uy = signals.push_now(m, s)
+    fx, fy, pullx, pully = on_sensor(m, s, seen, ux, uy)
+    fx, fy = hardware.measured(m, s, 0, fx), hardware.measured(m, s, 1, fy)
+    dx, dy = signals.command_over_sample(m, s)
+    if not hardware.is_lost(m, s.now.k):
+        s.shown = 1
+        answer(m, s, seen, w1, w2, fx, fy, pullx, pully)
+        hardware.ask(s)
+    if not m.own:
+        advance(m, s, 0, dx)
+        advance(m, s, 1, dy)
+    put_times(m, s.next, s.now.k + 1)
+
+
+def answer(m, s, k, w1, w2, fx, fy, pullx, pully):
+    """Response of the controller to a sample that is not lost."""
+    q1, q2 = hardware.encoded(m, s.q1), hardware.encoded(m, s.q2)
+    if m.window > 0:
+        w1, w2 = hardware.differenced(m, s, q1, q2)
+    if m.own:
+        own(m, s, q1, q2, w1, w2, fx, fy)
+        return
+    if m.encoder > 0:
+        arm.handle_at(m, k, q1, q2, w1, w1 + w2)
+        arm.turning(k, w1, w1 + w2)
+    elif m.window > 0:
+        arm.at_rates(k, w1, w2)
+    compute(m, s, k, fx, fy, pullx, pully)
+
+
+# ---- sense ---------------------------------------------------------------------------------------
+
+
+def see(m, s, k):
+    """The handle at a sample, into k; returns the joint rates [rad/s].
+
+    Half a kick holds too little of stiff clay: the velocity there is that of a whole kick, with the
+    step before it repeated.
+    """
+    e, x, y = s.e, s.e.x, s.e.y
+    vx, vy = x.u, y.u
+    if m.acts and m.special and m.stiff and s.before > 0.0:
+        across(m, s, k, s.before)
+        vx = kick.velocity(m, k, 0) if k.x.soft > 0.0 else vx
+        vy = kick.velocity(m, k, 1) if k.y.soft > 0.0 else vy
+    memory.copied4(k.u, e.u)
+    k.Wxx, k.Wxy, k.Wyy = e.Wxx, e.Wxy, e.Wyy
+    for i in range(2):
+        o, z = k.axis[i], e.axis[i]
+        o.p, o.v, o.c = z.p, z.v, z.c
+    if vx == x.u and vy == y.u:
+        return e.w1, e.w2
+    r1, r2 = arm_law.joint_velocity(vx, vy, e.u, 1.0)
+    arm.at_rates(k, r1, r2 - r1)
+    return r1, r2 - r1
+
+
+def on_sensor(m, s, k, ux, uy):
+    """Force of the operator on the sensor, and of physical clay that yields, (x, y) each [N].
+
+    At the start the handle does not accelerate.
+    """
+    e, x, y = s.e, k.x, k.y
+    t1, t2 = e.tau1 + e.slip1, e.tau2 + e.slip2
+    hx, hy = ux, uy
+    if m.hand:
+        hx -= hand.resistance(m, x.p, x.v, x.c, 0)
+        hy -= hand.resistance(m, y.p, y.v, y.c, 1)
+    fx, fy = hx, hy
+    pullx = pully = 0.0
+    if m.acts:
+        fx, fy = laws.without_clay(m, s, k, fx, fy)
+        if m.special and m.flow:
+            pullx, pully = reaction(m, s, k, fx, fy, t1, t2)
+    if not m.hand:
+        return ux, uy, pullx, pully
+    if s.before == 0.0:
+        hx, hy = ux - hand.resistance(m, x.p, x.v, 0.0, 0), uy - hand.resistance(m, y.p, y.v, 0.0, 1)
+        return hx, hy, pullx, pully
+    ax, ay = acceleration(m, k, fx - pullx, fy - pully, t1, t2)
+    return hx - m.x.mass * ax, hy - m.y.mass * ay, pullx, pully
+
+
+def acceleration(m, k, fx, fy, t1, t2):
+    """Acceleration of the handle and its hand under torques and a force, (x, y) [m/s^2]."""
+    ax, ay = arm.pushed(m, k.u, t1, t2)
+    gx, gy = ax + k.Wxx * fx + k.Wxy * fy, ay + k.Wxy * fx + k.Wyy * fy
+    a, b = 1.0 + k.Wxx * m.x.mass, k.Wxy * m.y.mass
+    c, e = k.Wxy * m.x.mass, 1.0 + k.Wyy * m.y.mass
+    r = c / a
+    uy = (gy - r * gx) / (e - r * b)
+    return (gx - b * uy) / a, uy
+
+
+def reaction(m, s, k, fx, fy, t1, t2):
+    """Force of physical clay that yields at an instant, (x, y) [N].
+
+    Where clay holds the handle, this is the force that prevents acceleration.
+    """
+    x, y, h = k.x, k.y, REACTION
+    ax, ay = acceleration(m, k, fx, fy, t1, t2)
+    B = controller.velocity_per_force(
+        (1.0, 1.0), (k.Wxx, k.Wxy, k.Wyy), (m.x.mass, m.y.mass, 0.0)
+    )
+    ax, ay = ax - x.c, ay - y.c
+    vx, vy = viscous.along(m, x.v, y.v)
+    x.stuck0, y.stuck0 = s.e.x.stuck, s.e.y.stuck
+    vx, vy = 0.0 if x.stuck0 > 0.0 else vx, 0.0 if y.stuck0 > 0.0 else vy
+    B = h * B[0], h * B[1], h * B[2], h * B[3]
+    k.L = 1.0
+    fyk = yielding.laws_in_kick(m, s, k, B, vx, vy, ax, ay)
+    ax, ay = viscous.along(m, ax, ay)
+    end = vx + h * ax, vy + h * ay
+    B = viscous.rotated_matrix(m, B)
+    found = yielding.resist_by(m, B, (vx, vy), end, fyk, 0.0)
+    return viscous.across(m, found[6], found[7])
+
+
+# ---- compute -------------------------------------------------------------------------------------
+
+
+def compute(m, s, k, fx, fy, pullx, pully):
+    """Response of compensator and servo to a sample of the handle in k."""
+    now, after, x, y = s.now, s.next, k.x, k.y
+    fex, fey = laws.seen_force(m, s, x.p, y.p, x.v, y.v, pullx, pully)
+    if m.coupling:
+        fex, fey = hardware.couple(m, s, k, viscous.now(m, s, 0, 0), viscous.now(m, s, 1, 0))
+    if m.guard:
+        fex, fey = hardware.guarded(m, s, k, 0, fex), hardware.guarded(m, s, k, 1, fey)
+        after.newest = (now.newest + 1) % (m.guard_whole + 2)
+    x.net, y.net = fx - fex, fy - fey
+    s.show1, s.show2 = output(m, now.x, 0, x.net), output(m, now.y, 1, y.net)
+    ax, _ = servo.acceleration(m, 0, s.show1, now.x.y, now.x.yrate, x.p, x.v, x.c)
+    ay, _ = servo.acceleration(m, 1, s.show2, now.y.y, now.y.yrate, y.p, y.v, y.c)
+    xx, xy, yy = k.Wxx, k.Wxy, k.Wyy
+    if m.shaping:
+        xx, xy, yy = m.x.servo[3], 0.0, m.y.servo[3]
+    ax, ay = ax + xx * x.net + xy * y.net, ay + xy * x.net + yy * y.net
+    k.g1, k.g2 = arm_law.joint_velocity(ax, ay, k.u, 1.0)
+    arm.link_torques(m, k)
+    t1, t2 = k.tau1, k.tau2
+    if not m.acts:  # the motors render the clay as well
+        a1, a2 = arm_law.joint_torques(fex, fey, k.u)
+        t1, t2 = t1 - a1, t2 - a2
+    hardware.drive(m, s, t1, t2)
+    after.x.force, after.y.force, after.x.net, after.y.net = fex, fey, x.net, y.net
+
+
+def output(m, z, i, f):
+    """Output of a compensator at a sample under a net force [m]."""
+    if not m.formed:
+        return z.delta
+    c, j, a = m.form, compensator.FORM * i + 20, z.z
+    out = z.start + m.axis[i].K * c[j + 4] * f
+    return out + c[j] * a[0] + c[j + 1] * a[1] + c[j + 2] * a[2] + c[j + 3] * a[3]
+
+
+def own(m, s, q1, q2, w1, w2, fx, fy):
+    """The user's own controller: a function of a buffer, which it fills with torques and state."""
+    b, z = m.buffer, s.next
+    b[0], b[1], b[2], b[3], b[4], b[5], b[6] = s.t, q1, q2, w1, w2, fx, fy
+    b[7] = b[8] = math.nan  # left behind by a call that fails
+    m.control(b)
+    t1, t2 = b[7], b[8]
+    s.show1 = s.show2 = 0.0
+    if not abs(t1) + abs(t2) < math.inf:
+        s.code = NOT_FINITE
+        z.x.tau, z.y.tau = t1, t2
+    else:
+        hardware.drive(m, s, t1, t2)
+    z.x.force = z.y.force = 0.0
+
+
+# ---- compensator and reference model at the next sample ------------------------------------------
+
+
+def advance(m, s, i, shift):
+    """One axis a sample later, under a force that is held; `shift`: of the command."""
+    a, z, to = m.axis[i].memory, s.now.axis[i], s.next.axis[i]
+    if m.formed:
+        advance_form(m, i, z, to, shift)
+        return
+    d, e, y, r, f = z.delta, z.rate, z.y, z.yrate, to.net
+    to.delta = a[0] * d + a[1] * e + a[2] * y + a[3] * r + a[4] * f + shift
+    to.rate = a[5] * d + a[6] * e + a[7] * y + a[8] * r + a[9] * f
+    to.y = a[10] * d + a[11] * e + a[12] * y + a[13] * r + a[14] * f
+    to.yrate = a[15] * d + a[16] * e + a[17] * y + a[18] * r + a[19] * f
+
+def advance_form(m, i, z, to, shift):
+    """The same of a compensator of another shape."""
+    c, a, f = m.axis[i].memory, z.z, to.net
+    for r in range(4):
+        to.z[r] = form_row(c, 8 * r, a, z.y, z.yrate, z.start, f)
+    to.start, to.rate = z.start + shift, 0.0
+    to.y, to.yrate = (
+        form_row(c, 32, a, z.y, z.yrate, z.start, f),
+        form_row(c, 40, a, z.y, z.yrate, z.start, f),
+    )
+    to.delta = output(m, to, i, f)
+
+
+def form_row(c, j, z, y, yrate, start, f):
+    """A state of compensator or reference a sample later, by its row."""
+    out = c[j + 4] * y + c[j + 5] * yrate
+    out += c[j + 6] * start + c[j + 7] * f
+    for r in range(4):
+        out += c[j + r] * z[r]
+    return out
+
+
+# ---- a step --------------------------------------------------------------------------------------
+
+
+def shown(s, after):
+    """Compensator output that a row shows, (x, y) [m], and the share in it of a kick to an event.
+
+    Force of hand and clay are the means of both kicks, half of each step, interpolated at the
+    sample.
+    """
+    if not is_early(s, after):
+        return s.now.x.delta, s.now.y.delta, 0.0
+    share = after / (s.before + after) if s.before > 0.0 else 0.0
+    return s.show1, s.show2, share
+
+
+def take(m, s):
+    """Keeps what an event did, once the step behind it is taken."""
+    if not s.on:
+        return
+    if s.shown:
+        if m.window > 0:
+            hardware.note_angles(m, s)
+        if m.guard:
+            hardware.note_force(m, s)
+        if m.own:
+            keep_own_state(m)
+        if m.delay > 0.0:
+            hardware.note_hold(m, s)
+    memory.copied(s.now, s.next)
+    s.on = 0
+
+
+def keep_own_state(m):
+    """The state that the user's own controller returned becomes that before its next sample."""
+    b, n = m.buffer, m.buffer_size
+    for i in range(n):
+        b[STATE + i] = b[STATE + n + i]
+
+
+# ---- the path ------------------------------------------------------------------------------------
+
+
+def before_event(m, s, target, after):
+    """The next stop of the path and the step to it: an event between the samples, if any."""
+    if not m.uneven or after <= 0.0:
+        return target, after
+    x, near = s.now, SLACK * m.dt
+    t = s.t + near
+    stop = first_after(t, x.when, first_after(t, x.then, math.inf))
+    if m.delay > 0.0:
+        stop = first_after(t, x.when + m.delay, stop)
+        stop = first_after(t, x.due, first_after(t, x.due_then, stop))
+    if stop < target - near:
+        return stop, stop - s.t
+    return target, after
+
+
+def first_after(t, when, target):
+    """A time, if it lies between t and a later one; else that one."""
+    return when if t < when and when < target else target

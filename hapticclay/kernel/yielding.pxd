@@ -1,0 +1,27 @@
+from .records cimport Kick, KickAxis, Model, State, Watch
+from ..formulas cimport cmath as math
+from ..formulas cimport controller
+from ..formulas cimport regions
+from ..formulas cimport flow as law
+from . cimport groove
+from . cimport viscous
+
+cdef (double, double, double) law_now(Model m, State s, Kick k, long i, double speed) noexcept nogil
+cdef bint is_same(State s) noexcept nogil
+cdef (double, double, double, double, double, double) laws_now(Model m, State s, Kick k, double vx, double vy) noexcept nogil
+cdef (double, double, double, double, double, double) laws_in_kick(Model m, State s, Kick k, (double, double, double, double) B, double vx, double vy, double ux, double uy) noexcept nogil
+cdef (double, double, double, double, double, double) laws_of_motion(Model m, State s, double vx, double vy) noexcept nogil
+cdef (double, double, double, double, double, double, double, double, double, double) resist_by(Model m, (double, double, double, double) B, (double, double) v, (double, double) end, (double, double, double, double, double, double) fyk, double L) noexcept nogil
+cdef bint flows_freely(Model m, State s) noexcept nogil
+cdef void resist(Model m, State s, Kick k) noexcept nogil
+cdef void flow_on(Kick k) noexcept nogil
+cdef double back(KickAxis o, double place, double on) noexcept nogil
+cdef void settle(Kick k, KickAxis o, double place, Watch w, double Fy, double stop) noexcept nogil
+cdef (double, double) creeping(Model m, State s, Kick k, double gx, double gy) noexcept nogil
+cdef double creep(double size, double b, double Fy, double K, long n, double g) noexcept nogil
+cdef double velocity(Model m, Kick k, long i) noexcept nogil
+cdef double sample_velocity(Model m, Kick k, long i) noexcept nogil
+cdef void enter(Model m, State s) noexcept nogil
+cdef void age(State s) noexcept nogil
+cdef void note(Model m, State s, Kick k) noexcept nogil
+cdef void note_stop(Model m, State s, long axis, double starts, double after) noexcept nogil
