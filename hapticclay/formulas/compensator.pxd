@@ -2,6 +2,7 @@ cimport cython
 
 cdef long ORDER, FORM, KICK, FEED, WORK, TERM, SUM, NEXT, TERMS
 
+@cython.locals(size=cython.double, halvings=cython.long, row=cython.double)
 cdef void exponential(double *form, long n, long i, double h, double *e, long at) noexcept nogil
 cdef void double_time(long n, double *e, long at) noexcept nogil
 @cython.locals(uneven=cython.bint)

@@ -1,4 +1,4 @@
-from .constants cimport B_MAX
+from . cimport constants
 
 cdef ((double, double), (double, double)) halved_damping((double, double) b0, (double, double) b1, double L, double R) noexcept nogil
 cdef (double, double, double, double, double, double, double, double, double) split_damping((double, double) b0, (double, double) b1, double H, double L, double R, double W, double damperx, double dampery) noexcept nogil

@@ -1,6 +1,6 @@
 """Damping of clay in time steps: split over a kick, on rotated axes, growing with time."""
 
-from .constants import B_MAX
+from . import constants
 
 
 def halved_damping(b0, b1, L, R):
@@ -132,5 +132,5 @@ def damping_at(base, rate, t):
     """
     x, y = base
     if rate[0] or rate[1]:
-        x, y = min(x + rate[0] * t, B_MAX), min(y + rate[1] * t, B_MAX)
+        x, y = min(x + rate[0] * t, constants.B_MAX), min(y + rate[1] * t, constants.B_MAX)
     return x, y

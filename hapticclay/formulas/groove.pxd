@@ -1,10 +1,11 @@
 from . cimport cmath as math
-from .numbers cimport whole
+from . cimport numbers
 
 cdef long SECTORS, RIM
-cdef double TOUCHING, SOFT, STRIDE, HALF[16]
+cdef double TOUCHING, SOFT, STRIDE
+cdef double HALF[16]
 
-cdef (double, double) outside(double *u) noexcept nogil
+cdef (double, double) outside(double u) noexcept nogil
 cdef void cut(double *grid, double *left, double *relief, double x, double y, long disc, double *rim, double *removed) noexcept nogil
 cdef void add(double *removed, double volume) noexcept nogil
 cdef long sector(double x, double y) noexcept nogil

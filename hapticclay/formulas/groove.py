@@ -2,7 +2,7 @@
 
 import math
 
-from .numbers import whole
+from . import numbers
 
 TOUCHING = 1e-6  # share of a cell: a gap this small ends the contact
 SOFT = 2.0  # cells on each side of the tool's edge that are cut in part
@@ -56,11 +56,11 @@ def cut(grid, left, relief, x, y, disc, rim, removed):
         removed: volume removed so far, and its rounding error [m^3].
     """
     x0, y0, wx, wy, nx, ny = grid[0], grid[1], grid[2], grid[3], grid[4], grid[5]
-    r, cell, pressure, gradient, m = grid[6], grid[7], grid[8], grid[9], whole(grid[5])
+    r, cell, pressure, gradient, m = grid[6], grid[7], grid[8], grid[9], numbers.whole(grid[5])
     for j in range(RIM):
         rim[j] = 0.0
     outer, inner = r + SOFT * cell, r - SOFT * cell
-    i0, i1 = whole(max((x - outer - x0) / wx, 0.0)), whole(min((x + outer - x0) / wx, nx - 1.0))
+    i0, i1 = numbers.whole(max((x - outer - x0) / wx, 0.0)), numbers.whole(min((x + outer - x0) / wx, nx - 1.0))
     for i in range(i0, i1 + 1):
         dx = x0 + (i + 0.5) * wx - x
         far = outer * outer - dx * dx
@@ -73,7 +73,7 @@ def cut(grid, left, relief, x, y, disc, rim, removed):
             low, high = y - y0 + (near if side else -far), y - y0 + (far if side else -near)
             if near == 0.0:
                 high = y - y0 + far
-            j0, j1 = max(whole(max(low / wy - 0.5, 0.0)), seen + 1), whole(min(high / wy, ny - 1.0))
+            j0, j1 = max(numbers.whole(max(low / wy - 0.5, 0.0)), seen + 1), numbers.whole(min(high / wy, ny - 1.0))
             seen = j1
             for j in range(j0, j1 + 1):
                 share = left[i * m + j]
@@ -122,7 +122,7 @@ def sector(x, y):
         y: y of the direction.
     """
     ax, ay = abs(x), abs(y)
-    k = min(whole(SECTORS * ay / (ax + ay)), SECTORS - 1)
+    k = min(numbers.whole(SECTORS * ay / (ax + ay)), SECTORS - 1)
     return k + (2 * SECTORS if x < 0.0 else 0) + (SECTORS if y < 0.0 else 0)
 
 

@@ -3,7 +3,7 @@
 import math
 
 from . import flow
-from .numbers import nearest
+from . import numbers
 
 
 def slide(case):
@@ -21,7 +21,7 @@ def round_to_even(x, step):
     Returns:
         The multiple.
     """
-    return nearest(x / step) * step
+    return numbers.nearest(x / step) * step
 
 
 def quantize(x, bits, span):
@@ -40,7 +40,7 @@ def quantize(x, bits, span):
     half = 2.0 ** (bits - 1)
     y = x * half / span
     # the bounds keep rounded values within the integers of a compiled run
-    level = half if y > half else -half if y < -half else nearest(y)
+    level = half if y > half else -half if y < -half else numbers.nearest(y)
     return min(level, half - 1.0) * span / half
 
 

@@ -1,5 +1,5 @@
 from . cimport cmath as math
-from .numbers cimport whole
+from . cimport numbers
 
 cdef long PIECE
 

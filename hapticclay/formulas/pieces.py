@@ -2,7 +2,7 @@
 
 import math
 
-from .numbers import whole
+from . import numbers
 
 PIECE = 9  # numbers of a row
 
@@ -19,7 +19,7 @@ def mean_of_lines(table, t, h):
         (x, y).
     """
     x, y = 0.0, 0.0
-    for j in range(1, 1 + whole(table[0])):
+    for j in range(1, 1 + numbers.whole(table[0])):
         a = table[PIECE * j] * h
         share = math.sin(a) / a if a else 1.0
         x += table[PIECE * j + 3] * (share * math.cos(table[PIECE * j] * t + table[PIECE * j + 1]))
@@ -33,7 +33,7 @@ def has_pieces(table):
     Args:
         table: see above.
     """
-    return whole(table[2]) > 1 + whole(table[0])
+    return numbers.whole(table[2]) > 1 + numbers.whole(table[0])
 
 
 def piece_at(table, t):
@@ -43,7 +43,7 @@ def piece_at(table, t):
         table: see above, with pieces.
         t: time [s].
     """
-    low, high = 1 + whole(table[0]), whole(table[2])
+    low, high = 1 + numbers.whole(table[0]), numbers.whole(table[2])
     while high - low > 1:
         middle = (low + high) // 2
         if table[PIECE * middle] <= t:
@@ -104,7 +104,7 @@ def mean_of_pieces(table, t, h):
     """
     if h == 0.0:
         return value_of_pieces(table, t, t + table[1])
-    begin, end, n = t - h, t + h, whole(table[2])
+    begin, end, n = t - h, t + h, numbers.whole(table[2])
     j = piece_at(table, begin)
     if j + 1 == n or table[PIECE * (j + 1)] >= end:
         return mean_of_piece(table, j, t, h)

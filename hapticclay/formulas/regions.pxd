@@ -1,5 +1,5 @@
-from .numbers cimport whole
-from .smooth cimport smooth_damping
+from . cimport numbers
+from . cimport smooth
 
 cdef long END, EDGES, LANDED, OWN, SMOOTH, VALUES, RATES, ENTERED, FLOWS, SPRINGS, HEAD, SPRING
 

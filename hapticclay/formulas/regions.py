@@ -1,7 +1,7 @@
 """The clay as a table of cells, in which a run looks up resistance by place."""
 
-from .numbers import whole
-from .smooth import smooth_damping
+from . import numbers
+from . import smooth
 
 # A table is one row of numbers. Its head says where the rest begins, two places each: END, one
 # place, holds the end of the path itself [m], inf for none; EDGES, borders along x and along y
@@ -32,7 +32,7 @@ def region_of(table, p):
 
 def _region_along(table, i, at):
     """Index of the region along one axis, from the last border at or before the place."""
-    begin, high = whole(table[EDGES + i]), whole(table[EDGES + i + 1])
+    begin, high = numbers.whole(table[EDGES + i]), numbers.whole(table[EDGES + i + 1])
     low = begin + 1
     while low < high:
         middle = (low + high) // 2
@@ -57,7 +57,7 @@ def enter_region(table, ix, iy, t):
     """
     basex, ratex = _cell_law(table, 0, ix, iy, t)
     basey, ratey = _cell_law(table, 1, ix, iy, t)
-    x, y = whole(table[EDGES]) + ix, whole(table[EDGES + 1]) + iy
+    x, y = numbers.whole(table[EDGES]) + ix, numbers.whole(table[EDGES + 1]) + iy
     return (table[x], table[y]), (table[x + 1], table[y + 1]), (basex, basey), (ratex, ratey)
 
 
@@ -73,7 +73,7 @@ def enter_flow(table, axis, ix, iy):
     Returns:
         (Fy [N], K [N/(m/s)^n], n).
     """
-    at = whole(table[FLOWS + axis]) + 3 * _cell(table, axis, ix, iy)
+    at = numbers.whole(table[FLOWS + axis]) + 3 * _cell(table, axis, ix, iy)
     return table[at], table[at + 1], table[at + 2]
 
 
@@ -86,7 +86,7 @@ def spring_place(table, axis, ix, iy):
         ix: index of the region along x.
         iy: index of the region along y.
     """
-    return whole(table[SPRINGS + axis]) + SPRING * _cell(table, axis, ix, iy)
+    return numbers.whole(table[SPRINGS + axis]) + SPRING * _cell(table, axis, ix, iy)
 
 
 def smooth_clay(table, which, x, y, bx, by):
@@ -103,11 +103,11 @@ def smooth_clay(table, which, x, y, bx, by):
     Returns:
         Damping (x, y) [N.s/m].
     """
-    first, second = whole(table[SMOOTH]), whole(table[SMOOTH + 1])
+    first, second = numbers.whole(table[SMOOTH]), numbers.whole(table[SMOOTH + 1])
     if which != 2:
-        bx = smooth_damping(table, first, x, y)
+        bx = smooth.smooth_damping(table, first, x, y)
     if which != 1:
-        by = bx if first == second else smooth_damping(table, second, x, y)
+        by = bx if first == second else smooth.smooth_damping(table, second, x, y)
     return bx, by
 
 
@@ -122,20 +122,20 @@ def is_alike(table, ix, iy, i, up):
         up: 1 for the region's upper border, -1 for its lower one.
     """
     jx, jy = ix if i else ix + up, iy + up if i else iy
-    if table[whole(table[LANDED + i]) + max(iy if i else ix, jy if i else jx)]:
+    if table[numbers.whole(table[LANDED + i]) + max(iy if i else ix, jy if i else jx)]:
         return False
     for axis in range(2):
         a, b = _cell(table, axis, ix, iy), _cell(table, axis, jx, jy)
-        values, rates = whole(table[VALUES + axis]), whole(table[RATES + axis])
+        values, rates = numbers.whole(table[VALUES + axis]), numbers.whole(table[RATES + axis])
         if table[values + a] != table[values + b] or table[rates + a] or table[rates + b]:
             return False
-        springs = whole(table[SPRINGS + axis])
+        springs = numbers.whole(table[SPRINGS + axis])
         if springs and a != b:  # each spring has its own rest position
             for side in range(2):
                 at = springs + SPRING * (b if side else a)
                 if table[at] > 0.0 or table[at + 2] > 0.0:
                     return False
-        flows = whole(table[FLOWS + axis])
+        flows = numbers.whole(table[FLOWS + axis])
         if flows:
             for j in range(3):
                 if table[flows + 3 * a + j] != table[flows + 3 * b + j]:
@@ -145,15 +145,15 @@ def is_alike(table, ix, iy, i, up):
 
 def _cell(table, axis, ix, iy):
     """Number of the cell of a region in the clay of an axis."""
-    x, y = whole(table[OWN + 2 * axis]), whole(table[OWN + 2 * axis + 1])
-    return whole(table[x + ix] + table[y + iy])
+    x, y = numbers.whole(table[OWN + 2 * axis]), numbers.whole(table[OWN + 2 * axis + 1])
+    return numbers.whole(table[x + ix] + table[y + iy])
 
 
 def _cell_law(table, axis, ix, iy, t):
     k = _cell(table, axis, ix, iy)
-    value, rate = table[whole(table[VALUES + axis]) + k], table[whole(table[RATES + axis]) + k]
+    value, rate = table[numbers.whole(table[VALUES + axis]) + k], table[numbers.whole(table[RATES + axis]) + k]
     if rate:
-        entered = whole(table[ENTERED + axis]) + k
+        entered = numbers.whole(table[ENTERED + axis]) + k
         if table[entered] != table[entered]:
             table[entered] = t
         value -= rate * table[entered]

@@ -1,3 +1,3 @@
-from .numbers cimport whole
+from . cimport numbers
 
 cdef double smooth_damping(double *table, long at, double x, double y) noexcept nogil

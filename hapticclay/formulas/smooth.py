@@ -1,6 +1,6 @@
 """Damping that varies smoothly in space, by a cubic B-spline."""
 
-from .numbers import whole
+from . import numbers
 
 
 def smooth_damping(table, at, x, y):
@@ -23,9 +23,9 @@ def smooth_damping(table, at, x, y):
     # beyond, all four control points are equal; NaN also ends up here
     u = 0.0 if not u > 0.0 else most if u > most else u
     v = 0.0 if not v > 0.0 else rows if v > rows else v
-    i, j = whole(u), whole(v)
+    i, j = numbers.whole(u), numbers.whole(v)
     u, v = u - i, v - j
-    n = whole(rows) + 4
+    n = numbers.whole(rows) + 4
     a = at + 6 + i * n + j
     b = a + n
     c = b + n

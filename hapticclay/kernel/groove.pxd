@@ -1,7 +1,7 @@
 from .records cimport Model, State
 from ..formulas cimport cmath as math
 from ..formulas cimport groove as law
-from ..formulas.numbers cimport whole
+from ..formulas cimport numbers
 
 cdef void cut(Model m, State s, double x, double y) noexcept nogil
 cdef void move(Model m, State s, double px, double py, double vx, double vy) noexcept nogil

@@ -3,7 +3,7 @@
 import math
 
 from ..formulas import groove as law
-from ..formulas.numbers import whole
+from ..formulas import numbers
 
 
 def cut(m, s, x, y):
@@ -14,7 +14,7 @@ def cut(m, s, x, y):
     disc = 1
     if ax == ax:
         dx, dy = x - ax, y - ay
-        disc, n = 0, 1 + whole(math.sqrt(dx * dx + dy * dy) / (law.STRIDE * grid[7]))
+        disc, n = 0, 1 + numbers.whole(math.sqrt(dx * dx + dy * dy) / (law.STRIDE * grid[7]))
         for j in range(1, n):
             law.cut(
                 grid, m.ground, m.relief, ax + j * dx / n, ay + j * dy / n, 0, m.rim, m.removed

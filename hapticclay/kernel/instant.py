@@ -28,7 +28,9 @@ def evaluate(m, s, z, since, row, out):
         x.delta, y.delta = x.delta + dx, y.delta + dy
     a.b, b.b = viscous.at_place(m, s, t, x.p, y.p)
     clayx, clayy = viscous.force(m, a.b, b.b, x.v, y.v)
-    lawx, lawy = own_laws.force(m, x.p, y.p, x.v, y.v, since) if m.laws else (0.0, 0.0)
+    lawx = lawy = 0.0
+    if m.laws:
+        lawx, lawy = own_laws.force(m, x.p, y.p, x.v, y.v, since)
     x.f, y.f, x.d, y.d, k.dxy = x.uh - clayx - lawx, y.uh - clayy - lawy, 0.0, 0.0, 0.0
     if m.hand:
         for i in range(2):

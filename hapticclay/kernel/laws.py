@@ -49,8 +49,11 @@ def without_clay(m, s, k, fx, fy):
     bx, by = viscous.force(m, viscous.now(m, s, 0, 1), viscous.now(m, s, 1, 1), x.v, y.v)
     fx, fy = fx - bx, fy - by
     if m.special and (m.springs or m.laws):
-        ax, ay = (s.x.force_before, s.y.force_before) if m.springs else (0.0, 0.0)
-        gx, gy = own_laws.force(m, x.p, y.p, x.v, y.v, 0.0) if m.laws else (0.0, 0.0)
+        ax = ay = gx = gy = 0.0
+        if m.springs:
+            ax, ay = s.x.force_before, s.y.force_before
+        if m.laws:
+            gx, gy = own_laws.force(m, x.p, y.p, x.v, y.v, 0.0)
         fx, fy = fx - (ax + gx), fy - (ay + gy)
     return fx, fy
 
@@ -62,7 +65,9 @@ def seen_force(m, s, px, py, vx, vy, pullx, pully):
     x, y = viscous.force(m, viscous.now(m, s, 0, 0), viscous.now(m, s, 1, 0), vx, vy)
     if not m.special:
         return x, y
-    fx, fy = motion_force(m, s, vx, vy, pullx, pully) if m.flow else (0.0, 0.0)
+    fx = fy = 0.0
+    if m.flow:
+        fx, fy = motion_force(m, s, vx, vy, pullx, pully)
     if m.springs:
         fx, fy = fx + springs.seen_force(m, s, 0, px), fy + springs.seen_force(m, s, 1, py)
     if m.laws:

@@ -8,6 +8,7 @@ itself in CPython.
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Iterator
 from typing import Any
 
@@ -101,6 +102,33 @@ def dtype_of(made: Any) -> Any:
     return made.dtype
 
 
+C_TYPES = {"double": ctypes.c_double}  # all else is as wide as a long long
+
+
+def struct_of(made: Any) -> Any:
+    """A class of views of rows of a record in memory, with the attributes of the record."""
+    if "struct" not in vars(made):
+        fields: list[tuple[str, Any]] = []
+        for name, kind in made.kinds.items():
+            if isinstance(kind, Many):
+                fields.append((name, struct_of(kind.record) * kind.n))
+            elif isinstance(kind, Kind):
+                c = C_TYPES.get(kind.c, ctypes.c_longlong)
+                fields.append((name, c * kind.shape if kind.shape else c))
+            else:
+                fields.append((name, struct_of(kind)))
+        body: dict[str, Any] = {"_fields_": fields}
+        if "axis" in made.kinds:
+            body |= {c: property(lambda view, i=i: view.axis[i]) for i, c in enumerate("xy")}
+        made.struct = type(made.__name__, (ctypes.Structure,), body)
+    return made.struct
+
+
+def view_of(made: Any, row: Any) -> Any:
+    """A view of a row of an array."""
+    return struct_of(made).from_address(row.ctypes.data)
+
+
 def load(view: Any, row: Any) -> None:
     """Fills a record from a row, except for what lies elsewhere."""
     for name, kind in type(view).kinds.items():
@@ -192,15 +220,15 @@ def declarations(records: Any, functions: str) -> str:
     """The same for Cython, as the text of a .pxd file."""
     text = "# Written from kernel/records.py.\n"
     text += 'cdef extern from "records.h" nogil:\n    void copied(...)\n'
-    text += "".join(f"    ctypedef struct {x.__name__}_s\n" for x in records)
+    for made in records:
+        text += f"    ctypedef struct {made.__name__}_s\n"
+        text += f"    ctypedef {made.__name__}_s *{made.__name__}\n"
     text += functions
     for made in records:
         text += f"    ctypedef struct {made.__name__}_s:\n"
-        for c, name, n, is_record in declared(made):
-            c = f"{c}_s" if is_record else c
+        for c, name, n, _ in declared(made):
             size = f"[{n}]" if n else ""
             text += f"        {c} {name}{size}\n"
             if name == "axis":
                 text += f"        {c} x, y\n"
-        text += f"    ctypedef {made.__name__}_s *{made.__name__}\n"
     return text

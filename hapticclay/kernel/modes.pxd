@@ -14,7 +14,7 @@ cdef bint is_active(State s, long i) noexcept nogil
 cdef double strength(State s, long i, double speed) noexcept nogil
 cdef double steepness(State s, long i, double speed) noexcept nogil
 cdef bint is_rough(State s, long i) noexcept nogil
-cdef double creep_speed(double mobility, double dt, double K, long n) noexcept nogil
+cdef double creep_speed(double mobility, double dt, double K, double n) noexcept nogil
 cdef double slowest(Model m, State s, long i) noexcept nogil
 cdef double holding_force(Model m, State s, long i) noexcept nogil
 cdef void put(State s, double x, double y) noexcept nogil

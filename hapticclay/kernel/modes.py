@@ -411,7 +411,8 @@ def nearly_rests(m, s, i, speed, forward, size, need):
 
 def set_out(s, grip):
     """Direction in which a handle at rest begins to slide in clay along the motion."""
-    ex, ey = flow.slowed(grip.B, grip.x.a, grip.y.a, 1.0, s.mode[0].Fy, 0.0, 1.0)
+    B = grip.B[0], grip.B[1], grip.B[2], grip.B[3]
+    ex, ey = flow.slowed(B, grip.x.a, grip.y.a, 1.0, s.mode[0].Fy, 0.0, 1.0)
     if ex == 0.0 and ey == 0.0:
         ex, ey = grip.x.f, grip.y.f
     size = math.sqrt(ex * ex + ey * ey)

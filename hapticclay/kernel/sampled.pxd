@@ -36,6 +36,7 @@ cdef void answer(Model m, State s, Kick k, double w1, double w2, double fx, doub
 cdef (double, double) see(Model m, State s, Kick k) noexcept nogil
 cdef (double, double, double, double) on_sensor(Model m, State s, Kick k, double ux, double uy) noexcept nogil
 cdef (double, double) acceleration(Model m, Kick k, double fx, double fy, double t1, double t2) noexcept nogil
+@cython.locals(B=(cython.double, cython.double, cython.double, cython.double))
 cdef (double, double) reaction(Model m, State s, Kick k, double fx, double fy, double t1, double t2) noexcept nogil
 cdef void compute(Model m, State s, Kick k, double fx, double fy, double pullx, double pully) noexcept nogil
 cdef double output(Model m, MachineAxis z, long i, double f) noexcept nogil

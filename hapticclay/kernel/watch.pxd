@@ -1,7 +1,7 @@
 cimport cython
 from .records cimport Model, State, Watch
 from ..formulas cimport cmath as math
-from ..formulas.numbers cimport whole
+from ..formulas cimport numbers
 
 cdef long SWINGS, QUIET, ROW
 cdef double FOLD, SPEED, FLOOR, STILL, SWING_GROWTH, STEP_GROWTH, SWING_SPACING, CYCLE

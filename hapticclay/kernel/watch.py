@@ -2,7 +2,7 @@
 
 import math
 
-from ..formulas.numbers import whole
+from ..formulas import numbers
 
 FOLD = math.sin(math.radians(1.0))  # out of reach: elbow within 1 degree of stretched or folded
 SPEED = 20.0  # [m/s] beyond any hand
@@ -76,7 +76,7 @@ def turned(w, o, bound):
         s[o + 6], s[o + 7], s[o + 9] = 1.0, 0.0, s[o + 8]
     s[o + 7] = s[o + 7] + 1.0 if s[o + 5] else 0.0
     s[o + 8] = 1.0 * w.seen[0]
-    n = whole(grown)
+    n = numbers.whole(grown)
     s[o + 9 + n % (SWINGS + 1)] = s[o + 8]
     slow = s[o + 8] - s[o + 9 + (n + 1) % (SWINGS + 1)] + 2.0 >= SWING_SPACING * SWINGS
     s[o + 2], s[o + 3], s[o + 4], s[o + 5] = s[o], size if grown else 0.0, grown, 2.0 * bound

@@ -1,4 +1,5 @@
-from .records cimport Kick, KickAxis, Model, State, Watch
+cimport cython
+from .records cimport Kick, KickAxis, Model, State
 from ..formulas cimport cmath as math
 from ..formulas cimport controller
 from ..formulas cimport regions
@@ -13,15 +14,16 @@ cdef (double, double, double, double, double, double) laws_in_kick(Model m, Stat
 cdef (double, double, double, double, double, double) laws_of_motion(Model m, State s, double vx, double vy) noexcept nogil
 cdef (double, double, double, double, double, double, double, double, double, double) resist_by(Model m, (double, double, double, double) B, (double, double) v, (double, double) end, (double, double, double, double, double, double) fyk, double L) noexcept nogil
 cdef bint flows_freely(Model m, State s) noexcept nogil
+@cython.locals(B=(cython.double, cython.double, cython.double, cython.double))
 cdef void resist(Model m, State s, Kick k) noexcept nogil
 cdef void flow_on(Kick k) noexcept nogil
 cdef double back(KickAxis o, double place, double on) noexcept nogil
-cdef void settle(Kick k, KickAxis o, double place, Watch w, double Fy, double stop) noexcept nogil
+cdef void settle(Kick k, KickAxis o, double place, double w, double Fy, double stop) noexcept nogil
 cdef (double, double) creeping(Model m, State s, Kick k, double gx, double gy) noexcept nogil
-cdef double creep(double size, double b, double Fy, double K, long n, double g) noexcept nogil
+cdef double creep(double size, double b, double Fy, double K, double n, double g) noexcept nogil
 cdef double velocity(Model m, Kick k, long i) noexcept nogil
 cdef double sample_velocity(Model m, Kick k, long i) noexcept nogil
 cdef void enter(Model m, State s) noexcept nogil
 cdef void age(State s) noexcept nogil
 cdef void note(Model m, State s, Kick k) noexcept nogil
-cdef void note_stop(Model m, State s, long axis, double starts, double after) noexcept nogil
+cdef void note_stop(Model m, State s, double axis, double starts, double after) noexcept nogil
