@@ -27,7 +27,7 @@ RESULT_SCHEMA = "hapticclay-result-1"
 ROOMS = (
     "model",
     "scene",
-    "stepping",
+    "kernel",
     "theory",
     "simulation",
     "studies",

@@ -60,7 +60,10 @@ def cut(grid, left, relief, x, y, disc, rim, removed):
     for j in range(RIM):
         rim[j] = 0.0
     outer, inner = r + SOFT * cell, r - SOFT * cell
-    i0, i1 = numbers.whole(max((x - outer - x0) / wx, 0.0)), numbers.whole(min((x + outer - x0) / wx, nx - 1.0))
+    i0, i1 = (
+        numbers.whole(max((x - outer - x0) / wx, 0.0)),
+        numbers.whole(min((x + outer - x0) / wx, nx - 1.0)),
+    )
     for i in range(i0, i1 + 1):
         dx = x0 + (i + 0.5) * wx - x
         far = outer * outer - dx * dx
@@ -73,7 +76,10 @@ def cut(grid, left, relief, x, y, disc, rim, removed):
             low, high = y - y0 + (near if side else -far), y - y0 + (far if side else -near)
             if near == 0.0:
                 high = y - y0 + far
-            j0, j1 = max(numbers.whole(max(low / wy - 0.5, 0.0)), seen + 1), numbers.whole(min(high / wy, ny - 1.0))
+            j0, j1 = (
+                max(numbers.whole(max(low / wy - 0.5, 0.0)), seen + 1),
+                numbers.whole(min(high / wy, ny - 1.0)),
+            )
             seen = j1
             for j in range(j0, j1 + 1):
                 share = left[i * m + j]

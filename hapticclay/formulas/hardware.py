@@ -2,8 +2,7 @@
 
 import math
 
-from . import flow
-from . import numbers
+from . import flow, numbers
 
 
 def slide(case):

@@ -1,7 +1,6 @@
 """The clay as a table of cells, in which a run looks up resistance by place."""
 
-from . import numbers
-from . import smooth
+from . import numbers, smooth
 
 # A table is one row of numbers. Its head says where the rest begins, two places each: END, one
 # place, holds the end of the path itself [m], inf for none; EDGES, borders along x and along y
@@ -151,7 +150,10 @@ def _cell(table, axis, ix, iy):
 
 def _cell_law(table, axis, ix, iy, t):
     k = _cell(table, axis, ix, iy)
-    value, rate = table[numbers.whole(table[VALUES + axis]) + k], table[numbers.whole(table[RATES + axis]) + k]
+    value, rate = (
+        table[numbers.whole(table[VALUES + axis]) + k],
+        table[numbers.whole(table[RATES + axis]) + k],
+    )
     if rate:
         entered = numbers.whole(table[ENTERED + axis]) + k
         if table[entered] != table[entered]:

@@ -18,3 +18,4 @@ cdef void put_axis(Model m, State s, long i, double p, double v) noexcept nogil
 cdef void put_clay(Model m, State s, double px, double py) noexcept nogil
 cdef void put_machine(Model m, State s, double px, double py) noexcept nogil
 cdef void fill_angles(Model m, State s) noexcept nogil
+cdef void change(Model m, State s) noexcept nogil

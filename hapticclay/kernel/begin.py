@@ -78,3 +78,22 @@ def fill_angles(m, s):
         q1, q2 = s.q1 + n * m.Ts * s.w1, s.q2 + n * m.Ts * s.w2
         ring[3 * j] = 1.0 * n
         ring[3 * j + 1], ring[3 * j + 2] = hardware.encoded(m, q1), hardware.encoded(m, q2)
+
+
+def change(m, s):
+    """Continues in a changed scene with the same borders."""
+    px, py = arm.place(m, s.q1, s.q2)
+    drag, s.drag, s.lost, s.stored = s.drag, 0.0, 0.0, 0.0
+    for i in range(2):
+        z, o = s.axis[i], s.k.axis[i]
+        o.b0, o.b1, o.p = z.old, z.old_rate, z.bare  # what stays
+        z.force = 0.0
+    struck = s.struck
+    borders.enter(m, s, s.x.index, s.y.index, px, py, -1, 0.0)
+    s.drag, s.struck = drag, struck
+    for i in range(2):
+        z, o = s.axis[i], s.k.axis[i]
+        z.old, z.old_rate, z.bare = o.b0, o.b1, o.p
+    if m.groove:
+        groove.meet(m, px, py)
+    arm.put(m, s)

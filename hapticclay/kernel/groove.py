@@ -6,25 +6,22 @@ from ..formulas import groove as law
 from ..formulas import numbers
 
 
-def cut(m, s, x, y):
-    """Removes the clay between the place of the last cut and here."""
-    ax, ay, grid = s.x.cut, s.y.cut, m.grid
+def cut(m, ax, ay, x, y):
+    """Removes the clay between the place of the last cut, NaN for none, and here."""
+    grid, disc = m.grid, 1
     if x == ax and y == ay:
         return
-    disc = 1
     if ax == ax:
         dx, dy = x - ax, y - ay
         disc, n = 0, 1 + numbers.whole(math.sqrt(dx * dx + dy * dy) / (law.STRIDE * grid[7]))
         for j in range(1, n):
-            law.cut(
-                grid, m.ground, m.relief, ax + j * dx / n, ay + j * dy / n, 0, m.rim, m.removed
-            )
+            law.cut(grid, m.ground, m.relief, ax + j * dx / n, ay + j * dy / n, 0, m.rim, m.removed)
     law.cut(grid, m.ground, m.relief, x, y, disc, m.rim, m.removed)
 
 
 def move(m, s, px, py, vx, vy):
     """Clay and tool after a step."""
-    cut(m, s, px, py)
+    cut(m, s.x.cut, s.y.cut, px, py)
     b = 0.0
     if m.drags:
         _, area = law.resistance(m.rim, vx, vy)
@@ -51,7 +48,6 @@ def laws_along(m, x, y):
     return Fy, 0.0, 1.0, Fy, 0.0, 1.0
 
 
-def meet(m, s, px, py):
+def meet(m, px, py):
     """Finds what touches the tool at rest, in clay whose numbers have changed."""
-    s.x.cut = s.y.cut = math.nan
-    cut(m, s, px, py)
+    cut(m, math.nan, math.nan, px, py)

@@ -53,9 +53,7 @@ def differenced(m, s, q1, q2):
     """Joint rates by the difference of measured angles [rad/s]."""
     ring, now, after = m.angles, s.now, s.next
     row, k = 3 * now.oldest, 1.0 * now.k
-    w1, w2 = law.velocity_difference(
-        ring[row], (ring[row + 1], ring[row + 2]), k, (q1, q2), m.Ts
-    )
+    w1, w2 = law.velocity_difference(ring[row], (ring[row + 1], ring[row + 2]), k, (q1, q2), m.Ts)
     if m.cutoff > 0.0:
         span = (k - ring[3 * ((now.oldest + m.window - 1) % m.window)]) * m.Ts
         w1 = law.low_pass(now.x.w, w1, m.cutoff, span)

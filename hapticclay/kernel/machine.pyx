@@ -1,9 +1,15 @@
-"""The way into the compiled kernel: it advances rows of models and states, without Python's lock."""
+"""The way into the compiled kernel: rows of models and states, without Python's lock.
 
-from . cimport arm, begin, energy, path, watch
-from .records cimport Engine_s, Model_s, State_s
+Records are given by the address of an array of them; `which` is that of the indices of n rows.
+"""
 
-SIZES = sizeof(Model_s), sizeof(State_s), sizeof(Engine_s)
+from . cimport arm, begin, path, rows, summary, watch
+from .records cimport Engine_s, Model_s, State_s, Summary_s
+
+SIZES = {
+    "Model": sizeof(Model_s), "State": sizeof(State_s), "Engine": sizeof(Engine_s),
+    "Summary": sizeof(Summary_s),
+}
 
 
 def begin_run(size_t model, size_t state, double px, double py, double vx, double vy):
@@ -11,21 +17,71 @@ def begin_run(size_t model, size_t state, double px, double py, double vx, doubl
     begin.begin(<Model_s *>model, <State_s *>state, px, py, vx, vy)
 
 
-def advance(size_t models, size_t states, size_t which, Py_ssize_t n, long room):
-    """Makes steps of rows until so many rows of theirs are filled.
+def change(size_t model, size_t state):
+    """Continues a run in a changed scene with the same borders."""
+    begin.change(<Model_s *>model, <State_s *>state)
 
-    Args:
-        models: address of an array of models.
-        states: address of an array of states.
-        which: address of the indices of the rows.
-        n: how many there are.
-        room: rows to fill.
+
+def look(size_t model, size_t state, long first, long n):
+    """Whether the monitor can have nothing to report on rows, nor had it before."""
+    watch.look(<Model_s *>model, <State_s *>state, first, n)
+    return bool((<State_s *>state).watch.quiet)
+
+
+def advance(size_t models, size_t states, size_t which, Py_ssize_t n, size_t rooms, bint watched):
+    """Makes steps of rows until as many rows of theirs are filled as `rooms` says, by row.
+
+    watched: the quick test of the monitor looks at the rows made.
     """
     cdef Model_s *m = <Model_s *>models
     cdef State_s *s = <State_s *>states
     cdef const long long *w = <const long long *>which
+    cdef const long long *room = <const long long *>rooms
     cdef Py_ssize_t j
+    cdef long long k, first
     with nogil:
         for j in range(n):
-            arm.put(&m[w[j]], &s[w[j]])
-            path.advance(&m[w[j]], &s[w[j]], room)
+            k = w[j]
+            first = s[k].row
+            arm.put(&m[k], &s[k])
+            path.advance(&m[k], &s[k], room[k])
+            if watched:
+                watch.look(&m[k], &s[k], first, s[k].row)
+
+
+def peek(size_t models, size_t states, size_t which, Py_ssize_t n, size_t spare, size_t shown):
+    """Writes the row that the next step of each row would write, and the force of the clay.
+
+    shown: 18 numbers by row; spare: another state.
+    """
+    cdef Model_s *m = <Model_s *>models
+    cdef State_s *s = <State_s *>states
+    cdef const long long *w = <const long long *>which
+    cdef double *out = <double *>shown
+    cdef Py_ssize_t j
+    cdef long i
+    cdef long long k, at
+    with nogil:
+        for j in range(n):
+            k = w[j]
+            at = s[k].row
+            arm.put(&m[k], &s[k])
+            path.peek(&m[k], &s[k], <State_s *>spare)
+            for i in range(16):
+                out[18 * k + i] = m[k].rows[16 * at + i]
+            if m[k].told or m[k].holds:
+                out[18 * k + 16], out[18 * k + 17] = m[k].rendered[3 * at], m[k].rendered[3 * at + 1]
+
+
+def finish(size_t models, size_t states, size_t outs, Py_ssize_t n, size_t starts, long room):
+    """Makes runs from start to end without their samples; starts: p and v, four numbers by row."""
+    cdef Model_s *m = <Model_s *>models
+    cdef State_s *s = <State_s *>states
+    cdef Summary_s *out = <Summary_s *>outs
+    cdef const double *z = <const double *>starts
+    cdef Py_ssize_t k
+    with nogil:
+        for k in range(n):
+            summary.finish(
+                &m[k], &s[k], &out[k], z[4 * k], z[4 * k + 1], z[4 * k + 2], z[4 * k + 3], room
+            )

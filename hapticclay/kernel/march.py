@@ -146,7 +146,12 @@ def add_stage(m, sums, i, now, a1, a2):
     first, last = 0.0 if i == 3 else 1.0, 0.0 if i == 0 else 1.0
     weight = 1.0 if i == 0 or i == 3 else 2.0
     f, e = sums.first, sums.last
-    f[0], f[1], e[0], e[1] = f[0] + first * a1, f[1] + first * a2, e[0] + last * a1, e[1] + last * a2
+    f[0], f[1], e[0], e[1] = (
+        f[0] + first * a1,
+        f[1] + first * a2,
+        e[0] + last * a1,
+        e[1] + last * a2,
+    )
     for j in range(2):
         o, at = now.axis[j], 2 + 2 * j
         f[at], f[at + 1] = f[at] + first * o.ddelta, f[at + 1] + first * o.dy

@@ -176,9 +176,7 @@ def answer(m, s, k, out):
     gx, gy = servo.solve(k)
     B[0], B[1], B[2], B[3] = rotated_matrix(
         m,
-        controller.velocity_per_force(
-            (x.n, y.n), (k.Sxx, k.Sxy, k.Syy), (x.d, y.d, k.dxy)
-        ),
+        controller.velocity_per_force((x.n, y.n), (k.Sxx, k.Sxy, k.Syy), (x.d, y.d, k.dxy)),
     )
     grip.x.v, grip.y.v = along(m, x.v, y.v)
     grip.x.a, grip.y.a = along(m, gx - x.c, gy - y.c)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import ParameterError
 from ..scene.scenario import Scenario
 from . import engine, layout, records
 from .engine import mujoco
@@ -111,6 +112,17 @@ class Mover:
         """Puts the engine to a scenario, at rest."""
         engine.rotate_dampers(self.model, scenario)
         mujoco.mj_resetData(self.model, self.data)
+
+
+def refuse_callbacks() -> None:
+    """Refuses a control callback of the engine, which would interfere.
+
+    Raises:
+        ParameterError: there is one.
+    """
+    if mujoco.get_mjcb_control() is not None:
+        bound = "the engine must be free of control callbacks"
+        raise ParameterError("mjcb_control", mujoco.get_mjcb_control(), bound)
 
 
 def bias(model: Any, data: Any, accelerated: int, _: Any) -> None:

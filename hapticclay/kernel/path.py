@@ -290,6 +290,8 @@ def advance(m, s, room):
         whole_steps(m, s, room)
         if s.code == OPEN and has_room(m, s, room):
             step_to_event(m, s)
+        if m.unread:
+            s.crossing = s.stopped = 0
 
 
 # ---- a look ahead --------------------------------------------------------------------------------

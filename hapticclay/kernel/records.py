@@ -57,7 +57,9 @@ class Engine:
 class ModelAxis:
     """One axis of the handle."""
 
-    servo: real[6]  # static gain, damping [1/s], stiffness [1/s^2] of G; gain, damping, stiffness of Sh
+    servo: real[
+        6
+    ]  # static gain, damping [1/s], stiffness [1/s^2] of G; gain, damping, stiffness of Sh
     K: real  # gain of the compensator [1/kg]
     pole: real  # of the compensator K/(s (s + pole)) [rad/s]
     z0: real[4]  # states of one of another shape, of a handle in steady motion
@@ -154,6 +156,7 @@ class Model:
     ratio: whole  # steps in a control sample
     Ts: real  # [s]
     uneven: whole  # events may lie between the steps
+    unread: whole  # nobody reads crossings and stops: they are written over
     told: whole  # the force of the clay is recorded: b v does not give it
     holds: whole  # it is recorded as the motors hold it
     chance: whole
@@ -499,7 +502,9 @@ class Watch:
     """What the quick test of the monitor carries from one look to the next."""
 
     quiet: whole  # nothing to report so far
-    seen: whole[4]  # samples; last one that moved, last one below the torque limits; samples at them
+    seen: whole[
+        4
+    ]  # samples; last one that moved, last one below the torque limits; samples at them
     swings: real[32]  # 16 of x, then of y
 
 
@@ -559,7 +564,20 @@ class State:
     watch: Watch
 
 
+@record
+class Summary:
+    """The end of a run without its samples."""
+
+    row: real[16]  # last one
+    force: real[2]  # of the clay in it, where b v does not give it [N]
+    crossings: whole
+    crossed: real[24]  # axis, time [s] and speed [m/s] of the first eight
+    steps: whole
+    kinetic: real[2]  # energy of the arm at start and end [J]
+    at_hand: real[2]  # stored in the hand
+
+
 RECORDS = (
     Engine, ModelAxis, KickAxis, Kick, LawSlot, Span, Model, StateAxis, MachineAxis, Machine, Work,
-    PointAxis, Point, GripAxis, Grip, InstantAxis, Instant, Sums, ModeAxis, Stride, Watch, State,
+    PointAxis, Point, GripAxis, Grip, InstantAxis, Instant, Sums, ModeAxis, Stride, Watch, State, Summary,
 )  # fmt: skip

@@ -7,13 +7,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..model.sampled_controller import Controller
+from ..model import regions
+from ..model.sampled_controller import BUFFER, Controller
 from ..scene.scenario import Scenario
-from . import begin, layout, march, path, records, rows, scene
+from . import arm, begin, layout, march, native, path, records, rows, scene, watch
 from .mover import Mover
 
 CHUNK = 4096  # rows between two looks at a run (progress, Ctrl-C, outcome); fits the cache
 CROSSINGS, STOPS = 64, 4 * CHUNK  # between two looks: an axis stops and starts again in each step
+
+SHOWN = rows.ROW + 2  # numbers of a sample shown: its row, and the force of the clay [N]
 
 
 class Saved(NamedTuple):
@@ -49,14 +52,21 @@ class Row:
     """A run: the model of its scene, its state, and the arrays that they name.
 
     `m` and `s` have the attributes of records.Model and records.State, whoever advances the row.
+
+    Attributes:
+        caller: of the user's own controller, None without any.
     """
 
     m: Any
     s: Any
+    engine: str
 
     def __init__(self, scenario: Scenario, mover: Mover, buffers: Buffers):
         self.buffers, self.mover = buffers, mover
         self.take(scenario)
+        self.begin(scenario)
+
+    # ---- the scene
 
     def take(self, scenario: Scenario, controller: Controller | None = None) -> None:
         """Takes a scene; the state stays.
@@ -68,34 +78,21 @@ class Row:
         made = scene.compile_scene(scenario, controller)
         self.arrays, self.caller, self.laws = made.arrays, made.caller, made.laws
         self.buffers.make_room(made.m)
-        made.m.most_crossings, made.m.most_stops = CROSSINGS - 3, max(len(self.buffers.stops) - 8, 1)
-        names = [name for name in made.written if name in self.arrays]
-        self.written = [self.arrays[name].reshape(-1) for name in names]
+        made.m.most_crossings, made.m.most_stops = (
+            CROSSINGS - 3,
+            max(len(self.buffers.stops) - 8, 1),
+        )
+        self.names = [name for name in made.written if name in self.arrays]
+        self.written = [self.arrays[name].reshape(-1) for name in self.names]
         self.written += [law.z for law in self.laws]
         self.kept = [np.empty_like(x) for x in self.written]
         made.m.laws, made.m.spans = len(self.laws), len(self.written)
         self.m = self.model_of(made.m)
-        self.m.engine = self.engine()
+        self.put_engine(self.mover)
         self.replace(self.buffers.arrays | self.arrays)
         for span, at, kept in zip(self.m.span, self.written, self.kept, strict=False):
             span.at, span.kept, span.size = self.place(at), self.place(kept), len(at)
         self.put_functions()
-
-    def model_of(self, m: Any) -> Any:
-        """The model, as this row reads it."""
-        raise NotImplementedError
-
-    def engine(self) -> Any:
-        """The engine, as this row calls it."""
-        raise NotImplementedError
-
-    def place(self, array: np.ndarray) -> Any:
-        """An array, as a record names it."""
-        raise NotImplementedError
-
-    def put_functions(self) -> None:
-        """Lets the model name the functions of the user."""
-        raise NotImplementedError
 
     def replace(self, arrays: dict[str, np.ndarray]) -> None:
         """Lets the model name other arrays."""
@@ -109,9 +106,92 @@ class Row:
         blocks = self.arrays.get("blocks")
         return self.m.substeps if blocks is None else int(blocks[i // march.GROWTH_BLOCK])
 
+    def change(self, scenario: Scenario, controller: Controller | None = None) -> None:
+        """Continues in another scene with the same borders."""
+        before = dict(zip(self.names, self.written, strict=False))
+        laws = [law.z.copy() for law in self.laws]
+        self.take(scenario, controller)
+        for name, array in zip(self.names, self.written, strict=False):
+            if name == "table":
+                regions.keep_entries(array, before[name])
+            elif name in before and len(before[name]) == len(array):
+                array[:] = before[name]
+        for law, z in zip(self.laws, laws, strict=False):
+            law.z[law.first :] = z[law.first :]
+        self.go_on()
+
+    # ---- what depends on who advances it
+
+    def model_of(self, m: Any) -> Any:
+        """The model, as this row reads it."""
+        raise NotImplementedError
+
+    def put_engine(self, mover: Mover) -> None:
+        """Lets the model name the engine that moves the arm."""
+        raise NotImplementedError
+
+    def place(self, array: np.ndarray) -> Any:
+        """An array, as a record names it."""
+        raise NotImplementedError
+
+    def put_functions(self) -> None:
+        """Lets the model name the functions of the user."""
+        raise NotImplementedError
+
+    def begin(self, scenario: Scenario) -> None:
+        """Puts the state to the start of a run."""
+        if self.caller is not None:
+            state = self.caller.controller.state
+            self.arrays["buffer"][BUFFER : BUFFER + len(state)] = state
+        for law in self.laws:
+            law.z[:] = law.start
+        self.put_start(*map(float, (*scenario.start, *scenario.velocity)))
+
+    def put_start(self, px: float, py: float, vx: float, vy: float) -> None:
+        """Puts the state to the start of a run, the handle at p with velocity v."""
+        raise NotImplementedError
+
+    def go_on(self) -> None:
+        """Continues in a changed scene."""
+        raise NotImplementedError
+
+    def advance(self, room: int) -> None:
+        """Makes steps until so many rows are filled, other buffers are full, or the run is over."""
+        raise NotImplementedError
+
+    def peek(self) -> np.ndarray:
+        """The row that the next step would write, and the force of the clay, shape (18,)."""
+        raise NotImplementedError
+
+    def is_quiet(self, first: int, n: int) -> bool:
+        """Whether the monitor can have nothing to report on rows, nor had it before."""
+        raise NotImplementedError
+
+    def state(self) -> np.ndarray:
+        """A copy of the state, shape (1,)."""
+        raise NotImplementedError
+
+    def put_state(self, state: np.ndarray) -> None:
+        """Puts a state back."""
+        raise NotImplementedError
+
+    # ---- to return to
+
+    def saved(self) -> Saved:
+        """The run at its sample."""
+        return Saved(self.state(), [x.copy() for x in self.written])
+
+    def restore(self, saved: Saved) -> None:
+        """Returns to a sample."""
+        self.put_state(saved.state)
+        for x, before in zip(self.written, saved.arrays, strict=True):
+            x[:] = before
+
 
 class PlainRow(Row):
     """A row that CPython advances."""
+
+    engine = "python"
 
     def __init__(self, scenario: Scenario, mover: Mover, buffers: Buffers):
         self.s, self.spare = records.State(), records.State()
@@ -120,8 +200,8 @@ class PlainRow(Row):
     def model_of(self, m: Any) -> Any:
         return m
 
-    def engine(self) -> Any:
-        return self.mover.plain
+    def put_engine(self, mover: Mover) -> None:
+        self.mover, self.m.engine = mover, mover.plain
 
     def place(self, array: np.ndarray) -> Any:
         return memoryview(array)  # type: ignore[arg-type]
@@ -133,13 +213,22 @@ class PlainRow(Row):
             slot.z, slot.scratch = memoryview(law.z), memoryview(law.z.copy())
             slot.size = len(law.z)
 
-    def begin(self, scenario: Scenario) -> None:
-        """Puts the state to the start of a run."""
-        begin.begin(self.m, self.s, *map(float, (*scenario.start, *scenario.velocity)))
+    def put_start(self, px: float, py: float, vx: float, vy: float) -> None:
+        begin.begin(self.m, self.s, px, py, vx, vy)
+
+    def go_on(self) -> None:
+        begin.change(self.m, self.s)
 
     def advance(self, room: int) -> None:
-        """Makes steps until so many rows are filled, other buffers are full, or the run is over."""
+        arm.put(self.m, self.s)
         self._made(path.advance, self.m, self.s, room)
+
+    def peek(self) -> np.ndarray:
+        n = self.s.row
+        arm.put(self.m, self.s)
+        self._made(path.peek, self.m, self.s, self.spare)
+        rendered = self.buffers.rendered[n, :2] if self.m.told or self.m.holds else (0.0, 0.0)
+        return np.concatenate((self.buffers.rows[n], rendered))
 
     def _made(self, make: Any, *arguments: Any) -> None:
         """Makes steps, where the step of an exactly straight arm raises."""
@@ -152,19 +241,41 @@ class PlainRow(Row):
                 raise
             self.s.code = path.NOT_FINITE
 
+    def is_quiet(self, first: int, n: int) -> bool:
+        watch.look(self.m, self.s, first, n)
+        return bool(self.s.watch.quiet)
+
+    def state(self) -> np.ndarray:
+        made = np.zeros(1, layout.dtype_of(records.State))
+        layout.save(self.s, made[0])
+        return made
+
+    def put_state(self, state: np.ndarray) -> None:
+        layout.load(self.s, state[0])
+
 
 class NativeRow(Row):
     """A row that the compiled kernel advances."""
 
-    def __init__(self, scenario: Scenario, mover: Mover, buffers: Buffers):
-        from ..native.kernel import machine
+    engine = "native"
 
-        self.machine = machine
-        self.models = np.zeros(1, layout.dtype_of(records.Model))
-        self.states = np.zeros(2, layout.dtype_of(records.State))  # the run's, and a spare
+    def __init__(
+        self, scenario: Scenario, mover: Mover, buffers: Buffers, at: Any = None
+    ):  # fmt: skip
+        """Makes a row.
+
+        Args:
+            scenario: what is run.
+            mover: the engine.
+            buffers: what it fills.
+            at: arrays of one model and one state to lie in; its own if None.
+        """
+        self.machine = native.machine()
+        self.models, self.states = at or (one(records.Model), one(records.State))
         self.s = layout.view_of(records.State, self.states)
         self.addresses = self.models.ctypes.data, self.states.ctypes.data
-        self.which = np.zeros(1, np.int64)
+        self.rooms, self.which = np.zeros(1, np.int64), np.zeros(1, np.int64)
+        self.call = *self.addresses, self.which.ctypes.data, 1
         super().__init__(scenario, mover, buffers)
 
     def model_of(self, m: Any) -> Any:
@@ -172,8 +283,8 @@ class NativeRow(Row):
         layout.save(m, self.models[0])
         return layout.view_of(records.Model, self.models)
 
-    def engine(self) -> Any:
-        return self.mover.row.ctypes.data
+    def put_engine(self, mover: Mover) -> None:
+        self.mover, self.m.engine = mover, mover.row.ctypes.data
 
     def place(self, array: np.ndarray) -> Any:
         return array.ctypes.data
@@ -181,7 +292,7 @@ class NativeRow(Row):
     def put_functions(self) -> None:
         self.called: list[Any] = []
         if self.caller is not None:
-            self.m.control = self._address(CONTROL, lambda buffer: self.caller())
+            self.m.control = self._address(CONTROL, self.caller)
         for slot, law in zip(self.m.law, self.laws, strict=False):
             scratch = law.z.copy()
             slot.z, slot.scratch, slot.size = law.z.ctypes.data, scratch.ctypes.data, len(law.z)
@@ -189,18 +300,39 @@ class NativeRow(Row):
             for name, kind, function in called_by_address(law.module, both):
                 setattr(slot, name, self._address(kind, function))
 
-    def _address(self, kind: Any, function: Any) -> int:
+    def _address(self, kind: Any, function: Any) -> Any:
         made = kind(function)
         self.called.append(made)
-        return ctypes.cast(made, ctypes.c_void_p).value  # type: ignore[return-value]
+        return ctypes.cast(made, ctypes.c_void_p).value
 
-    def begin(self, scenario: Scenario) -> None:
-        """Puts the state to the start of a run."""
-        self.machine.begin_run(*self.addresses, *map(float, (*scenario.start, *scenario.velocity)))
+    def put_start(self, px: float, py: float, vx: float, vy: float) -> None:
+        self.machine.begin_run(*self.addresses, px, py, vx, vy)
+
+    def go_on(self) -> None:
+        self.machine.change(*self.addresses)
 
     def advance(self, room: int) -> None:
-        """Makes steps until so many rows are filled, other buffers are full, or the run is over."""
-        self.machine.advance(*self.addresses, self.which.ctypes.data, 1, room)
+        self.rooms[0] = room
+        self.machine.advance(*self.call, self.rooms.ctypes.data, False)
+
+    def peek(self) -> np.ndarray:
+        shown, spare = np.zeros(SHOWN), one(records.State)
+        self.machine.peek(*self.call, spare.ctypes.data, shown.ctypes.data)
+        return shown
+
+    def is_quiet(self, first: int, n: int) -> bool:
+        return self.machine.look(*self.addresses, first, n)
+
+    def state(self) -> np.ndarray:
+        return self.states.copy()
+
+    def put_state(self, state: np.ndarray) -> None:
+        self.states[:] = state
+
+
+def one(record: Any) -> np.ndarray:
+    """An array of one record."""
+    return np.zeros(1, layout.dtype_of(record))
 
 
 PLACE, FLOAT = ctypes.c_void_p, ctypes.c_double

@@ -9,8 +9,20 @@ import math
 
 from ..formulas import arm as arm_law
 from ..formulas import compensator, controller
-from . import arm, friction, hand, hardware, kick, laws, memory, rows, servo, signals
-from . import viscous, yielding
+from . import (
+    arm,
+    friction,
+    hand,
+    hardware,
+    kick,
+    laws,
+    memory,
+    rows,
+    servo,
+    signals,
+    viscous,
+    yielding,
+)
 
 SLACK = 1e-9  # share of dt: events so close count as one
 REACTION = 1e-9  # [s] a force within this time after a sample counts as that at it
@@ -207,7 +219,10 @@ def on_sensor(m, s, k, ux, uy):
     if not m.hand:
         return ux, uy, pullx, pully
     if s.before == 0.0:
-        hx, hy = ux - hand.resistance(m, x.p, x.v, 0.0, 0), uy - hand.resistance(m, y.p, y.v, 0.0, 1)
+        hx, hy = (
+            ux - hand.resistance(m, x.p, x.v, 0.0, 0),
+            uy - hand.resistance(m, y.p, y.v, 0.0, 1),
+        )
         return hx, hy, pullx, pully
     ax, ay = acceleration(m, k, fx - pullx, fy - pully, t1, t2)
     return hx - m.x.mass * ax, hy - m.y.mass * ay, pullx, pully
@@ -231,9 +246,7 @@ def reaction(m, s, k, fx, fy, t1, t2):
     """
     x, y, h = k.x, k.y, REACTION
     ax, ay = acceleration(m, k, fx, fy, t1, t2)
-    B = controller.velocity_per_force(
-        (1.0, 1.0), (k.Wxx, k.Wxy, k.Wyy), (m.x.mass, m.y.mass, 0.0)
-    )
+    B = controller.velocity_per_force((1.0, 1.0), (k.Wxx, k.Wxy, k.Wyy), (m.x.mass, m.y.mass, 0.0))
     ax, ay = ax - x.c, ay - y.c
     vx, vy = viscous.along(m, x.v, y.v)
     x.stuck0, y.stuck0 = s.e.x.stuck, s.e.y.stuck
@@ -317,6 +330,7 @@ def advance(m, s, i, shift):
     to.rate = a[5] * d + a[6] * e + a[7] * y + a[8] * r + a[9] * f
     to.y = a[10] * d + a[11] * e + a[12] * y + a[13] * r + a[14] * f
     to.yrate = a[15] * d + a[16] * e + a[17] * y + a[18] * r + a[19] * f
+
 
 def advance_form(m, i, z, to, shift):
     """The same of a compensator of another shape."""

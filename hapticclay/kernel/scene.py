@@ -106,6 +106,11 @@ def steady_force(s: Scenario) -> tuple[float, float]:
     return float(x), float(y)
 
 
+def takes_gain(m: Any) -> bool:
+    """Whether another gain changes nothing but the numbers K of the compensators."""
+    return not m.formed and m.method == methods.CONTINUOUS
+
+
 # ---- clay ----------------------------------------------------------------------------------------
 
 

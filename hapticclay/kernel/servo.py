@@ -10,9 +10,7 @@ def ready_form(m, s, k):
     """Makes compensator.form_kick for the steps around a sample, unless it is ready."""
     if s.form_before != k.before or s.form_after != k.after:
         for i in range(2):
-            compensator.form_kick(
-                m.form, m.order, i, k.before, k.after, s.form_work, s.form_kick
-            )
+            compensator.form_kick(m.form, m.order, i, k.before, k.after, s.form_work, s.form_kick)
         s.form_before, s.form_after = k.before, k.after
 
 
@@ -107,7 +105,10 @@ def servo_law(m, s, k):
             o.ref_feed = take * c[2] * c[0] * o.feed
     if m.formed:
         x, y, c, e = k.x, k.y, m.x.servo, m.y.servo
-        tx, ty = 1.0 / (1.0 / k.H + c[1] * k.R) * c[2] * c[0], 1.0 / (1.0 / k.H + e[1] * k.R) * e[2] * e[0]
+        tx, ty = (
+            1.0 / (1.0 / k.H + c[1] * k.R) * c[2] * c[0],
+            1.0 / (1.0 / k.H + e[1] * k.R) * e[2] * e[0],
+        )
         k.Sxx, k.Syy = k.Sxx + x.n * tx * x.feed, k.Syy + y.n * ty * y.feed
 
 

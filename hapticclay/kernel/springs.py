@@ -50,9 +50,7 @@ def move(m, s, px, py, h):
     for i in range(2):
         z, p, before = s.axis[i], py if i else px, s.axis[i].rest
         z.rest, f, kept0, lost0 = law.spring_step(z.k, z.k_limit, z.way, z.rest, p)
-        z.stretch, f1, kept1, lost1 = law.relaxing_step(
-            z.k1, z.tau, z.way, z.stretch, p - z.at, h
-        )
+        z.stretch, f1, kept1, lost1 = law.relaxing_step(z.k1, z.tau, z.way, z.stretch, p - z.at, h)
         kept, lost = kept + (kept0 + kept1), lost + (lost0 + lost1)
         z.at, z.force = p, f + f1
         if h > 0.0:

@@ -31,11 +31,13 @@ class UserLaw(NamedTuple):
         module: its functions.
         z: parameters and state.
         first: index of the state.
+        start: parameters and state at the start of a run.
     """
 
     module: Any
     z: np.ndarray
     first: int
+    start: np.ndarray
 
 
 def of_scene(scenario: Scenario) -> tuple[UserLaw, ...]:
@@ -54,5 +56,5 @@ def of_scene(scenario: Scenario) -> tuple[UserLaw, ...]:
             raise ParameterError("clay", scenario.clay, told)
         p = tuple(map(float, scenario.start))
         z = np.array([*numbers, *module.start(numbers, p)], float)
-        laws.append(UserLaw(module, z, len(numbers)))
+        laws.append(UserLaw(module, z, len(numbers), z.copy()))
     return tuple(laws)

@@ -26,7 +26,7 @@ def begin(w):
 
 
 def look(m, s, first, n):
-    """Tests rows from one on, to another; a test that failed once stays failed."""
+    """Tests rows from one on, up to another; a test that failed once stays failed."""
     w = s.watch
     while w.quiet and first < n:
         w.quiet = 1 if is_quiet(m, w, ROW * first) else 0

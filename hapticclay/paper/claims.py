@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..kernel.engine import arm_at
 from ..model import arm
 from ..model.arm import Arm
 from ..model.constants import (
@@ -35,7 +36,6 @@ from ..model.operator import Operator
 from ..model.signals import Multisine
 from ..scene.experiments import GROWTHS, free
 from ..simulation.record import out_of_band_ratio
-from ..stepping.engine import arm_at
 from ..theory import gain_limits, linear_loop, stability_margins
 from ..theory.loops import Loop
 from .ledger import TH, Row, Runs, rightmost, row, steady

@@ -15,11 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import ParameterError, number
+from ..kernel import native
+from ..kernel.pace import STABLE_STEP, check_explicit, fastest_rate
 from ..scene.scenario import Scenario
-from ..stepping.pace import STABLE_STEP, check_explicit, fastest_rate
 from .accuracy import Accuracy
 from .columns import ARRAYS
-from .engines import has_numba
 from .one_run import run_once
 from .record import Record
 from .step_comparison import Comparison, Trace, compare_positions, compare_times, hides_events
@@ -194,7 +194,7 @@ def choices(scenario: Scenario, asked: float, unit: str) -> list[tuple[str, floa
     if scenario.control == "sampled":
         return [("fast", _divided(scenario.Ts or scenario.dt, steps["fast"]))]
     fast = "fast", steps["fast"]
-    if not has_numba():  # the accurate method is too slow in Python
+    if not native.is_there():  # the accurate method is too slow in Python
         return [fast]
     # beyond, the explicit method divides its steps, and other steps are no other runs
     steps["accurate"] = min(

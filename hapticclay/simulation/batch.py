@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
-import contextlib
-import functools
 import itertools
+import math
 import os
-import sys
 import threading
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..arguments import checked
 from ..errors import ParameterError, choice, integer
+from ..kernel.engine import warnings_caught
 from ..model.constants import AXES
 from ..scene.plausible import warn_of
 from ..scene.scenario import Scenario
-from ..stepping import scene
-from ..stepping.engine import warnings_caught
-from ..stepping.many import FEWEST, SUMMARY_CROSSINGS, Lane, Patterns, draws_of, kind_key
-from ..stepping.monitor import Outcome
-from ..stepping.run import PLAIN, Crossing, EngineStore, Kernel, Run, completed
 from . import record
-from .engines import NUMBA, has_numba, load_compiled, outweighs, pays, saved_in_a_step
+from .engines import engine_for
+from .many import SUMMARY_CROSSINGS, Lane, kind_key
+from .monitor import Outcome
+from .run import Crossing, Place, Run, completed
 from .simulate import simulate
 
 KEEP = ("records", "summaries")
@@ -65,8 +61,6 @@ SUMMARY = np.dtype(
         *((name, "f8") for name in WORKS),  # record.Record.energy [J]
     ]
 )
-KNOWN = 100_000  # runs of a sequence counted before the first; more repay any compilation
-ALONE = 1e-3  # time that a run takes Python in addition to its steps, alone, measured [s]
 LAST_ONLY = 1_000_000_000  # value of `every` that keeps only the last sample
 WARNED = 200  # kinds of scene per batch that are checked for implausible values
 
@@ -109,25 +103,22 @@ def simulate_batch(
     todo = checked_scenarios(scenarios, seen)
     first = list(itertools.islice(todo, MANY))
     out = Summaries() if summaries else _Records()
-    if not has_numba():
-        if first:
-            print(f"hapticclay: the batch runs in Python: native {NUMBA}", file=sys.stderr)
+    engine = engine_for("auto", math.inf if first else 0.0)
+    if engine == "python":  # one after the other: side by side they would wait for each other
         for i, scenario in enumerate(itertools.chain(first, todo)):
-            r = simulate(scenario, every=every, engine="python")
+            r = simulate(scenario, every=every, engine=engine)
             out.put(i, [summary_entry(*record.brief(r))] if summaries else [r])
         return out.all()
     pool, together = BatchPool(every), summaries and len(first) == MANY
-    known = scenarios if isinstance(scenarios, Sequence) and len(scenarios) <= KNOWN else ()
-    plan = Plan(pool, known, together)
 
-    def make(jobs: list[Job]) -> Any:
+    def make(jobs: list[Scenario]) -> Any:
         if summaries:
-            return _summaries_of(pool, plan, jobs)
-        return [record.Record.of(*pool.run(j.scenario, j.kernel)) for j in jobs]
+            return _summaries_of(pool, jobs, together)
+        return [record.Record.of(*pool.run(s)) for s in jobs]
 
-    parts = map(plan.jobs, _in_parts(itertools.chain(first, todo), together))
     with warnings_caught():
         count = max(min(threads, len(first)), 1)
+        parts = _in_parts(itertools.chain(first, todo), together)
         on_threads(parts, make, out.put, count, pool.stop)
     return out.all()
 
@@ -135,234 +126,52 @@ def simulate_batch(
 Part = TypeVar("Part", bound=Sized)
 
 
-class Job(NamedTuple):
-    """A run of a batch.
-
-    Attributes:
-        scenario: what to run.
-        key: from many.kind_key for a run made together with others; else None.
-        kernel: how the steps of a run made alone are made.
-    """
-
-    scenario: Scenario
-    key: Any
-    kernel: Kernel
-
-
 class BatchPool:
-    """What each thread of a batch owns: engines, and what runs of one kind share.
+    """What each thread of a batch owns: a place for its runs, and what runs of one kind share.
 
     Args:
-        every: keep each every-th sample, and the last.
-
-    Attributes:
-        stop: set when the batch ends early, so that no run begins.
+        every: keep each every-th sample.
     """
 
     def __init__(self, every: int):
         self.every, self.stop = every, threading.Event()
-        self.own, self.turn = threading.local(), threading.Lock()
-
-    def _go(self, scenario: Scenario, every: int, kernel: Kernel, brief: bool) -> tuple[Run, float]:
-        """The run, made by this thread's engines, and the seconds it took."""
-        # in CPython one after the other: side by side they would wait for each other at each step
-        with self.turn if kernel is PLAIN else contextlib.nullcontext():
-            if self.stop.is_set():
-                raise CancelledError
-            return completed(scenario, every, kernel, self.store(), None, brief)
-
-    def store(self) -> EngineStore:
-        """The engines of this thread."""
-        if not hasattr(self.own, "store"):
-            self.own.store = EngineStore()
-        return self.own.store
+        self.own = threading.local()
 
     def lane(self) -> Lane:
         """The lane of this thread, which makes runs of one kind together."""
         if not hasattr(self.own, "lane"):
-            from ..stepping.compiled import CARRY, KERNEL, RESET  # where it pays
-
-            self.own.lane = Lane(KERNEL, self.store(), CARRY, RESET)
+            self.own.lane = Lane(Place())
         return self.own.lane
 
-    def run(self, scenario: Scenario, kernel: Kernel) -> tuple[Run, float]:
+    def _go(self, scenario: Scenario, every: int, brief: bool) -> tuple[Run, float]:
+        """The run, made at this thread's place, and the seconds it took."""
+        if self.stop.is_set():
+            raise CancelledError
+        return completed(scenario, every, "native", self.lane().place, None, brief)
+
+    def run(self, scenario: Scenario) -> tuple[Run, float]:
         """Makes a run.
 
-        Args:
-            scenario: what to run.
-            kernel: how its steps are made.
-
         Returns:
-            The run, and the seconds it took.
+            The run and the seconds it took.
         """
-        return self._go(scenario, self.every, kernel, False)
+        return self._go(scenario, self.every, False)
 
-    def brief(self, scenario: Scenario, kernel: Kernel) -> tuple[Any, ...]:
-        """The end of a run, without its samples.
-
-        Args:
-            scenario: what to run.
-            kernel: how its steps are made.
-
-        Returns:
-            As Run.brief.
-        """
-        return self._go(scenario, LAST_ONLY, kernel, True)[0].brief()
+    def brief(self, scenario: Scenario) -> tuple[Any, ...]:
+        """The end of a run, without its samples."""
+        return self._go(scenario, LAST_ONLY, True)[0].brief()
 
     def many(
         self, scenarios: Sequence[Scenario], keys: Sequence[Any]
     ) -> tuple[list[tuple[np.ndarray, dict[str, Any]]], list[int]]:
         """Makes short runs of one kind together, without their samples.
 
-        Args:
-            scenarios: what to run.
-            keys: as Job.key.
-
         Returns:
-            As many.Lane.make.
+            As Lane.make.
         """
         if self.stop.is_set():
             raise CancelledError
         return self.lane().make(scenarios, keys)
-
-
-class Plan:
-    """Chooses how each run of a batch is made: compiled where the runs of its kind repay it.
-
-    All runs of the batch count where they are known beforehand, else those taken so far.
-
-    Args:
-        pool: makes the runs.
-        known: all scenarios of the batch; empty where they are not known beforehand.
-        together: whether runs of one kind may be made together.
-    """
-
-    def __init__(self, pool: BatchPool, known: Sequence[Scenario], together: bool):
-        self.pool, self.together, self.known = pool, together, bool(known)
-        self.lock = threading.Lock()
-        self.kernels: dict[Any, Kernel] = {}  # by traits of a scene
-        # steps of runs made alone, by traits of their scene
-        self.expected: defaultdict[Any, float] = defaultdict(float)
-        self.patterns = Patterns()
-        self.carried: dict[Any, bool] = {}  # kinds of run made together: whether compiled yet
-        kinds: dict[Any, list[Scenario]] = {}
-        for s in known:
-            key = kind_key(s) if together else None
-            if key is None:
-                self.expected[scene.traits(s)] += s.t_max / s.dt
-            else:
-                kinds.setdefault(key, []).append(s)
-        for key, jobs in kinds.items():
-            self._count(key, jobs)
-        for key, jobs in kinds.items():
-            if self._repay(key, jobs):
-                self.carried[key] = False
-            else:
-                self.expected[scene.traits(jobs[0])] += sum(s.t_max / s.dt for s in jobs)
-
-    def jobs(self, scenarios: list[Scenario]) -> list[Job]:
-        """Jobs of the batch for one thread; compiles what they need.
-
-        Args:
-            scenarios: of the runs.
-        """
-        if not self.together:
-            return [Job(s, None, self.kernel(s)) for s in scenarios]
-        keys, kinds = [kind_key(s) for s in scenarios], dict[Any, list[Scenario]]()
-        for key, s in zip(keys, scenarios, strict=True):
-            kinds.setdefault(key, []).append(s)
-        kinds.pop(None, None)
-        made = {key for key, jobs in kinds.items() if self._carries(key, jobs)}
-        return [
-            Job(s, key, PLAIN) if key in made else Job(s, None, self.kernel(s))
-            for s, key in zip(scenarios, keys, strict=True)
-        ]
-
-    @functools.cached_property
-    def compiled(self) -> Any:
-        """The module stepping.compiled; None where it cannot be loaded."""
-        return load_compiled()
-
-    def takes(self, key: Any, like: Scenario, n: int) -> bool:
-        """Whether n runs, all of their kind, are made together; if so, compiles what they need.
-
-        Args:
-            key: of the kind.
-            like: one of the runs.
-            n: how many there are.
-        """
-        return self._carries(key, [like] * min(n, KNOWN))
-
-    def _carries(self, key: Any, jobs: list[Scenario]) -> bool:
-        """Whether runs of a kind are made together; if so, compiles what they need."""
-        if key not in self.carried:
-            if self.known:
-                return False
-            self._count(key, jobs)
-            if not self._repay(key, jobs):
-                return False
-            self.carried[key] = False
-        if self.compiled is None:
-            return False
-        if not self.carried[key]:
-            pattern = self.patterns.of(key, jobs[0])
-            with self.compiled.first_call(carried, pattern.kind, "many runs of this kind"):
-                self.pool.lane().group(pattern, draws_of(jobs[:1]))
-            self.carried[key] = True
-        return True
-
-    def _count(self, key: Any, jobs: list[Scenario]) -> None:
-        """Adds the time that making runs of a kind together would save."""
-        if len(jobs) < FEWEST:
-            return
-        pattern = self.patterns.of(key, jobs[0])
-        steps = 0.0 if is_ready(pattern.scene) else sum(s.t_max / s.dt for s in jobs)
-        # half: runs tend to end before t_max
-        time = ALONE * len(jobs) + 0.5 * saved_in_a_step(jobs[0]) * steps
-        saved[pattern.kind] = saved.get(pattern.kind, 0.0) + time
-
-    def _repay(self, key: Any, jobs: list[Scenario]) -> bool:
-        """Whether runs of a kind, with those counted so far, repay code to make them together."""
-        if len(jobs) < FEWEST:
-            return False
-        pattern = self.patterns.of(key, jobs[0])
-        if not pattern.is_made or pattern.kind in carried:
-            return pattern.is_made
-        return outweighs(saved[pattern.kind], pattern.kind)
-
-    def kernel(self, s: Scenario) -> Kernel:
-        """How the steps of a run made alone are made; compiles them if needed.
-
-        Args:
-            s: what to run.
-        """
-        traits = scene.traits(s)
-        with self.lock:
-            if traits in self.kernels:
-                return self.kernels[traits]
-            known = traits in self.expected
-            if not pays(s, self.expected.pop(traits, s.t_max / s.dt)):
-                if known:
-                    self.kernels[traits] = PLAIN
-                return PLAIN
-            self.kernels[traits] = self.compiled.KERNEL if self.compiled else PLAIN
-            if self.compiled:
-                self.compiled.warm(s)
-            return self.kernels[traits]
-
-
-carried: set[Any] = set()  # kinds whose code for many runs is compiled or loaded in this process
-saved: dict[Any, float] = {}  # time that this would have saved so far, by kind [s]
-
-
-def is_ready(kind: Any) -> bool:
-    """Whether machine code for steps of a kind of scene is loaded.
-
-    Args:
-        kind: from machine_code.kind_of.
-    """
-    compiled = sys.modules.get("hapticclay.stepping.compiled")
-    return compiled is not None and kind in compiled.ready
 
 
 class _Records:
@@ -449,23 +258,16 @@ def _in_parts(scenarios: Iterable[Scenario], together: bool) -> Iterator[list[Sc
         yield part
 
 
-def _summaries_of(pool: BatchPool, plan: Plan, jobs: list[Job]) -> np.ndarray:
-    """Summaries of runs.
-
-    Args:
-        pool: makes them.
-        plan: how.
-        jobs: what to run.
-    """
-    out, keys = np.zeros(len(jobs), SUMMARY), [j.key for j in jobs]
-    together = any(key is not None for key in keys)
-    done, left = pool.many([j.scenario for j in jobs], keys) if together else ([], range(len(jobs)))
-    for places, fields in done:
-        for name, values in fields.items():
-            out[name][places] = values
+def _summaries_of(pool: BatchPool, jobs: list[Scenario], together: bool) -> np.ndarray:
+    """Summaries of runs."""
+    out, left = np.zeros(len(jobs), SUMMARY), list(range(len(jobs)))
+    if together:
+        done, left = pool.many(jobs, [kind_key(s) for s in jobs])
+        for places, fields in done:
+            for name, values in fields.items():
+                out[name][places] = values
     for i in left:
-        s, key, kernel = jobs[i]
-        out[i] = summary_entry(*pool.brief(s, kernel if key is None else plan.kernel(s)))
+        out[i] = summary_entry(*pool.brief(jobs[i]))
     return out
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -9,17 +10,18 @@ import numpy as np
 
 from ..arguments import checked
 from ..errors import ParameterError, array_of, field_types, integer, number
+from ..kernel import scene
+from ..kernel.engine import warnings_caught
 from ..model.cells import Profile
 from ..model.constants import AXES
 from ..scene.changes import HAND, with_fields
 from ..scene.fields import bounds_at
 from ..scene.scenario import Scenario
-from ..stepping import scene
-from ..stepping.engine import warnings_caught
-from ..stepping.many import FEWEST, Draws, Pattern, draws_of, kind_key
 from . import batch
-from .engines import has_numba
+from .engines import engine_for
+from .many import FEWEST, Draws, draws_of, kind_key
 
+MOST = 4096  # runs of one part: their models and states take 40 MB
 PART = 100_000.0  # steps of one part of the work of a thread: a quarter of a second
 PAIRS = {
     "gain": "gain",
@@ -56,10 +58,10 @@ def simulate_columns(
     """
     threads = integer("threads", batch.cores() if threads is None else threads, 1, 1024)
     drawn = Columns(base, columns)
-    lane = _Lanes(drawn) if has_numba() and len(drawn) >= batch.MANY and drawn.is_plain else None
-    if lane is None or not lane.repay():
+    many = len(drawn) >= batch.MANY and drawn.is_plain
+    if not many or engine_for("auto", math.inf) == "python":
         return batch.simulate_batch(drawn.scenarios(), threads=threads, keep="summaries")
-    return lane.run(threads)
+    return _Lanes(drawn).run(threads)
 
 
 class Columns:
@@ -206,7 +208,7 @@ def _check_bounds(base: Scenario, name: str, column: np.ndarray) -> None:
 
 
 class _Lanes:
-    """Makes these runs by compiled code, on threads.
+    """Makes these runs together, on threads.
 
     Args:
         drawn: the runs.
@@ -214,21 +216,15 @@ class _Lanes:
 
     def __init__(self, drawn: Columns):
         self.drawn, self.pool = drawn, batch.BatchPool(1)
-        self.plan = batch.Plan(self.pool, (), True)
-        self.pattern: Pattern = self.plan.patterns.of(drawn.key, drawn.like)
-
-    def repay(self) -> bool:
-        """Whether compiled code repays itself; if so, compiles it."""
-        return self.plan.takes(self.drawn.key, self.drawn.like, len(self.drawn))
 
     def run(self, threads: int) -> np.ndarray:
         """Makes all runs.
 
-        Args:
-            threads: number of threads.
+        Returns:
+            Their summaries.
         """
         like, n = self.drawn.like, len(self.drawn)
-        size = max(FEWEST, int(PART * like.dt / like.t_max))
+        size = max(FEWEST, min(int(PART * like.dt / like.t_max), MOST))
         parts = (range(k, min(k + size, n)) for k in range(0, n, size))
         out = batch.Summaries()
         with warnings_caught():
@@ -236,20 +232,21 @@ class _Lanes:
         return out.all()
 
     def part(self, rows: range) -> np.ndarray:
-        """Summaries of some runs.
-
-        Args:
-            rows: their rows.
-        """
+        """Summaries of some runs."""
         drawn, lane = self.drawn, self.pool.lane()
         d, out = drawn.draws(rows.start, rows.stop), np.zeros(len(rows), batch.SUMMARY)
-        fields, good = lane.group(lane.patterns.of(drawn.key, drawn.like), d)
+        pattern = lane.pattern(drawn.key, drawn.like)
+        if not pattern.is_made:
+            scenes = [drawn.scenario(k) for k in rows]
+            return np.array(
+                [batch.summary_entry(*self.pool.brief(s)) for s in scenes], batch.SUMMARY
+            )
+        fields, good = lane.group(pattern, d)
         alike = drawn.of_kind(d)
         keep = alike[good]
         good &= alike
         for name, values in fields.items():
             out[name][good] = values[keep]
         for i in np.flatnonzero(~good).tolist():
-            s = drawn.scenario(rows[i])
-            out[i] = batch.summary_entry(*self.pool.brief(s, self.plan.kernel(s)))
+            out[i] = batch.summary_entry(*self.pool.brief(drawn.scenario(rows[i])))
         return out

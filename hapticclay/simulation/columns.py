@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..scene.scenario import Scenario
-from ..stepping.monitor import Outcome
+from .monitor import Outcome
 
 ARRAYS = {
     "t": "s",

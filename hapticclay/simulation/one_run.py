@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from ..errors import ParameterError, choice
+from ..errors import ParameterError
+from ..kernel.engine import warnings_caught
 from ..scene.scenario import Scenario
-from ..stepping.engine import warnings_caught
-from ..stepping.run import borrowed_store, completed
-from .engines import ENGINES, kernel_for
+from .engines import engine_for
 from .memory import memory_left
 from .record import Record
+from .run import borrowed_place, completed
 
 SAMPLE = 430  # bytes per kept sample at the end of a run, measured
 SMALL_MEMORY = 2.0**28  # [bytes] smaller runs skip the check of memory
@@ -36,11 +36,10 @@ def run_once(
     """
     check_memory(scenario, every)
     if scenario.controller is not None:
-        scenario.controller.function()  # refused before anything is compiled
-    with warnings_caught():
-        kernel = kernel_for(scenario, choice("engine", engine, ENGINES))
-        with borrowed_store() as store:
-            return Record.of(*completed(scenario, every, kernel, store, progress))
+        scenario.controller.function()  # refused before a run is made
+    engine = engine_for(engine, scenario.t_max / scenario.dt)
+    with warnings_caught(), borrowed_place() as place:
+        return Record.of(*completed(scenario, every, engine, place, progress))
 
 
 def check_memory(scenario: Scenario, every: int) -> None:

@@ -10,25 +10,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..model import arm
+from ..formulas import arm
+from ..kernel import layout, mover, path, records
+from ..kernel.hardware import QUEUED
+from ..kernel.memories import delay_in_samples
+from ..kernel.row import Buffers, Row
+from ..model.sampled_controller import BUFFER
 from ..scene.scenario import Scenario
-from ..stepping import many, scene
-from ..stepping.hardware import QUEUED
-from ..stepping.machine_code import kind_of, leaves
-from ..stepping.memories import delay_in_samples
-from ..stepping.parts import Parts
-from ..stepping.run import PLAIN, EngineStore, with_checked
-from ..stepping.state import OPEN, State
-from ..stepping.vector import kind_of_steps
-from . import engines
-from .copies import CompiledSteps, Copies, PlainSteps, leaves_of, ring_of
+from .engines import engine_for
+from .run import ROWS, with_checked
 
 KICK = 1e-6  # in SI units: the squares of angles are 1e-6 of it, their rounding is 1e-10 of it
 LINEAR = 1e-4  # share of the ends by which that of all kicks may miss the sum of those of each
 ROUNDED = 1e-8  # of an end, per kick
 MOST = 100  # coordinates of a scene
 SETTLED = 1  # periods after which each step follows a whole one
-KINDS = 8  # of scenes, kept ready
 
 
 class PeriodMap(NamedTuple):
@@ -50,206 +46,204 @@ class PeriodMap(NamedTuple):
 
 
 class PeriodMaps:
-    """The maps of scenes.
+    """The maps of scenes, which share engines and buffers."""
 
-    Args:
-        expected: about how many; many of a kind repay machine code.
-    """
-
-    def __init__(self, expected: int):
-        self.expected, self.kinds = expected, dict[Any, MapsOfKind]()
+    def __init__(self):
+        self.movers, self.buffers = mover.Movers(), Buffers()
+        self.coupled: set[Any] = set()  # kinds of scene in which one axis has acted on the other
 
     def of(self, s: Scenario, i: int) -> PeriodMap | None:
         """The map of a scene around its start, at rest.
 
         Args:
-            s: the scene; its velocity and constant force are ignored.
-            i: index of the axis, 0 or 1.
+            s: the scene; its velocity and force count as 0.
+            i: axis along which small motions are asked for.
 
         Returns:
-            The map; None where small motions are not linear or differ between periods, and for
-            more than MOST coordinates.
+            None for a scene that has none: see `has_map`, and where the handle does not stay at
+            rest or the map is not linear.
         """
         end = (MOST + SETTLED) * (s.Ts or s.dt)  # longer than any map takes
         s = with_checked(s, velocity=(0.0, 0.0), force=(0.0, 0.0), t_max=end, length=None)
-        parts = scene.parts_of(s)
-        warm = warm_periods(parts)
-        if not has_map(s, parts) or warm + 1 > MOST:
+        row = ROWS[engine_for("auto")](s, self.movers.of(s), self.buffers)
+        warm = warm_periods(row.m)
+        if not has_map(s, row.m) or warm + 1 > MOST:
             return None
-        key = kind_of(parts), s.arm, s.clay and s.clay.angle, s.hardware is None
-        if key not in self.kinds:
-            if len(self.kinds) >= KINDS:
-                del self.kinds[next(iter(self.kinds))]
-            self.kinds[key] = MapsOfKind(s, parts, self.expected)
-        return self.kinds[key].of(s, parts, i, warm)
+        kind = s.arm, s.clay and s.clay.angle, s.hardware is None, s.control
+        copies = Map(row, kind in self.coupled)
+        found = copies.of(s, i, warm)
+        if copies.coupled:
+            self.coupled.add(kind)
+        return found
 
 
 # ---- which scenes have a map ---------------------------------------------------------------------
 
 
-def has_map(s: Scenario, parts: Parts) -> bool:
+def has_map(s: Scenario, m: Any) -> bool:
     """Whether small motions of a scene are linear, and alike in each period.
 
     Args:
         s: the scene.
-        parts: of the scene.
+        m: its model.
     """
-    x, special, clay = parts.sampler, parts.special, parts.clay
-    if s.driven or parts.accurate is not None or (clay is not None and clay.growth is not None):
-        return False
-    if special is not None and any((special.smooth, special.flow, special.groove, special.more)):
-        return False
-    uneven = () if x is None else (x.encoder, x.chance, x.adc, x.dac, x.friction, x.passivity)
-    return all(part is None for part in uneven)
+    uneven = m.grows, m.smooth, m.flow, m.modal, m.groove, m.laws
+    wires = m.encoder, m.chance, m.adc_bits, m.dac_bits, m.friction, m.guard
+    return not (
+        s.driven or s.integrator != "fast" and s.control != "sampled" or any(uneven + wires)
+    )
 
 
-def warm_periods(parts: Parts) -> int:
-    """Periods after which the rings of the hardware are full.
-
-    Args:
-        parts: of the scene.
-    """
-    x = parts.sampler
-    if x is None:
-        return SETTLED
-    window = 0 if x.difference is None else x.difference.velocity_window
-    late = -1 if x.delay is None else delay_in_samples(x.delay.delay, x.Ts)[0]
-    return max(SETTLED, window, late + 1)
+def warm_periods(m: Any) -> int:
+    """Periods after which the rings of the hardware are full."""
+    late = delay_in_samples(m.delay, m.Ts)[0] if m.delay > 0.0 else -1
+    return max(SETTLED, m.window, late + 1) if m.ratio else SETTLED
 
 
 # ---- coordinates ---------------------------------------------------------------------------------
+
+
+def number_of(*names: Any) -> int:
+    """Index of a number of a state, by names and indices that lead to it."""
+    kind, at = layout.dtype_of(records.State), 0
+    for name in names:
+        if isinstance(name, int):
+            kind = kind.base if kind.subdtype else kind
+            at += name * kind.itemsize
+        else:
+            kind, first = kind.fields[name][:2]
+            at += first
+            kind = kind.subdtype[0] if kind.subdtype else kind
+    return at // 8
 
 
 class Ring(NamedTuple):
     """Numbers of past samples on which the next ones depend.
 
     Attributes:
-        part: of the sampler, which has it.
-        first: which number of the state gives its first row.
-        filled: which number of the state gives the number of its rows; None where all count.
+        name: of the array.
+        first: field of the machine that gives its first row; "" for a fixed one.
+        filled: field that gives the number of its rows; "" where all count.
         width: numbers of a row.
         columns: those of them that are coordinates of x, and of y.
     """
 
-    part: str
-    first: int
-    filled: int | None
+    name: str
+    first: str
+    filled: str
     width: int
     columns: tuple[tuple[int, ...], tuple[int, ...]]
 
-    def places(self, state: np.ndarray, size: int, i: int) -> np.ndarray:
+    def places(self, machine: Any, size: int, i: int) -> np.ndarray:
         """Where the coordinates of an axis lie.
 
         Args:
-            state: numbers of a state.
+            machine: of a state.
             size: of the ring.
             i: index of the axis.
         """
+        if not self.first:
+            return np.array(self.columns[i], int)
         rows = size // self.width
-        count = rows if self.filled is None else int(state[self.filled])
-        row = (int(state[self.first]) + np.arange(count)) % rows
-        return (row[:, None] * self.width + np.array(self.columns[i])).ravel()
+        count = int(machine[self.filled]) if self.filled else rows
+        at = (int(machine[self.first]) + np.arange(count)) % rows
+        return (at[:, None] * self.width + np.array(self.columns[i])).ravel()
 
 
-def coordinates(at: State, i: int) -> list[int]:
+def coordinates(m: Any, i: int) -> list[int]:
     """The numbers of a state that change in small motions along an axis.
 
     Link i moves the handle along axis i at the nominal pose. Angle and rate of its joint come
     first.
 
     Args:
-        at: the state with the index in `many.numbers_of` in place of each number.
+        m: a model.
         i: index of the axis.
     """
-    x = at.clay.laws and at.clay.laws.elastic
-    springs = x and (x.rest[i], x.stretch[i], x.at[i], x.force[i], x.before[i])
-    owed = at.clay.reaction and at.clay.reaction.owed
-    loop = controller_of(at.loop, i)
-    found = leaves((at.body.q[i], at.body.w[i], loop, owed and owed[i], springs))
-    return [x for x in found if x is not None]
+    joint = [number_of("q2" if i else "q1"), number_of("w2" if i else "w1")]
+    names = ["owed"] if m.special and m.acts else []
+    names += ["rest", "stretch", "at", "force", "force_before"] if m.springs else []
+    loop = ["delta", "rate", "y", "yrate"]
+    clay = [number_of("axis", i, name) for name in names]
+    if not m.ratio:
+        form = [number_of("axis", i, "z") + r for r in range(4)] if m.formed else []
+        return [*joint, *(number_of("axis", i, name) for name in loop), *form, *clay]
+    held = ["tau"] + ["w"] * bool(m.window)
+    if not m.own:
+        held += loop + ["pull", "pull_rate", "tool"] * bool(m.coupling)
+    found = [number_of("now", "axis", i, name) for name in held]
+    if m.filtered:
+        found += [number_of("now", "axis", i, "filter") + r for r in range(2)]
+    if m.formed and not m.own:
+        found += [number_of("now", "axis", i, "z") + r for r in range(4)]
+    return [*joint, *found, *clay]
 
 
-def controller_of(loop: Any, i: int) -> Any:
-    """The part of `coordinates` in controller and hardware.
-
-    Args:
-        loop: of a state.
-        i: index of the axis.
-    """
-    if not hasattr(loop, "machine"):
-        return (loop.x, loop.y)[i], loop.form and loop.form[i]
-    m = loop.machine
-    wires = m.hold.tau[i], m.rates and m.rates.w[i], m.filtered and m.filtered[2 * i : 2 * i + 2]
-    if m.own is not None:
-        return wires, m.own if i == 0 else None
-    pull = m.hold.pull and (m.hold.pull.f[i], m.hold.pull.u[i])
-    form = m.form and (m.form.x, m.form.y)[i]
-    return wires, (m.x, m.y)[i], form, pull, m.tool and m.tool[i]
-
-
-def rings_of(parts: Parts, at: State) -> list[Ring]:
-    """The rings of the hardware.
-
-    Args:
-        parts: of the scene.
-        at: as in `coordinates`.
-    """
-    x, found = parts.sampler, []
-    if x is not None and x.difference is not None:
-        found.append(Ring("difference", at.loop.machine.rates.oldest, None, 3, ((1,), (2,))))
-    if x is not None and x.delay is not None:
-        queue = at.loop.machine.queue
-        columns = ((1,), (2,)) if x.coupling is None else ((1, 7, 9), (2, 8, 10))
-        found.append(Ring("delay", queue.first, queue.n, QUEUED, columns))
+def rings_of(m: Any) -> list[Ring]:
+    """The rings of the hardware, and the state of the user's own controller."""
+    found = []
+    if m.window:
+        found.append(Ring("angles", "oldest", "", 3, ((1,), (2,))))
+    if m.delay > 0.0:
+        columns = ((1, 7, 9), (2, 8, 10)) if m.coupling else ((1,), (2,))
+        found.append(Ring("queue", "first", "n", QUEUED, columns))
+    if m.own:
+        state = tuple(range(BUFFER, BUFFER + m.buffer_size))
+        found.append(Ring("buffer", "", "", 1, (state, ())))
     return found
+
+
+# ---- copies --------------------------------------------------------------------------------------
+
+
+class Copies(NamedTuple):
+    """Copies of a run.
+
+    Attributes:
+        states: of the copies.
+        rings: numbers of each, shape (copies, size).
+    """
+
+    states: np.ndarray
+    rings: list[np.ndarray]
+
+    def repeated(self, n: int) -> Copies:
+        """Each copy n times."""
+        return Copies(np.repeat(self.states, n), [np.repeat(x, n, axis=0) for x in self.rings])
+
+    @property
+    def arrays(self) -> list[np.ndarray]:
+        """All numbers in which the copies may differ, shape (copies, size) each."""
+        return [self.states.view(float).reshape(len(self.states), -1), *self.rings]
 
 
 # ---- the map -------------------------------------------------------------------------------------
 
 
-class MapsOfKind:
-    """The maps of scenes of one kind.
+class Map:
+    """Makes the map of a scene.
 
     Args:
-        s: one of them.
-        parts: of it.
-        expected: number of maps.
+        row: its row.
+        coupled: whether one axis acts on the other in such scenes.
     """
 
-    def __init__(self, s: Scenario, parts: Parts, expected: int):
-        self.store = EngineStore()
-        self.e = self.store.arrays(parts, *self.store.engine(s), PLAIN)
-        state = self._start(s, parts)
-        at, self.numbers = many.places(state), leaves_of(state, float | int)
-        self.own, self.rings = [np.array(coordinates(at, i)) for i in (0, 1)], rings_of(parts, at)
-        self.moving = np.array([*leaves((at.body.q, at.body.w))])
-        machine = getattr(at.loop, "machine", None)
-        self.torques = None if machine is None else machine.hold.tau
-        self.filled, self.code = at.filled.rows, at.status.code
-        self.coupled = False  # whether one axis has acted on the other
-        names = [x.part for x in self.rings]
-        steps = expected * len(self.own[0]) * steps_of_period(parts)
-        self.steps: Any = (
-            CompiledSteps(self.store, s, parts, state, names, MOST + 1)
-            if repays(s, parts, state, steps)
-            else PlainSteps(self.store, s, parts, state, names)
-        )
+    def __init__(self, row: Row, coupled: bool):
+        self.row, self.coupled, self.rings = row, coupled, rings_of(row.m)
+        self.own = [np.array(coordinates(row.m, i)) for i in (0, 1)]
+        self.moving = [number_of(name) for name in ("q1", "q2", "w1", "w2")]
+        self.torques = [number_of("now", "axis", i, "tau") for i in (0, 1)]
 
-    def _start(self, s: Scenario, parts: Parts) -> State:
-        return scene.start(parts, s, self.e)
-
-    def of(self, s: Scenario, parts: Parts, i: int, warm: int) -> PeriodMap | None:
-        """The map of a scene.
+    def of(self, s: Scenario, i: int, warm: int) -> PeriodMap | None:
+        """The map.
 
         Args:
-            s: the scene, at rest.
-            parts: of the scene.
-            i: index of the axis.
-            warm: periods before the one of the map.
+            s: the scene.
+            i: axis of the small motions.
+            warm: periods after which rings are full.
         """
-        state, n = self._start(s, parts), steps_of_period(parts)
-        self.steps.take(parts)
-        rest = self._at_rest(parts, state, warm * n)
+        n, q = self.row.m.ratio or 1, (self.row.s.q1, self.row.s.q2)
+        rest = self._at_rest(warm * n)
         if rest is None:
             return None
         axes, matrix = (i,), None if self.coupled else self._matrix(rest, (i,), n)
@@ -261,18 +255,18 @@ class MapsOfKind:
         pushed, seen = np.zeros((2, len(matrix)))
         first = 0
         for j in axes:  # the rate of a joint is the second coordinate of its axis
-            pushed[first + 1], seen[first + 1] = push_of(s, state, i, j)
+            pushed[first + 1], seen[first + 1] = push_of(s, q, i, j)
             first += sum(map(len, self._places(rest, j)))
         return PeriodMap(matrix, n * s.dt, pushed, seen)
 
-    def _at_rest(self, parts: Parts, state: State, n: int) -> Copies | None:
+    def _at_rest(self, n: int) -> Copies | None:
         """The run after n steps; None where it moves."""
-        rings = [ring_of(parts, x.part)[None] for x in self.rings]
-        x = Copies(np.array([self.numbers(state)], float), rings)
-        before = x.states[0, self.moving]
+        rings = [self.row.arrays[x.name].reshape(1, -1).copy() for x in self.rings]
+        x = Copies(self.row.state(), rings)
+        before = x.arrays[0][0, self.moving]
         self._advance(x, n)
-        moves = np.abs(x.states[0, self.moving] - before) > LINEAR * KICK
-        return None if moves.any() or x.states[0, self.code] != OPEN else x
+        moves = np.abs(x.arrays[0][0, self.moving] - before) > LINEAR * KICK
+        return None if moves.any() or x.states["code"][0] != path.OPEN else x
 
     def _matrix(self, rest: Copies, axes: tuple[int, ...], n: int) -> np.ndarray | None:
         """The map of some axes over n steps; None where it is not linear, or others act on them."""
@@ -286,7 +280,7 @@ class MapsOfKind:
         self._advance(x, n)
         before = [coordinates_at(rest, places) for places in kicked]
         after = [coordinates_at(x, self._places(x, i)) for i in axes]
-        if (x.states[:, self.code] != OPEN).any():
+        if (x.states["code"] != path.OPEN).any():
             return None
         if any(a.shape[1] != b.shape[1] for a, b in zip(before, after, strict=True)):
             return None
@@ -294,62 +288,49 @@ class MapsOfKind:
         return linear_map(np.concatenate([b - a for a, b in pairs], axis=1) / KICK)
 
     def _advance(self, x: Copies, n: int) -> None:
-        x.states[:, self.filled] = 0.0
+        x.states["row"] = 0
         self._add_elbow(x, 1.0)
-        self.steps.advance(x, n)
+        arrays = [self.row.arrays[ring.name].reshape(-1) for ring in self.rings]
+        for k in range(len(x.states)):
+            self.row.put_state(x.states[k : k + 1])
+            for array, ring in zip(arrays, x.rings, strict=True):
+                array[:] = ring[k]
+            self.row.advance(n)
+            x.states[k : k + 1] = self.row.state()
+            for array, ring in zip(arrays, x.rings, strict=True):
+                ring[k] = array
         self._add_elbow(x, -1.0)
 
     def _add_elbow(self, x: Copies, sign: float) -> None:
         """Adds the elbow's torque to the shoulder's, or takes it off: then both act on a link."""
-        if self.torques is not None:
-            x.states[:, self.torques[0]] += sign * x.states[:, self.torques[1]]
+        if not self.row.m.ratio:
+            return
+        numbers = x.arrays[0]
+        numbers[:, self.torques[0]] += sign * numbers[:, self.torques[1]]
         for ring, array in zip(self.rings, x.rings, strict=True):
-            if ring.part == "delay":
+            if ring.name == "queue":
                 entries = array.reshape(len(array), -1, ring.width)
                 entries[:, :, 1] += sign * entries[:, :, 2]
 
     def _places(self, x: Copies, i: int) -> list[np.ndarray]:
         """Where the coordinates of an axis lie in the arrays of copies."""
-        pairs = zip(self.rings, x.rings, strict=True)
-        return [self.own[i], *(ring.places(x.states[0], a.shape[1], i) for ring, a in pairs)]
+        pairs, machine = zip(self.rings, x.rings, strict=True), x.states["now"][0]
+        return [self.own[i], *(ring.places(machine, a.shape[1], i) for ring, a in pairs)]
 
 
-def steps_of_period(parts: Parts) -> int:
-    """Engine steps of a period.
-
-    Args:
-        parts: of the scene.
-    """
-    return 1 if parts.sampler is None else parts.sampler.ratio
-
-
-def push_of(s: Scenario, state: State, i: int, j: int) -> tuple[float, float]:
+def push_of(s: Scenario, q: tuple[float, float], i: int, j: int) -> tuple[float, float]:
     """Rate of joint j per velocity of the handle along axis i, and the reverse.
 
     Args:
         s: the scene.
-        state: at its start.
+        q: joint angles at its start [rad].
         i: index of the axis.
         j: index of the joint.
     """
-    q1, q2 = state.body.q
-    u = arm.jacobian(q1, q2, s.arm.links)
+    u = arm.jacobian(*q, s.arm.links)
     r1, r2 = arm.joint_velocity(float(i == 0), float(i == 1), u, 1.0)
     # the rate of joint 2 is that of link 2 less that of link 1
     return (r1, r2 - r1)[j], (u[i] + u[2 + i], u[2 + i])[j]
-
-
-def repays(s: Scenario, parts: Parts, state: State, steps: float) -> bool:
-    """Whether machine code repays itself, and can be had.
-
-    Args:
-        s: a scene.
-        parts: of it.
-        state: of it.
-        steps: that are about to be made.
-    """
-    kind, more = kind_of_steps(kind_of(parts), state), engines.saved_in_a_step(s) * steps
-    return engines.repays_with(kind, more) and engines.load_compiled() is not None
 
 
 def coordinates_at(x: Copies, places: list[np.ndarray]) -> np.ndarray:

@@ -26,12 +26,12 @@ from ..scene.given_values import make_part
 from ..scene.plain_data import plain_data
 from ..scene.scenario import Scenario
 from ..scene.text import scenario_rows
-from ..stepping.monitor import Outcome
-from ..stepping.run import Crossing, Run, Stop
 from ..theory import linear_loop
 from ..theory.stability_margins import Verdict
 from .accuracy import Accuracy
 from .columns import ARRAYS, EXTRA, SCALAR
+from .monitor import Outcome
+from .run import Crossing, Run, Stop
 from .stored import check_head, check_headers, check_times
 
 if TYPE_CHECKING:

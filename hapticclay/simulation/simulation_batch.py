@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked
-from ..errors import ParameterError, array_of, choice, integer, number
+from ..errors import ParameterError, array_of, integer, number
+from ..kernel.engine import warnings_caught
 from ..model.operator import Operator
 from ..scene.scenario import Scenario
-from ..stepping.engine import warnings_caught
-from ..stepping.monitor import Outcome
 from .batch import checked_scenarios, cores
-from .engines import ENGINES, NUMBA, has_numba
+from .engines import engine_for
+from .monitor import Outcome
 from .stepwise import COLUMNS, MOST, MOST_GAIN, gain_of, started_with_operator
 from .vectored import VectoredRuns
 
@@ -56,9 +56,7 @@ class SimulationBatch:
         workers: int | None = None,
         monitored: bool = True,
     ):
-        engine = choice("engine", engine, ENGINES)
-        if engine == "native" and not has_numba():
-            raise ParameterError("engine", engine, NUMBA)
+        engine = engine_for(engine)
         workers = integer("workers", cores() if workers is None else workers, 1, 1024)
         self._warned: set[Any] = set()
         given = list(checked_scenarios(scenarios, self._warned))
@@ -217,7 +215,7 @@ class SimulationBatch:
     @property
     def t(self) -> np.ndarray:
         """Time of the present sample of each run [s], shape (N,)."""
-        return self._runs.common.times.copy()
+        return self._runs.times.copy()
 
     @property
     def p(self) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..stepping.run import Crossing
+from .run import Crossing
 
 ORDER_GAP = 0.5  # largest deviation of an observed order that confirms that of the integrator
 CLOSER = 0.7  # share of the gap of 4h to h that the gap of 2h to h may have; 0.2 at second order

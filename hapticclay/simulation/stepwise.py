@@ -12,24 +12,22 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import checked
-from ..errors import ParameterError, choice, integer, number, numbers_of, pair
+from ..errors import ParameterError, integer, number, numbers_of, pair
+from ..kernel.engine import warnings_caught
+from ..kernel.rows import ROW
 from ..model.hardware import JOINTS
 from ..model.operator import Operator
 from ..model.sampled_controller import Controller
 from ..scene.plausible import warn_of
 from ..scene.scenario import Scenario
-from ..stepping.engine import warnings_caught
-from ..stepping.monitor import Outcome
-from ..stepping.rows import ROW
-from ..stepping.run import PLAIN, EngineStore, Kernel, Run, Snapshot
 from . import record
-from .engines import ENGINES, kernel_for
-from .vectored import repay
+from .engines import engine_for
+from .monitor import Outcome
+from .run import Place, Run, Snapshot
 
 MOST = 1e6  # largest force [N] and torque [N.m] that may be given
 MOST_GAIN = 1e6  # largest K of a scenario [1/kg]
 LOOK = 0.02  # [s] of simulated time between two checks for divergence
-TOLD = 1000  # steps after which to check again whether machine code pays
 COLUMNS = {"q": 0, "p": 2, "v": 4, "fh": 6, "tau": 8, "delta": 10, "b": 12, "qd": 14, "fe": ROW}
 
 
@@ -104,8 +102,8 @@ class Simulation:
         if not isinstance(scenario, Scenario):
             bound = "must be a Scenario, as constant_cut() returns"
             raise ParameterError("scenario", scenario, bound)
-        self._engine = choice("engine", engine, ENGINES)
-        self._lock, self._store, self._untold = threading.Lock(), EngineStore(), 0
+        self._engine, self._maker = engine, engine_for(engine, scenario.t_max / scenario.dt)
+        self._lock, self._place = threading.Lock(), Place()
         self._closed, self._warned, self._recorded = False, (), recorded
         self._monitored = monitored
         self._begin(scenario)
@@ -115,10 +113,8 @@ class Simulation:
         if place != self._warned:  # warn of clay out of reach and the like once
             warn_of(scenario)
             self._warned = place
-        kernel = PLAIN
-        if self._engine == "native":
-            kernel = stepwise_kernel(kernel_for(scenario, self._engine))
-        self._run = Run(scenario, 1, kernel, self._store, watched=True, **self._kept())
+        kept = self._kept()
+        self._run = Run(scenario, 1, self._maker, self._place, watched=True, **kept)
         self._given, self._wall = scenario, 0.0
         self._torque: tuple[float, float] | None = None
         self._forget()
@@ -290,18 +286,8 @@ class Simulation:
             with warnings_caught():
                 if not run.hop(n):
                     run.pause = goal
-                    self._choose(n)
                     run.go(None)
             self._wall += time.perf_counter() - begin
-
-    def _choose(self, n: int) -> None:
-        """Switches to machine code for the steps from now on, where it pays."""
-        run = self._run
-        self._untold += n
-        if self._engine == "auto" and run.kernel is PLAIN and self._untold >= TOLD:
-            if repay(run, self._untold):
-                run.kernel = stepwise_kernel(kernel_for(run.scenario, "native"))
-            self._untold = 0
 
     def reset(self, scenario: Scenario | None = None) -> None:
         """Restarts the run.
@@ -309,10 +295,8 @@ class Simulation:
         Args:
             scenario: what to run; None for the same.
         """
-        with self._alone() as run:
-            kernel = run.kernel
+        with self._alone():
             self._begin(scenario or self._given)
-            self._run.kernel = kernel
 
     def snapshot(self) -> Snapshot:
         """The run as it is now, to `restore`; it can be pickled."""
@@ -430,19 +414,6 @@ def sample_of(t: float, row: np.ndarray) -> Sample:
         row: from Run.ahead.
     """
     return Sample(t, *[row[place] for place in PLACES])
-
-
-def stepwise_kernel(kernel: Kernel) -> Kernel:
-    """The kernel for a run that is advanced often, a few steps at a time.
-
-    Args:
-        kernel: that of an ordinary run.
-    """
-    if kernel is PLAIN:
-        return kernel
-    from ..stepping.compiled import BY_ROWS  # where it is loaded
-
-    return BY_ROWS
 
 
 def gain_of(value: object) -> tuple[float, float]:

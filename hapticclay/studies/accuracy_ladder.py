@@ -19,7 +19,7 @@ from ..errors import ParameterError
 from ..files import versions
 from ..scene.scenario import Scenario
 from ..simulation.asked_error import METHODS, choices
-from ..simulation.engines import has_numba
+from ..simulation.engines import engine_for
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..simulation.step_comparison import ROUNDING_LEFT, Trace, compare_positions, compare_times
@@ -202,7 +202,7 @@ def accuracy_ladder(
     how = f"{best.integrator} integrator at dt = {best.dt:.3g} s"
     return Ladder(
         scenario,
-        "native" if has_numba() else "python",
+        engine_for("auto"),
         tuple(settings),
         how,
         exact.left,
@@ -269,7 +269,7 @@ def _reference(s: Scenario, grid: float) -> Reference:
 
 def _run(s: Scenario, grid: float) -> Record:
     """A run that keeps samples at multiples of grid [s], or all if they are further apart."""
-    engine = "native" if has_numba() else "python"
+    engine = engine_for("auto")
     return simulate(s, every=max(1, round(grid / s.dt)), engine=engine)
 
 

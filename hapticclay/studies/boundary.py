@@ -34,7 +34,6 @@ PUSH_TIME = 0.01  # [s] duration of a force that replaces such a velocity
 GROWTH_SPAN = 1.2  # [s] length of a run whose growth rate is read
 CLASSIFIED_SPANS = (2.0, 8.0, 32.0)  # [s] longer runs while the motors are saturated
 BRACKET = 2e-3  # relative accuracy of boundaries
-SEARCHED = 30  # growth rates in a search, about
 
 Subject = TypeVar("Subject")
 
@@ -283,7 +282,7 @@ def simulated_stiffness(loop: PushedLoop, guess: float | None = None, most: floa
 
 
 def _simulated(loop: PushedLoop, field: str, guess: float, most: float) -> float:
-    maps, small = PeriodMaps(SEARCHED), abs(loop.push) <= SMALL_PUSH
+    maps, small = PeriodMaps(), abs(loop.push) <= SMALL_PUSH
 
     def rate(value: float) -> float:
         s = replace(loop, **{field: value}).scenario()

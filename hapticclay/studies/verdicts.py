@@ -103,7 +103,7 @@ def mapped_rates(cases: Cases, reading: Reading) -> Rates:
         cases: what to judge.
         reading: of such cases.
     """
-    maps, rate = PeriodMaps(len(cases)), {}
+    maps, rate = PeriodMaps(), {}
     for i, case in cases.items():
         m = maps.of(case.scenario, AXES.index(case.axis))
         if m is not None:

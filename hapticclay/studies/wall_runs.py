@@ -36,7 +36,6 @@ WINDOWS = ((0.4, 0.6), (0.8, 1.0))  # parts of a run whose swings are compared
 KEPT = 0.97  # an oscillation that keeps this share from one part to the next is sustained
 ROUGH_KEPT = 0.8  # the same for one within ROUGH quanta, whose amplitude is irregular
 ROUGH = 10.0
-SEARCHED = 100  # growth rates in a search, about
 RUNG = 3.0  # ratio of successive K of the search
 EDGE_CLOSE = 5e-3  # relative accuracy of the boundary between rest and oscillation
 Search = Generator[float, Any, float]
@@ -111,7 +110,7 @@ def stiffest(
 
 def _growth() -> Callable[[Sequence[Any]], list[float]]:
     """`growth_rates` in a search."""
-    return functools.partial(growth_rates, maps=PeriodMaps(SEARCHED))
+    return functools.partial(growth_rates, maps=PeriodMaps())
 
 
 def _damping(wall: Wall) -> float:
@@ -190,7 +189,7 @@ def growth_rates(walls: Sequence[Wall], maps: PeriodMaps | None = None) -> list[
         walls: the walls.
         maps: those made before; None for none.
     """
-    maps = maps or PeriodMaps(len(walls))
+    maps = maps or PeriodMaps()
     rates = [_mapped_rate(wall, maps) for wall in walls]
     if left := [i for i, x in enumerate(rates) if math.isnan(x)]:
         for i, x in zip(left, _rates_of_runs([walls[i] for i in left]), strict=True):

@@ -18,7 +18,6 @@ from ..ports.driven_arm import LARGEST_FORCE, Drive, DrivenArm, Sensed
 from ..ports.service import Service
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
-from ..stepping.run import PLAIN, Kernel
 from ..studies.removal import TOOL, Tool
 from .clock import FRAME_TIME
 from .live_run import played
@@ -78,10 +77,6 @@ class ServedSession(Session):
         self.undriven = played(driven, 1.0)
         self.arm = DrivenArm(self.undriven, self._largest_force)
         return replace(self.undriven, controller=self.arm.controller)
-
-    def kernel(self) -> Kernel:
-        """Steps in Python, because the motors' law changes during the run."""
-        return PLAIN
 
     def verdict(self) -> LiveVerdict:
         """Names the programs that drive the arm; the loop report judges their stability."""

@@ -18,8 +18,8 @@ import numpy as np
 
 from ..errors import ParameterError, choice, integer, number
 from ..files import atomic
+from ..kernel.engine import mujoco
 from ..simulation.record import Record
-from ..stepping.engine import mujoco
 from ..studies.removal import TOOL, Tool
 from .stage import CAMERAS, Stage, held_words
 

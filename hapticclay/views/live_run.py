@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 
 from ..errors import number
+from ..kernel import path
 from ..model.operator import NO_HAND, Operator
 from ..model.signals import Multisine
 from ..scene.scenario import Scenario
-from ..simulation.engines import has_numba, load_compiled, saved_in_a_step
-from ..stepping import monitor, path
-from ..stepping.run import PLAIN, Kernel, Run
+from ..simulation import monitor
+from ..simulation.engines import engine_for
+from ..simulation.run import Run
 
 LONGEST_SESSION = 3600.0  # [s]
 PULL_MARGIN = (0.05, 0.02)  # distance of the target point from the folded and the stretched arm [m]
-KEEPS_UP = 0.4  # share of real time for steps; the rest is for the picture
 
 
 class Pull:
@@ -99,7 +99,6 @@ class LiveRun(Run):
     Args:
         scenario: scenario to run.
         every: keep each every-th sample.
-        kernel: kernel of the steps.
 
     Attributes:
         pull: the muscle.
@@ -107,8 +106,8 @@ class LiveRun(Run):
         gains: (index of the first sample with it, gain), one after the other.
     """
 
-    def __init__(self, scenario: Scenario, every: int, kernel: Kernel = PLAIN):
-        super().__init__(scenario, every, kernel)
+    def __init__(self, scenario: Scenario, every: int):
+        super().__init__(scenario, every, engine_for("auto"))
         x, y = (th or NO_HAND for th in scenario.operators)
         self.pull = Pull((x.spring, y.spring), scenario.start)
         # a person moves it: growing motion is no instability while the gain is below its limit
@@ -122,7 +121,7 @@ class LiveRun(Run):
         Args:
             steps: number of steps.
         """
-        self.pause = min(self.i + steps, self.parts.time.last)
+        self.pause = min(self.i + steps, self.row.m.last)
         self.push_evenly(self.pull.steady())
         self.go(None)
         if self.filled:
@@ -142,11 +141,8 @@ class LiveRun(Run):
     @property
     def held(self) -> tuple[bool, bool]:
         """Whether yielding clay holds the handle, along x and along y."""
-        reaction = self.state.clay.reaction
-        if reaction is None or reaction.contact is None:
-            return False, False
-        x, y = reaction.contact.stuck
-        return bool(x), bool(y)
+        x, y = self.row.s.axis
+        return bool(x.stuck), bool(y.stuck)
 
     def judge(self, made: np.ndarray) -> int:
         """As Run.judge; discards the samples while recording is off.
@@ -162,24 +158,9 @@ class LiveRun(Run):
 
     def end(self) -> None:
         """Ends the run, with the status of a completed run."""
-        self.state = path.closed(self.state)
+        self.row.s.closing = path.FINISHED
         self.advance(self.filled + 1)
         self.flush()
-
-
-def live_kernel(scenario: Scenario) -> Kernel:
-    """The kernel of a session: compiled where Python would be slower than real time.
-
-    Args:
-        scenario: that is played.
-    """
-    if saved_in_a_step(scenario) < KEEPS_UP * scenario.dt or not has_numba():
-        return PLAIN
-    compiled = load_compiled()
-    if compiled is None:
-        return PLAIN
-    compiled.warm(scenario)
-    return compiled.KERNEL
 
 
 def played(scenario: Scenario, stiffness: float = 1.0) -> Scenario:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
-from ..stepping.monitor import Outcome
+from ..simulation.monitor import Outcome
 from ..theory import gain_limits
 
 CALM_TIME = 1.0  # [s] without growing oscillation after which an unstable arm counts as calm

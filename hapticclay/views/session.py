@@ -16,13 +16,12 @@ import numpy as np
 from ..errors import ParameterError, integer, number
 from ..model.operator import NO_HAND
 from ..scene.scenario import Scenario
+from ..simulation import monitor
 from ..simulation.record import Record
-from ..stepping import monitor
-from ..stepping.run import Kernel
 from ..studies.removal import TOOL, Tool, removed
 from .clock import FRAME_TIME, LATE_EDGES, Clock
 from .frame import Frame, Listener, Partner
-from .live_run import PULL_MARGIN, LiveRun, live_kernel, played
+from .live_run import PULL_MARGIN, LiveRun, played
 from .live_verdict import CALM_TIME, LiveVerdict, is_viscous, live_gain_limits, live_verdict
 
 
@@ -76,7 +75,7 @@ class Session:
         """
         self.scenario = self.prepared(scenario)
         self.given = scenario
-        self.run = LiveRun(self.scenario, self.every, self.kernel())
+        self.run = LiveRun(self.scenario, self.every)
         self.paused, self.recording = False, True
         self.clock = Clock(FRAME_TIME if self.partner is None else self.partner.span)
         self.point: tuple[float, float] | None = None
@@ -97,10 +96,6 @@ class Session:
         """
         refuse_other(scenario, control="continuous", integrator="fast")
         return played(scenario, self.stiffness)
-
-    def kernel(self) -> Kernel:
-        """Kernel of the steps."""
-        return live_kernel(self.scenario)
 
     def restart(self) -> None:
         """Restarts the same scenario with the present gain, damping and recording switch."""

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..kernel.engine import checked_model, compose_spec, mujoco, warnings_caught
 from ..model.arm import PAPER, Arm
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
-from ..stepping.engine import checked_model, compose_spec, mujoco, warnings_caught
 from ..studies.removal import TOOL, Removal, Tool
 from .style import BLUE, PART_COLORS, SKY_BLUE, clay_color, clay_share, cutting_force, rgb
 

@@ -22,10 +22,10 @@ from typing import Any
 
 import numpy as np
 
+from ..kernel.engine import mujoco
 from ..model.clay import Clay
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
-from ..stepping.engine import mujoco
 from ..studies.removal import Tool
 from .clock import FRAME_TIME
 from .frame import Frame

@@ -1,0 +1,301 @@
+"""Many short runs that differ in numbers: rows of one model, made in one call."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..kernel import hardware, layout, native, path, records, scene, user_laws
+from ..kernel.memories import delay_in_samples
+from ..kernel.row import CHUNK, NativeRow
+from ..kernel.summary import CROSSINGS as SUMMARY_CROSSINGS
+from ..model import controller, regions
+from ..model.cells import Profile
+from ..model.hardware import Hardware
+from ..model.operator import NO_HAND, mobility_with
+from ..scene.scenario import Scenario
+from . import monitor
+from .run import Place, balance
+
+LONGEST = 10_000  # most steps of such a run: a call ends soon, so Ctrl-C takes effect soon
+FEWEST = 4  # runs of a kind that repay its pattern
+PATTERNS = 64  # kinds that are kept
+# of the hardware, all but its delay; without noise its seed has no effect
+SHARED = tuple(x.name for x in fields(Hardware) if x.name not in ("delay", "seed"))
+_scene = operator.attrgetter(
+    "control", "inertia_shaping", "dt", "t_max", "length", "Ts", "render", "torque_limit"
+)
+_shared, _hand_parts = operator.attrgetter(*SHARED), operator.attrgetter("mass", "damper", "spring")
+
+
+def kind_key(s: Scenario) -> tuple[Any, ...] | None:
+    """Key of runs of one kind; None for a run that `carry` does not make.
+
+    Runs of one kind differ in numbers: gain, force, operator, servo, start, velocity, origin, clay
+    and delay.
+
+    Args:
+        s: the scenario.
+    """
+    clay, wires, hand = s.clay, s.hardware, s.operator
+    if (
+        s.muscle is not None
+        or s.command is not None
+        or s.controller is not None
+        or s.integrator != "fast"
+        or not s.stop_when_unstable
+        or s.t_max > LONGEST * s.dt
+        or (user_laws.TABLE and user_laws.of_scene(s))
+    ):
+        return None
+    law: Any = None
+    if clay is not None:
+        x: Any = clay.x
+        y: Any = clay.y
+        if clay.angle or clay.groove is not None or not (is_plain(x) and (y is x or is_plain(y))):
+            return None
+        hard = scene.hardness(s, max(max(x.values), max(y.values)))
+        law = x.edges, x.along, y.edges, y.along, y is x or y == x, hard
+    parts: Any = None
+    if wires is not None:
+        if wires.jitter or wires.dropout_probability or wires.force_noise:
+            return None
+        parts = _shared(wires), wires.delay > 0.0
+    held = hand is not None and (not isinstance(hand, tuple) or any(hand))
+    # parts that are expensive to compare are distinguished by identity
+    return *_scene(s), held, law, parts, id(s.arm), id(s.compensator)
+
+
+def is_plain(law: Any) -> bool:
+    """Whether the clay of an axis damps only, as a function of one coordinate.
+
+    Args:
+        law: of the axis.
+    """
+    return type(law) is Profile and not (law.growth or law.Fy or law.K or law.springs)
+
+
+class Pattern:
+    """A scene whose model is that of all runs of its kind, except for some numbers.
+
+    Args:
+        scenario: a run of the kind.
+        place: where its rows are made.
+    """
+
+    def __init__(self, scenario: Scenario, place: Place):
+        self.scenario = scenario  # kept: the identity of its parts is in the key
+        self.row = NativeRow(scenario, place.movers.of(scenario), place.buffers)
+        self.is_made = not self.row.m.formed
+
+    def models(self, d: Draws) -> tuple[np.ndarray, list[np.ndarray]]:
+        """The models of runs, and the arrays that they name."""
+        out, kept = np.repeat(self.row.models, len(d.gain)), []
+        out["ox"], out["oy"] = d.origin.T
+        axis = out["axis"]
+        axis["K"], axis["push"] = d.gain, d.force
+        for i in (0, 1):
+            for servo, runs in d.servo[i].items():
+                axis["servo"][np.array(runs), i] = servo.numbers
+        if self.row.m.hand:
+            self._put_hands(out, d.hands)
+        if self.row.m.ratio:
+            for i in (0, 1):
+                axis["memory"][:, i, :20] = self._memory(d, i)
+        if self.row.m.delay > 0.0:
+            kept.append(self._put_delays(out, d.delays))
+        if d.values is not None:
+            kept.append(self._put_tables(out, d))
+        return out, kept
+
+    def _put_hands(self, out: np.ndarray, hands: np.ndarray) -> None:
+        """Puts the operators' arms into models, and the mobility with them."""
+        for j, name in enumerate(("mass", "damper", "spring")):
+            out["axis"][name] = hands[:, :, j]
+        if self.row.m.stiff:
+            mass = np.minimum(hands[:, 0, 0], hands[:, 1, 0])
+            out["mobility"] = mobility_with(self.scenario.arm.links[4], mass)
+
+    def _put_delays(self, out: np.ndarray, delays: Sequence[float]) -> np.ndarray:
+        """Puts delays of the torques into models; the ring that all use, one after the other."""
+        whole, share = np.array([delay_in_samples(x, self.row.m.Ts) for x in delays]).T
+        out["delay"], out["queue_rows"] = delays, whole + scene.QUEUE
+        ring = np.zeros(int(hardware.QUEUED * (whole.max() + scene.QUEUE)))
+        out["queue"] = ring.ctypes.data
+        if not self.row.m.guard:
+            return ring
+        out["guard_whole"], out["guard_share"] = whole, share
+        both = np.zeros(len(ring) + int(2 * (whole.max() + 2)))
+        out["queue"], out["forces"] = both.ctypes.data, both[len(ring) :].ctypes.data
+        return both
+
+    def _put_tables(self, out: np.ndarray, d: Draws) -> np.ndarray:
+        """Puts the values of the clay into tables of their own."""
+        table = self.row.arrays["table"]
+        tables = np.tile(table, (len(out), 1))
+        at = [int(table[regions.VALUES + i]) for i in (0, 1)]
+        for i in range(2 if at[0] != at[1] else 1):
+            tables[:, at[i] : at[i] + d.values[i].shape[1]] = d.values[i]
+        out["table"] = tables.ctypes.data + tables.strides[0] * np.arange(len(out))
+        return tables
+
+    def _memory(self, d: Draws, i: int) -> np.ndarray:
+        """Rows of controller.held_compensator of an axis, shape (n, 20)."""
+        Ts, shape = self.row.m.Ts, self.scenario.compensators[i]
+        out = np.empty((len(d.gain), 20))
+        for servo, runs in d.servo[i].items():
+            at = np.array(runs)
+            gains, which = np.unique(d.gain[at, i], return_inverse=True)
+            A, B = controller.held_compensator(servo, shape, gains, Ts)
+            out[at] = np.concatenate((A, B[:, :, None]), axis=2).reshape(len(gains), -1)[which]
+        return out
+
+
+class Draws(NamedTuple):
+    """Differences between runs of one kind, as columns over n runs.
+
+    Attributes:
+        gain: of x and y [1/kg], shape (n, 2).
+        force: constant muscle force [N], shape (n, 2).
+        origin: world position of p = 0 [m], shape (n, 2).
+        starts: position [m] and velocity [m/s] of the handle, (x, y) each, shape (n, 4).
+        servo: of x and of y: the servos, and the runs that have them.
+        hands: mass, damper and spring of x and of y, shape (n, 2, 3); None without operators.
+        delays: of the torques [s]; empty without hardware.
+        values: dampings of the clay's regions [N.s/m], of x and of y, shape (n, regions) each; None
+            without clay.
+    """
+
+    gain: np.ndarray
+    force: np.ndarray
+    origin: np.ndarray
+    starts: np.ndarray
+    servo: Any
+    hands: Any
+    delays: Any
+    values: Any
+
+
+def draws_of(jobs: Sequence[Scenario]) -> Draws:
+    """Differences between scenarios of one kind.
+
+    Args:
+        jobs: the scenarios.
+    """
+    first, hands, values = jobs[0], None, None
+    if any(first.operators):
+        hands = np.array([[_hand_parts(th or NO_HAND) for th in s.operators] for s in jobs])
+    if first.clay is not None:
+        values = [np.array([s.clay.laws[i].values for s in jobs if s.clay]) for i in (0, 1)]
+    servo: Any = [{x: range(len(jobs))} for x in first.servo]
+    if not all(s.servo is first.servo for s in jobs):
+        servo = {}, {}
+        for i in (0, 1):
+            for k, s in enumerate(jobs):
+                servo[i].setdefault(s.servo[i], []).append(k)
+    gain, force, origin = (
+        np.array([getattr(s, name) for s in jobs], float) for name in ("gain", "force", "origin")
+    )
+    starts = np.array([(*s.start, *s.velocity) for s in jobs], float)
+    delays = [s.hardware.delay for s in jobs if s.hardware]
+    return Draws(gain, force, origin, starts, servo, hands, delays, values)
+
+
+class Lane:
+    """Makes many runs in one thread."""
+
+    def __init__(self, place: Place):
+        self.place, self.known = place, dict[Any, Pattern]()
+
+    def pattern(self, key: Any, scenario: Scenario) -> Pattern:
+        """The pattern of a kind.
+
+        Args:
+            key: from `kind_key`.
+            scenario: a run of the kind.
+        """
+        if key not in self.known:
+            if len(self.known) >= PATTERNS:
+                del self.known[next(iter(self.known))]
+            self.known[key] = Pattern(scenario, self.place)
+        return self.known[key]
+
+    def make(
+        self, jobs: Sequence[Scenario], keys: Sequence[Any]
+    ) -> tuple[list[tuple[np.ndarray, dict[str, Any]]], list[int]]:
+        """Makes those runs that it can.
+
+        Args:
+            jobs: scenarios.
+            keys: of each, from `kind_key`.
+
+        Returns:
+            Indices of runs with fields of their summaries, for each kind; indices of the rest.
+        """
+        kinds: dict[Any, list[int]] = {}
+        for i, key in enumerate(keys):
+            kinds.setdefault(key, []).append(i)
+        done, left = [], kinds.pop(None, [])
+        for key, found in kinds.items():
+            if len(found) < FEWEST or not (p := self.pattern(key, jobs[found[0]])).is_made:
+                left += found
+                continue
+            summaries, good = self.group(p, draws_of([jobs[i] for i in found]))
+            at = np.array(found)
+            done.append((at[good], summaries))
+            left += at[~good].tolist()
+        return done, sorted(left)
+
+    def group(self, p: Pattern, d: Draws) -> tuple[dict[str, Any], np.ndarray]:
+        """Makes runs of one kind.
+
+        Returns:
+            Fields of the summaries of the good ones; which are good, shape (n,).
+        """
+        models, kept = p.models(d)
+        n = len(models)
+        states = np.zeros(n, layout.dtype_of(records.State))
+        outs = np.zeros(n, layout.dtype_of(records.Summary))
+        starts = np.ascontiguousarray(d.starts, float)
+        models["engine"] = self.place.movers.of(p.scenario).row.ctypes.data
+        places = (x.ctypes.data for x in (models, states, outs))
+        native.machine().finish(*places, n, starts.ctypes.data, CHUNK - 1)
+        del kept  # the arrays that the models name
+        good = states["watch"]["quiet"] > 0
+        return summary_columns(p.scenario, p.row.m, states[good], outs[good]), good
+
+
+def summary_columns(like: Scenario, m: Any, states: np.ndarray, outs: np.ndarray) -> dict[str, Any]:
+    """The fields of summaries, arrays over runs.
+
+    Args:
+        like: a run of their kind.
+        m: its model.
+        states: at their ends.
+        outs: their summaries.
+    """
+    seen, moved, unbound, _ = states["watch"]["seen"].T
+    saturated, stalled = monitor.at_rest(seen, moved, unbound, like.dt)
+    ends = np.where(saturated, "saturated", np.where(stalled, "stalled", "time limit"))
+    w = states["work"]
+    work = [w[name] for name in ("muscle", "motors", "clay", "hand", "through")]
+    stored = outs["kinetic"], outs["at_hand"]
+    energy = balance(work, [x[:, 0] for x in stored], [x[:, 1] for x in stored])
+    if like.hardware is not None and any(like.hardware.friction):
+        energy["residual"] = energy["residual"] - w["friction"]
+    row, crossings = outs["row"], outs["crossings"]
+    crossed = outs["crossed"].reshape(-1, SUMMARY_CROSSINGS, 3).copy()
+    none = np.arange(SUMMARY_CROSSINGS) >= crossings[:, None]
+    crossed[none] = -1.0, np.nan, np.nan
+    v, b = row[:, 4:6], row[:, 12:14]
+    return dict(
+        code=np.where(states["code"] == path.FINISHED, "finished", ends),
+        axis=np.zeros(len(states), "U1"), time=states["t"], step=states["i"], steps=outs["steps"],
+        crossings=crossings, crossing_axis=crossed[:, :, 0].astype(np.int64),
+        crossing_time=crossed[:, :, 1], crossing_speed=crossed[:, :, 2], p=row[:, 2:4], v=v,
+        fh=row[:, 6:8], fe=outs["force"] if m.told or m.holds else b * v, b=b, **energy,
+    )  # fmt: skip
