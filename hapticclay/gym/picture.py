@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..model.arm import inverse_kinematics
+from ..formulas.arm import inverse_kinematics
 from ..scene.scenario import Scenario
 from ..views.plan_picture import Plan, PlanPicture
 from .draws import Truth

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..formulas import groove as groove_law
 from ..formulas import pieces
+from ..formulas.constants import B_MAX
 from ..model import compensator, regions
 from ..model import hardware as devices
-from ..model.constants import B_MAX
 from ..model.sampled_controller import BUFFER, Controller, LawCaller
 from ..scene.scenario import Scenario
 from . import hardware, methods, modes, pace, records, user_laws

@@ -11,7 +11,8 @@ import numpy as np
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, number, numbers_of, pair, table_of
-from .constants import AXES, B_MAX
+from ..formulas.constants import B_MAX
+from .constants import AXES
 from .flow import Consistency, FlowIndex, YieldForce
 from .spring import Spring
 from .traits import (

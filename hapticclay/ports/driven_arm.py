@@ -6,7 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 from ..errors import number
-from ..model.arm import handle_velocity, jacobian, joint_torques
+from ..formulas.arm import handle_velocity, jacobian, joint_torques
 from ..model.sampled_controller import Controller
 from ..scene.scenario import Scenario
 from .commands import Pair

@@ -18,12 +18,12 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, ParamSpec
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, field_types
+from ..formulas.constants import B_MAX
 from ..model.cells import Profile
 from ..model.clay import Clay, slab
 from ..model.constants import (
     AXES,
     B_CONSTANT,
-    B_MAX,
     B_STABILITY,
     B_VARIABLE,
     BORDER,

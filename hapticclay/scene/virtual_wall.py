@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, choice, number
+from ..formulas.constants import B_MAX
 from ..model.arm import Arm
-from ..model.constants import B_MAX
 from ..model.hardware import Hardware
 from ..model.operator import NO_HAND, Operator
 from ..model.sampled_controller import Controller

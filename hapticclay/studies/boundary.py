@@ -12,11 +12,12 @@ import numpy as np
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, number
-from ..model import arm
+from ..formulas import arm as arm_law
+from ..formulas.constants import B_MAX
 from ..model.arm import Arm
 from ..model.cells import Profile
 from ..model.clay import Clay
-from ..model.constants import AXES, B_MAX, TORQUE_LIMIT, TS
+from ..model.constants import AXES, TORQUE_LIMIT, TS
 from ..model.controller import SERVO
 from ..model.hardware import Hardware
 from ..model.spring import Spring
@@ -327,8 +328,8 @@ def pose_matrix(loop: PushedLoop) -> np.ndarray:
     )
     loops = (loop, other) if i == 0 else (other, loop)
     x, y = loop._nominal
-    q1, q2 = arm.inverse_kinematics(x + loop.pose[0], y + loop.pose[1], links)
-    xx, xy, yy = arm.mobility(arm.jacobian(q1, q2, links), links)
+    q1, q2 = arm_law.inverse_kinematics(x + loop.pose[0], y + loop.pose[1], links)
+    xx, xy, yy = arm_law.mobility(arm_law.jacobian(q1, q2, links), links)
     W = np.array([[xx, xy], [xy, yy]])
     if loop.Ts is None:
         return linear_loop.state_space(*loops, mobility=None if loop.inertia_shaping else W)[0]

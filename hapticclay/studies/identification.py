@@ -18,6 +18,7 @@ import numpy as np
 from ..arguments import checked, named
 from ..errors import ParameterError, choice, flag, integer, number, numbers_of, pair
 from ..files import versions
+from ..formulas import arm as arm_law
 from ..model import arm
 from ..model.arm import Arm
 from ..model.constants import AXES, L1, L2, TS, G, S
@@ -248,8 +249,8 @@ def endpoint_mobility(x: float, y: float) -> tuple[float, float]:
         y: world position of the handle [m].
     """
     links = Arm().links
-    q1, q2 = arm.inverse_kinematics(x, y, links)
-    wxx, _, wyy = arm.mobility(arm.jacobians(q1, q2, links), links)
+    q1, q2 = arm_law.inverse_kinematics(x, y, links)
+    wxx, _, wyy = arm_law.mobility(arm.jacobians(q1, q2, links), links)
     return float(wxx), float(wyy)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arguments import checked
 from ..errors import ParameterError, number, pair
-from ..model.arm import inverse_kinematics, jacobian, mobility
+from ..formulas.arm import inverse_kinematics, jacobian, mobility
 from ..scene.scenario import Scenario
 from . import linear_loop, roots
 

@@ -17,9 +17,10 @@ from numpy.polynomial import Polynomial
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, choice, number
+from ..formulas.constants import B_MAX
 from ..model import controller
 from ..model.compensator import PRINTED, Compensator
-from ..model.constants import AXES, B_MAX
+from ..model.constants import AXES
 from ..model.controller import SERVO, Servo
 from ..model.operator import NO_HAND, Operator
 from ..model.spring import STIFFNESS_MAX
