@@ -7,8 +7,6 @@
 | it may end | at a sample | at an event too | within a sample |
 """
 
-import math
-
 from . import arm, ends, kick, march, rows, sampled, servo, signals, yielding
 
 CONTINUOUS, SAMPLED, ACCURATE = range(3)
@@ -47,10 +45,10 @@ def place_behind(m, s, after):
 
 
 def is_sound(m, s):
-    """Whether the step tried ends with finite rates."""
+    """Whether the step tried ends with rates of an arm."""
     if m.method == ACCURATE:
         return march.is_finite(s.a.end)
-    return abs(s.k.w1) + abs(s.k.w2) < math.inf
+    return abs(s.k.w1) + abs(s.k.w2) < march.FASTEST
 
 
 def keep(m, s, after, shows):

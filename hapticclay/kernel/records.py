@@ -189,7 +189,8 @@ class Model:
     control: own_control
     buffer: floats
     buffer_size: whole  # its numbers of state
-    hardware: whole  # the ledger counts it
+    renders: whole  # the motors hold the force of clay that the loop computes
+    hardware: whole  # the ledger counts what motors and their hardware take
     # accurate method
     substeps: whole  # engine steps per sample
     blocks: wholes  # the same by block of samples, where the clay grows
@@ -381,9 +382,10 @@ class Work:
     clay: real
     hand: real
     through: real
-    friction: real
-    guard: real
-    coupling: real
+    friction: real  # of the joints; the next three are part of motors
+    guard: real  # of the passivity controller
+    coupling: real  # of the virtual coupling
+    rendered: real  # of the force that the motors hold for the clay
 
 
 @record
@@ -579,5 +581,6 @@ class Summary:
 
 RECORDS = (
     Engine, ModelAxis, KickAxis, Kick, LawSlot, Span, Model, StateAxis, MachineAxis, Machine, Work,
-    PointAxis, Point, GripAxis, Grip, InstantAxis, Instant, Sums, ModeAxis, Stride, Watch, State, Summary,
+    PointAxis, Point, GripAxis, Grip, InstantAxis, Instant, Sums, ModeAxis, Stride, Watch, State,
+    Summary,
 )  # fmt: skip

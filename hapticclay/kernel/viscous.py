@@ -1,4 +1,4 @@
-"""Viscous clay: constant, growing, with rotated axes, smooth, and so stiff that a step overshoots."""
+"""Viscous clay: constant, growing, with rotated axes, smooth, stiff."""
 
 from ..formulas import arm as arm_law
 from ..formulas import controller, regions
