@@ -33,6 +33,10 @@ ROOMS = (
     "studies",
     "ports",
 )  # packages of classes that a file may name
+MOVED = {  # modules of earlier releases, and where their classes are
+    "hapticclay.stepping.monitor": "hapticclay.simulation.monitor",
+    "hapticclay.stepping.run": "hapticclay.simulation.run",
+}
 SHOWN_ROWS = 10  # rows of a table shown in a notebook
 Tables = Mapping[str, Mapping[str, Sequence[Any]]]
 
@@ -212,6 +216,7 @@ def of_plain(data: Any) -> Any:
 def _made(name: str, fields: Mapping[str, Any]) -> Any:
     """Makes a part of the package from its fields."""
     module, _, kind = name.partition(":")
+    module = MOVED.get(module, module)
     found = getattr(importlib.import_module(module), kind) if _is_own(module) else None
     if found is None or not _is_part(found):
         raise ValueError(f"{one_line(name)} is not a part of this package")

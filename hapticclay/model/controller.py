@@ -5,7 +5,7 @@ Feedback alone sets Sh; a reference model y = G delta with its acceleration fed 
     p'' = y'' + kd (y' - v) + kp (y - p) + W f        f = fh - fe
 
 in operational space, W = Lambda(q)^-1; inertia shaping replaces W by its value at the nominal
-pose. One kick of that law is in `stepping.servo`.
+pose. One kick of that law is in `kernel.servo`.
 """
 
 from __future__ import annotations
