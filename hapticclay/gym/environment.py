@@ -9,9 +9,11 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ParameterError, choice
+from ..errors import choice
 from ..simulation.engines import ENGINES
+from .draws import fixed_by
 from .episodes import Episode
+from .inputs import action_of, options_of, seed_of, task_of
 from .quantities import box_of
 from .task import DT, Task
 
@@ -45,11 +47,11 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if render_mode is not None:
             choice("render_mode", render_mode, MODES)
         self.render_mode = render_mode
-        self.task = self.task_type(ranges, **options)
+        self.task = task_of(self.task_type, ranges, options, self)
         self._episode = Episode(self.task, choice("engine", engine, ENGINES))
         self.action_space = box_of(self.task.actions)
         self.observation_space = box_of(self.task.observations)
-        self._shape = self.action_space.shape
+        self._shape = (len(self.task.actions),)
         self._picture: Any = None
         self._live = False
 
@@ -63,10 +65,13 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             options: values to use instead of drawn ones, by name.
 
         Raises:
-            ParameterError: a name is unknown, or a value out of its bounds.
+            ParameterError: the seed is refused, a name is unknown, or a value out of its bounds;
+                or the values make no scene, and there is no episode until the next reset.
         """
-        super().reset(seed=seed)
-        self._episode.reset(self.np_random, options)
+        fixed = fixed_by(self.task.ranges, options_of(options))
+        super().reset(seed=seed_of("seed", seed))
+        self._live = False
+        self._episode.reset(self.np_random, fixed)
         self._live = True
         self._begin_picture()
         return self._episode.observe(), dict(self._episode.truth)
@@ -77,19 +82,16 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Advances by one control period.
 
         Args:
-            action: action, clipped to the action space.
+            action: finite numbers, shape (k,), clipped to the action space.
 
         Raises:
-            ParameterError: the action has the wrong shape.
+            ParameterError: the action has another shape, or is not of finite real numbers.
             RuntimeError: the environment was not reset.
         """
         if not self._live:
             raise RuntimeError("reset the environment before its first step")
-        action = np.asarray(action)
-        if action.shape != self._shape:
-            bound = f"must have shape {self._shape}, has {action.shape}"
-            raise ParameterError("action", action, bound)
-        observation, reward, ended, info = self._episode.step(action.tolist())
+        numbers = action_of("action", action, self._shape)
+        observation, reward, ended, info = self._episode.step(numbers.tolist())
         if self._picture is not None:
             self._show()
         return observation, reward, ended, False, self._episode.truth | info
@@ -111,13 +113,18 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self.render_mode is not None:
             from .picture import Picture
 
-            self._picture = self._picture or Picture(self.task, self.render_mode == "human")
+            if self._picture is None:
+                self._picture = Picture(self.task, self.render_mode == "human")
+                if self._picture.unseen:
+                    shown = "render_mode='human' shows nothing here"
+                    remedy = "take 'rgb_array', or a display"
+                    gymnasium.logger.warn(f"{shown}: {self._picture.unseen}; {remedy}")
             self._picture.begin()
             self._show()
 
     def _show(self) -> None:
         self._picture.note(self._episode.handle.p)
-        if self.render_mode == "human":
+        if self.render_mode == "human" and not self._picture.unseen:
             self._drawn()
 
     def close(self) -> None:
