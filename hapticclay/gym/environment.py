@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -16,6 +16,9 @@ from .episodes import Episode
 from .inputs import action_of, options_of, seed_of, task_of
 from .quantities import box_of
 from .task import DT, Task
+
+if TYPE_CHECKING:
+    from .picture import Picture
 
 FPS = 50
 MODES = ["human", "rgb_array"]
@@ -52,7 +55,8 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.action_space = box_of(self.task.actions)
         self.observation_space = box_of(self.task.observations)
         self._shape = (len(self.task.actions),)
-        self._picture: Any = None
+        self._picture: Picture | None = None
+        self._warned = False
         self._live = False
 
     def reset(
@@ -73,7 +77,9 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._live = False
         self._episode.reset(self.np_random, fixed)
         self._live = True
-        self._begin_picture()
+        if self.render_mode is not None:
+            self._shown_by().begin()
+            self._show()
         return self._episode.observe(), dict(self._episode.truth)
 
     def step(
@@ -92,7 +98,7 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise RuntimeError("reset the environment before its first step")
         numbers = action_of("action", action, self._shape)
         observation, reward, ended, info = self._episode.step(numbers.tolist())
-        if self._picture is not None:
+        if self.render_mode is not None:
             self._show()
         return observation, reward, ended, False, self._episode.truth | info
 
@@ -105,26 +111,32 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise RuntimeError("reset the environment before it is drawn")
         return self._drawn() if self.render_mode == "rgb_array" else None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy or a pickle keeps: all but the picture, whose path starts anew in it."""
+        return self.__dict__ | {"_picture": None}
+
     def _drawn(self) -> Any:
         now = self._episode
-        return self._picture.drawn(now.truth, now.memory, now.handle)
+        return self._shown_by().drawn(now.truth, now.memory, now.handle)
 
-    def _begin_picture(self) -> None:
-        if self.render_mode is not None:
+    def _shown_by(self) -> Picture:
+        """The picture; a new one at the first reset, after `close` and in a copy."""
+        if self._picture is None:
             from .picture import Picture
 
-            if self._picture is None:
-                self._picture = Picture(self.task, self.render_mode == "human")
-                if self._picture.unseen:
-                    shown = "render_mode='human' shows nothing here"
-                    remedy = "take 'rgb_array', or a display"
-                    gymnasium.logger.warn(f"{shown}: {self._picture.unseen}; {remedy}")
-            self._picture.begin()
-            self._show()
+            self._picture = Picture(self.task, self.render_mode == "human")
+            if self._picture.unseen and not self._warned:
+                shown = "render_mode='human' shows nothing here"
+                gymnasium.logger.warn(
+                    f"{shown}: {self._picture.unseen}; 'rgb_array' needs no display"
+                )
+                self._warned = True
+        return self._picture
 
     def _show(self) -> None:
-        self._picture.note(self._episode.handle.p)
-        if self.render_mode == "human" and not self._picture.unseen:
+        picture = self._shown_by()
+        picture.note(self._episode.handle.p)
+        if self.render_mode == "human" and not picture.unseen:
             self._drawn()
 
     def close(self) -> None:

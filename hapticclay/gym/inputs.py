@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -77,8 +77,10 @@ def seeds_of(given: Any, n: int) -> list[int | None]:
     """
     if given is None:
         return [None] * n
-    if isinstance(given, Iterable) and not isinstance(given, str | bytes | Mapping):
-        seeds = np.asarray(given).tolist() if isinstance(given, np.ndarray) else list(given)
+    if isinstance(given, np.ndarray):
+        given = given.tolist()
+    if isinstance(given, Sequence) and not isinstance(given, str | bytes):
+        seeds = list(given)
         if len(seeds) != n:
             raise ParameterError("seed", given, f"must be a number, or {n} of them")
         return [seed_of(f"seed[{i}]", x) for i, x in enumerate(seeds)]

@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import ParameterError, choice
-from .baselines import Fixed, Maker, Oracle, returns
+from .baselines import Fixed, Maker, Oracle, Scores, returns
 
 ID = "AdaptiveGain-v0"
 SEEDS = range(100)  # of the reference episodes
-SHARES = tuple(round(0.01 * n, 2) for n in range(70, 121))  # of the gain limit
+SHARES = tuple(round(0.05 * n, 2) for n in range(14, 25))  # of the gain limit, to begin with
+FINE, AROUND = 0.01, 4  # step, and number of steps to either side of the best of these
 FAMILIES: dict[str, Callable[[float], Maker]] = {"best fixed gain": Fixed, "best oracle": Oracle}
 
 
@@ -77,24 +78,38 @@ def search(
     shares: Sequence[float] = SHARES,
     seeds: Sequence[int] = SEEDS,
     *,
-    progress: Callable[[Sequence[float]], Iterable[float]] = iter,
+    around: int = AROUND,
     **options: Any,
 ) -> Searched:
-    """Runs AdaptiveGain with each share of the gain limit, over the same episodes.
+    """Runs AdaptiveGain with shares of the gain limit, over the same episodes.
+
+    The shares given come first, then those in steps of 0.01 around the best of them.
 
     Args:
         family: "best fixed gain" (a share of the least limit over the published hands, for the
             clay of the episode) or "best oracle" (a share of the limit of the hand of the episode).
-        shares: shares to try.
+        shares: shares to begin with.
         seeds: seeds of the episodes.
-        progress: wraps the shares, to show progress.
+        around: number of finer steps to either side.
         **options: options of the environment.
+
+    Returns:
+        What each share earned, ordered by share.
 
     Raises:
         ParameterError: there is no such family.
     """
     make = FAMILIES[choice("family", family, tuple(FAMILIES))]
-    found = [returns(ID, make(share), seeds, **options) for share in progress(shares)]
-    totals = np.stack([x.total for x in found])
-    lost = np.stack([x.info["lost"] for x in found]).astype(bool)
-    return Searched(np.array(shares, float), totals, lost)
+    found: dict[float, Scores] = {}
+
+    def run(wanted: Iterable[float]) -> Searched:
+        for share in wanted:
+            if share not in found:
+                found[share] = returns(ID, make(share), seeds, **options)
+        tried = sorted(found)
+        totals = np.stack([found[x].total for x in tried])
+        lost = np.stack([found[x].info["lost"] for x in tried]).astype(bool)
+        return Searched(np.array(tried), totals, lost)
+
+    best = run(shares).best
+    return run(round(best + FINE * k, 2) for k in range(-around, around + 1))

@@ -249,6 +249,15 @@ class TaskVectorEnv(VectorEnv):
             raise RuntimeError("reset the environments before their first step")
         return self._episodes.truth_of(integer("i", i, 0, self.num_envs - 1))
 
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        """Refused: the copies run in threads and machine code.
+
+        Raises:
+            TypeError: always.
+        """
+        told = "cannot be copied or pickled: make another with the same arguments"
+        raise TypeError(f"{type(self).__name__} {told}, or take single environments")
+
     def close_extras(self, **_: Any) -> None:
         """Ends the runs."""
         for picture in self._pictures:
