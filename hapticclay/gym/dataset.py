@@ -76,11 +76,11 @@ def record(
     episodes = integer("episodes", episodes, 1, 100_000)
     noise = number("noise", noise, 0.0, 1.0)
     seed = integer("seed", seed, 0, SEEDS - episodes)
+    target = _target(name)
     with needing("a data set", "minari", "minari"):
         import minari  # noqa: F401  # pyright: ignore[reportMissingImports]
     with needing("a data set", "h5py", "minari"):
         import h5py  # noqa: F401
-    target = _target(name)
     settings = {"id": id, "noise": noise, "seed": seed, "hapticclay": __version__}
     kept = _begun(target.with_name(f".{target.name}.part"), settings)
     _record_missing(kept, episodes, settings, engine, progress or (lambda n: None))
