@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import json
 import os
 import re
@@ -79,8 +80,9 @@ def record(
     target = _target(name)
     with needing("a data set", "minari", "minari"):
         import minari  # noqa: F401  # pyright: ignore[reportMissingImports]
-    with needing("a data set", "h5py", "minari"):
-        import h5py  # noqa: F401
+    with needing("a data set", "h5py", "minari"):  # which Minari imports when it writes
+        if importlib.util.find_spec("h5py") is None:
+            raise ImportError
     settings = {"id": id, "noise": noise, "seed": seed, "hapticclay": __version__}
     kept = _begun(target.with_name(f".{target.name}.part"), settings)
     _record_missing(kept, episodes, settings, engine, progress or (lambda n: None))
@@ -159,7 +161,7 @@ def _file_of(kept: Path, i: int) -> Path:
 def _episode_in(file: Path) -> dict[str, np.ndarray] | None:
     """A kept episode by columns; None where it is not there, or damaged."""
     try:
-        with np.load(file) as found:
+        with file.open("rb") as f, np.load(f) as found:
             return {name: found[name] for name in COLUMNS}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
