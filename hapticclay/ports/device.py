@@ -21,6 +21,7 @@ from .commands import Pair
 from .driven_arm import LARGEST_FORCE, Drive, DrivenArm, Sensed
 
 LONGEST = 1e5  # [s] longest session
+FASTEST = 100.0  # [m/s] of a hand
 
 
 @named
@@ -29,11 +30,12 @@ class Trajectory:
     """Target of the hand over time: straight from point to point, at rest after the last.
 
     Attributes:
-        t: times [s], ascending, shape (n,).
-        points: positions of the handle [m], shape (n, 2).
+        t: times [s], ascending, -1e9 to 1e9, shape (n,).
+        points: positions of the handle [m], -10 to 10, no further apart than a hand of 100 m/s
+            moves meanwhile, shape (n, 2).
     """
 
-    t: Annotated[tuple[float, ...], Bound(unit="s")]
+    t: Annotated[tuple[float, ...], Bound(-1e9, 1e9, "s")]
     points: Annotated[tuple[tuple[float, ...], ...], Bound(-10.0, 10.0, "m")]
 
     def __post_init__(self):
@@ -44,6 +46,11 @@ class Trajectory:
             raise ParameterError("hand.points", self.points, "must have x and y each")
         if any(b <= a for a, b in zip(self.t[:-1], self.t[1:], strict=True)):
             raise ParameterError("hand.t", self.t, "must ascend")
+        for i in range(1, len(self.t)):
+            span, way = self.t[i] - self.t[i - 1], math.dist(self.points[i], self.points[i - 1])
+            if way > FASTEST * span:
+                bound = f"must be within {FASTEST:g} m/s; the point before is {way:.3g} m away"
+                raise ParameterError(f"hand.points[{i}]", self.points[i], f"{bound}, {span:.3g} s")
 
     def at(self, t: float) -> tuple[Pair, Pair]:
         """Position [m] and velocity [m/s] at a time.
