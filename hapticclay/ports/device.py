@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import os
 from dataclasses import dataclass, replace
@@ -12,6 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import named
+from ..columns import Sheet, unreadable
 from ..errors import Bound, ParameterError, check_fields, number
 from ..model.constants import TS
 from ..scene.scenario import Scenario
@@ -81,37 +81,41 @@ class Trajectory:
     def of_file(cls, path: str | os.PathLike[str]) -> Trajectory:
         """Reads a trajectory from a CSV file with the columns t [s], x and y [m].
 
+        A unit in the name of a column, as in "x [mm]", or in a row below the names is converted.
+
         Args:
             path: the file.
 
         Raises:
-            ParameterError: the file cannot be read, or has other columns.
+            ParameterError: the file cannot be read, has other columns, a cell that is no number, or
+                a unit that does not fit.
         """
-        rows = read_columns("hand", path, ("t", "x", "y"))
+        rows = read_columns("hand", path, {"t": ("s",), "x": ("m",), "y": ("m",)})
         return cls(tuple(r[0] for r in rows), tuple((r[1], r[2]) for r in rows))
 
 
 def read_columns(
-    field: str, path: str | os.PathLike[str], names: tuple[str, ...]
+    field: str, path: str | os.PathLike[str], units: dict[str, tuple[str, ...]]
 ) -> list[tuple[float, ...]]:
     """Reads some columns of a CSV file.
 
     Args:
         field: name for the error.
         path: the file; its first line names the columns.
-        names: columns to read.
+        units: columns to read, and their SI units; none for a column without a unit.
 
     Raises:
-        ParameterError: the file cannot be read, or lacks a column.
+        ParameterError: the file cannot be read, lacks a column, or has a cell that is no number or
+            a unit that does not fit.
     """
     try:
-        with Path(path).open(newline="") as f:
-            rows = [tuple(float(row[name]) for name in names) for row in csv.DictReader(f)]
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        bound = f"must be a CSV file with the columns {', '.join(names)} ({error!r})"
-        raise ParameterError(field, str(path), bound) from None
+        sheet = Sheet.read(field, Path(path))
+    except OSError as error:
+        raise unreadable(field, Path(path), error) from None
+    columns = sheet.numbers(sheet.named(list(units)), units)
+    rows = list(zip(*(columns[name].tolist() for name in units), strict=True))
     if not rows:
-        raise ParameterError(field, str(path), "must have a row or more")
+        raise sheet.refusal("must have a row or more")
     return rows
 
 
