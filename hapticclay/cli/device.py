@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from ..errors import ParameterError
+from ..errors import ParameterError, number
 from ..files import writable
 from . import console
 from .device_options import deliver_loops, write_report
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from ..scene.scenario import Scenario
 
 WAIT = 0.1  # [s] between two looks at whether the session is to end
+LONGEST = 1e9  # [s] longest session
+PERIOD = 0.005  # [s] of a message, by default
 
 
 @dataclass(frozen=True)
@@ -44,9 +46,11 @@ class DeviceCommand:
             drivers, as JSON for ROS programs.
         port: Port to listen on, 0 for a free one; by default that of the protocol, 10001 or 9090.
         host: Address to listen on. Any address but that of this machine needs a token.
+        origin: Web pages that may drive the device, as http://localhost:8000; by default none.
         clock: wall moves the arm in real time; tick moves it by --period at each message, so the
             same messages give the same run.
-        period: Simulated time that one message advances the arm, with --clock tick [s].
+        period: Simulated time that one message advances the arm, with --clock tick [s]; by default
+            5 ms.
         hand: Target of the hand: x y [m]; or x0 y0 x1 y1 and a speed [m/s] for a line; or a CSV
             file with the columns t, x, y. By default the hand rests at the start.
         plane: Plane of the device in which the arm moves.
@@ -66,8 +70,9 @@ class DeviceCommand:
     protocol: Literal["inverse", "rosbridge"] = "inverse"
     port: int | None = None
     host: str = "127.0.0.1"
+    origin: tuple[str, ...] = ()
     clock: Literal["wall", "tick"] = "wall"
-    period: float = 0.005
+    period: float | None = None
     hand: tuple[str, ...] = ()
     plane: Literal["xy", "xz"] = "xy"
     buttons: Path | None = None
@@ -86,11 +91,14 @@ class DeviceCommand:
         out = self.out or Path("out", "loop" if self.action == "report" else "device")
         if self.action == "report":
             return self._report(out)
+        duration = math.inf
+        if self.duration is not None:
+            duration = number("duration", self.duration, 0.0, LONGEST, unit="s")
         writable(out)
         with self._server() as server, console.ctrl_c() as stop:
             shown = "an Inverse3" if self.protocol == "inverse" else "a device of ROS"
             print(f"{shown} listens at {server.url}; Ctrl-C ends the session", flush=True)
-            end = math.inf if self.duration is None else time.monotonic() + self.duration
+            end = time.monotonic() + duration
             while not stop.wait(WAIT) and time.monotonic() < end:
                 if ended := server.service.device.ended:
                     print(f"hapticclay: the arm stopped: {ended}", file=sys.stderr)
@@ -104,6 +112,9 @@ class DeviceCommand:
         from ..ports.sessions import PORTS, Inverse3
 
         logging.basicConfig(format="hapticclay: %(message)s", level=logging.WARNING)
+        if self.period is not None and self.clock != "tick":
+            bound = "is for --clock tick: leave it out with --clock wall"
+            raise ParameterError("period", self.period, bound)
         shown = Inverse3(
             self.device_id,
             self.grip_id,
@@ -111,13 +122,16 @@ class DeviceCommand:
             ButtonScript.of_file(self.buttons) if self.buttons else ButtonScript(),
             self.largest_force,
             self.protocol,
+            self.origin,
         )
         return serve(
             served_scenario(self.source),
             host=self.host,
             port=PORTS[self.protocol] if self.port is None else self.port,
             clock=self.clock,
-            period=self.period if self.clock == "tick" else None,
+            period=(PERIOD if self.period is None else self.period)
+            if self.clock == "tick"
+            else None,
             hand=trajectory_of(self.hand),
             clay=self.clay,
             inverse3=shown,
@@ -175,7 +189,7 @@ def trajectory_of(words: tuple[str, ...]) -> Trajectory | None:
     Raises:
         ParameterError: they are none of these.
     """
-    from ..ports.device import Trajectory
+    from ..ports.device import FASTEST, Trajectory
 
     if not words:
         return None
@@ -187,7 +201,8 @@ def trajectory_of(words: tuple[str, ...]) -> Trajectory | None:
         x = []
     if len(x) == 2:
         return Trajectory.to((x[0], x[1]))
-    if len(x) == 5 and x[4] > 0.0 and x[:2] != x[2:4]:
+    if len(x) == 5 and x[:2] != x[2:4]:
+        number("hand speed", x[4], 1e-6, FASTEST, unit="m/s")
         way = math.dist(x[:2], x[2:4])
         return Trajectory((0.0, way / x[4]), ((x[0], x[1]), (x[2], x[3])))
     bound = "must be x y, or x0 y0 x1 y1 and a speed above 0, or a CSV file"

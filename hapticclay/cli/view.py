@@ -166,7 +166,8 @@ def replay(record: Record, tool: Tool, stream: str | None = None) -> None:
 
 
 def _serve_page(session: Session, host: str, port: int, until: Callable[[], bool]) -> None:
-    from ..views.page import LOCAL, Page
+    from ..ports.guard import LOCAL
+    from ..views.page import Page
 
     page = Page(session, host, port)
     if host not in LOCAL:

@@ -18,9 +18,10 @@ from ..model.operator import Operator
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from ..simulation.stepwise import Simulation
-from .client import PLAIN, DeviceClient, DeviceSample, Limits
+from .client import DeviceClient, DeviceSample
 from .client_log import ClientLog, Timing
 from .commands import NOTHING, Pair
+from .limits import PLAIN, Limits
 from .planes import PLANES, to_plane, to_space
 
 SETTLING = 50  # exchanges without force to measure the period of the device
@@ -165,12 +166,13 @@ class DeviceHand:
         return self.held
 
     def watch(self) -> bool:
-        """Reads the position of the device, without force.
+        """Reads the position of the device, without force; the next forces rise from zero.
 
         Returns:
             Whether the sample came in time.
         """
         sample = self.client.exchange()
+        self.client.restart_ramp()
         self.held = sample is not None
         if sample is not None:
             self._take(sample)

@@ -283,7 +283,9 @@ def test_files_as_others_write_them(tmp_path):
     [
         ("time [ms],force (kN),pos [um]", (1e-3, 1e3, 1e-6)),
         ("t,command (mm),pos [cm]", (1.0, 1e-3, 1e-2)),
-        ("t [s],input [raw],output [1]", (1.0, 1.0, 1.0)),  # no units: as they are
+        ("t [s],input (2),output [1]", (1.0, 1.0, 1.0)),  # no units: as they are
+        ("t_ms,force / mN,x_mm", (1e-3, 1e-3, 1e-3)),
+        ("time (seconds),input [mN] raw,pos", (1.0, 1e-3, 1.0)),
     ],
 )
 def test_a_unit_in_the_name_of_a_column_is_converted(head, size, tmp_path):
