@@ -258,9 +258,8 @@ def margins(loop: Loop, *, at: str = "compensator") -> Margins:
     delay, delay_at = _extreme(lag / omega, omega, every, np.argmin, math.inf)
     if n.degree() == d.degree() and abs(n.coef[-1]) >= abs(d.coef[-1]):
         delay, delay_at = 0.0, math.inf  # L does not roll off: any delay makes it encircle -1
-    far, near = roots.squared_magnitude(d - n), roots.squared_magnitude(d + n)
-    worst, disk_at = roots.least_ratio(-far, near)
-    disk = 2.0 / math.sqrt(-worst)
+    worst, disk_at = roots.peak_ratio(d - n, d + n)
+    disk = 2.0 / worst
     return Margins(
         True, (less, more), phase, delay, disk, (less_at, more_at), phase_at, delay_at, disk_at
     )
@@ -396,12 +395,12 @@ def small_gain(loop: Loop, *, equation: int = 13) -> Verdict:
     n2, d2 = roots.squared_magnitude(n), roots.squared_magnitude(d)
     how = "extreme of a ratio of polynomials: exact. "
     if equation == 9:
-        worst, omega = roots.least_ratio(roots.squared_magnitude(n + d), d2)
-        margin = math.sqrt(max(worst, 0.0))
+        peak, omega = roots.peak_ratio(d, n + d)
+        margin = 1.0 / peak
         how += "Necessary for stability, not sufficient"
-        return Verdict(worst > 0.0, margin, omega, (LINEAR,), how, "least |1 + L|")
-    worst, omega = roots.least_ratio(-n2, d2)
-    margin = 1.0 / math.sqrt(-worst) if worst else math.inf
+        return Verdict(margin > 0.0, margin, omega, (LINEAR,), how, "least |1 + L|")
+    peak, omega = roots.peak_ratio(n, d)
+    margin = 1.0 / peak if peak else math.inf
     how += "Sufficient for stability, not necessary"
     fails = roots.positive_bands(n2 - d2)
     measures = "least right side over left side"
