@@ -18,7 +18,8 @@ ROUNDED = 1e-14  # a sum below this share of its terms is their rounding
 NEARLY_REAL = 1e-3  # imaginary part of a double root that rounding has split, as a share of it
 SCAN_DENSITY = 24.0  # points of a scan per decade of omega^2, ...
 SCAN_BEYOND = 6.0  # which extends by so many decades on either side of all roots, ...
-REFINED = 6  # times that the least value of a scan is looked for on a grid 20 times as fine
+REFINED = 8  # times that a minimum is looked for on a grid 20 times as fine
+NOISE = 1e-12  # relative differences of values up to this are rounding
 SCAN_NEAR = np.linspace(-5.0, 5.0, 21)  # and closes in on a root, in units of its imaginary part
 
 
@@ -205,20 +206,21 @@ def _typical_size(*polynomials: Polynomial) -> float:
 def _in_unit(p: Polynomial, unit: float) -> Polynomial:
     """p as a polynomial in its variable over a unit."""
     p = p.trim()
-    return Polynomial(p.coef * unit ** np.arange(len(p.coef)))
+    return Polynomial(np.multiply(p.coef, unit ** np.arange(len(p.coef))))
 
 
 def _ratio(p: Polynomial, q: Polynomial, x: np.ndarray) -> np.ndarray:
     """p/q at x >= 0, infinity included; infinity where both vanish."""
-    n = max(len(p.coef), len(q.coef))
-    a, b = (np.pad(y.coef, (0, n - len(y.coef))) for y in (p, q))
-    far = x > 1.0
+    n = max(p.degree(), q.degree()) + 1
+    far = x > 1.0  # there in powers of 1/x
+
+    def value(y: Polynomial) -> np.ndarray:
+        back = Polynomial(np.pad(y.coef, (0, n - len(y.coef)))[::-1])
+        return np.where(far, back(1.0 / np.where(far, x, 1.0)), y(np.where(far, 1.0, x)))
+
     with np.errstate(divide="ignore", invalid="ignore"):
-        near, back = np.where(far, 1.0, x), np.where(far, 1.0 / x, 1.0)
-        top = np.where(far, np.polyval(a, back), np.polyval(a[::-1], near))
-        bottom = np.where(far, np.polyval(b, back), np.polyval(b[::-1], near))
-        value = top / bottom
-    return np.where(np.isnan(value), math.inf, value)
+        out = value(p) / value(q)
+    return np.where(np.isnan(out), math.inf, out)
 
 
 def _least_value(
@@ -236,15 +238,37 @@ def _least_value(
     ends = np.array([0.0, math.inf])
     at_ends, x = value(ends), np.union1d(_scan(found), _polished(slope))
     y = value(x)
-    for _ in range(REFINED):
-        i = int(np.argmin(y))
-        x = np.union1d(np.linspace(x[max(i - 1, 0)], x[min(i + 1, len(x) - 1)], 41), x[i])
-        y = value(x)
-    i, j = int(np.argmin(at_ends)), int(np.argmin(y))
+    best, place = refined_minimum(value, x, y, int(np.argmin(y)))
+    i = int(np.argmin(at_ends))
+    end = float(at_ends[i])
     # near an end the values differ from that of the end by their rounding
-    if y[j] < at_ends[i] - 1e-12 * abs(at_ends[i]):
-        return float(y[j]), float(x[j])
-    return float(at_ends[i]), float(ends[i])
+    if best < (end - NOISE * abs(end) if math.isfinite(end) else end):
+        return best, place
+    return end, float(ends[i])
+
+
+def refined_minimum(
+    f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, y: np.ndarray, i: int
+) -> tuple[float, float]:
+    """A minimum of f, and its place, from the values y at ascending x around the least, y[i].
+
+    The function may be infinite; the search then ends at the border of where it is finite.
+
+    Args:
+        f: function of arrays, shape (n,) to (n,).
+        x: shape (n,).
+        y: f(x), shape (n,).
+        i: index of a y that is no larger than its neighbours.
+    """
+    for _ in range(REFINED):
+        if math.isinf(y[i]):
+            break
+        rises = np.flatnonzero(y > y[i] + NOISE * abs(y[i]))  # two places may differ by rounding
+        low, high = rises[rises < i].max(initial=0), rises[rises > i].min(initial=len(x) - 1)
+        x = np.union1d(np.linspace(x[low], x[high], 41), x[i])
+        y = f(x)
+        i = int(np.argmin(y))
+    return float(y[i]), float(x[i])
 
 
 def _difference(a: Polynomial, b: Polynomial, c: Polynomial, d: Polynomial) -> Polynomial:
