@@ -351,11 +351,10 @@ def verdicts(loop: PushedLoop, delay: float = 0.0) -> list[dict[str, Any]]:
         small = stability_margins.small_gain(linear, equation=equation)
         judge(f"small gain, Eq. {equation}", small, "right over left side")
     judge("passive: stable with every hand", loop_passivity.passivity(linear), "least Re Z [N.s/m]")
-    judge(
-        "held clay passive with this hand",
-        loop_passivity.clay_passivity(loop.b, Ts, loop.hand.damper),
-        "N.s/m to spare",
-    )
+    for late in (0.0, delay) if delay else (0.0,):
+        clay = loop_passivity.clay_passivity(loop.b, Ts, loop.hand.damper, delay=late)
+        question = f"... {1e3 * late:g} ms late" if late else "held clay passive with this hand"
+        judge(question, clay, "N.s/m to spare")
     transparency = stability_margins.transparency(linear, np.array([ONE_HZ]))[0]
     response("transparency |fe/fh| at 1 Hz", float(abs(transparency)), "1 at best", ONE_HZ)
     return rows
