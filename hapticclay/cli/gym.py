@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import tyro
 
 from ..errors import ParameterError, integer, number
 from .console import text_table
+from .unused import Unused
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,11 @@ class GymCommand:
     noise: float = 0.1
     name: str | None = None
     engine: Literal["auto", "python", "native"] = "auto"
+
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("seeds",), "is for baselines: say gym baselines", ("action=dataset",)),
+        Unused(("episodes", "noise"), "is for a data set: say gym dataset", ("action=baselines",)),
+    )
 
     def __call__(self) -> int:
         integer("seeds", self.seeds, 2, 100_000)

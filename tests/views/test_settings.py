@@ -56,7 +56,9 @@ def pictures(record):
     plan = Plan(np.array([(-0.1, -0.2), (0.0, -0.1), (0.0, 0.0)]), np.zeros((2, 2)),
                 np.array([(0.0, 0.0), (0.05, 0.02)]), ((0.02, -0.02, 0.03, 0.05),), 0.002,
                 (0.0, 0.0, 0.01), "0.1 s")  # fmt: skip
-    yield "plan", PlanPicture(False).draw(plan).tobytes()
+    drawn = PlanPicture(False).draw(plan)
+    assert drawn is not None
+    yield "plan", drawn.tobytes()
 
 
 @pytest.mark.filterwarnings("ignore::matplotlib.MatplotlibDeprecationWarning")
