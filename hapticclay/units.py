@@ -33,12 +33,15 @@ def parse_unit(text: str) -> tuple[Decimal, tuple[int, ...]] | None:
     """Size of a unit in SI units and its powers of m, kg, s and rad; None if it is unknown.
 
     Args:
-        text: the unit, as in "N.s/m" or "kg.m^2"; a slash divides by the next factor only.
+        text: the unit, as in "N.s/m" or "kg.m^2"; a slash divides by the next factor only. A space
+            multiplies as a dot does, and Ns and Nm are N.s and N.m.
     """
     for sign, plain in (("µ", "u"), ("μ", "u"), ("²", "^2"), ("³", "^3"), ("·", "."), ("*", ".")):
         text = text.replace(sign, plain)
+    text = re.sub(r"\s*([./])\s*", r"\1", text.replace(" per ", "/").strip())
+    text = re.sub(r"\bN(?=[sm]\b)", "N.", re.sub(r"\s+", ".", text))
     size, powers = Decimal(1), (0, 0, 0, 0)
-    for stroke, factor in re.findall(r"(^|[./])([^./]*)", text.replace(" per ", "/").strip()):
+    for stroke, factor in re.findall(r"(^|[./])([^./]*)", text):
         found = FACTOR.fullmatch(factor.strip())
         if not found:
             return None

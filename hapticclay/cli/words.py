@@ -22,10 +22,17 @@ from ..errors import ParameterError, choice, quantity
 from ..units import is_quantity
 from .commands import COMMANDS, load_command
 from .console import scenario_words
-from .unused import refuse_unused
+from .unused import Unused, refuse_unused
 
 PATHS = ("file", "record")  # words behind a command before the path of a scenario or a record
 HELP = ("-h", "--help")
+OF_SAMPLING = (
+    Unused(
+        ("render",),
+        "is of sampled control: give --control sampled too",
+        without=("control=sampled", "scenario=file"),
+    ),
+)
 KINDS: dict[Any, str] = {float: "number", int: "whole number"}
 
 
@@ -302,7 +309,7 @@ def check_words(words: Sequence[str]) -> None:
             continue
         head, equals, value = word.partition("=")
         name = _plain(head)
-        if name not in _option_names(slots):
+        if name not in _option_names(slots) or not head.startswith("--"):
             raise _unknown(head, path, slots)
         slot = slots.get(name, Slot(bool))  # as --no-plots
         values = [value] if equals else []
@@ -310,7 +317,8 @@ def check_words(words: Sequence[str]) -> None:
         _check_option(f"--{name}", values, slot.kind)
         _note(name, values, given)
     given |= _check_loose(loose, path, slots)
-    refuse_unused(getattr(load_command(words[0]), "unused", ()), _with_fields(given))
+    rules = getattr(load_command(words[0]), "unused", ())
+    refuse_unused((*rules, *OF_SAMPLING), _with_fields(given))
 
 
 def _note(name: str, values: list[str], given: dict[str, list[str]]) -> None:
@@ -375,7 +383,10 @@ def _check_loose(loose: list[str], path: str, slots: dict[str, Slot]) -> dict[st
             _check_option(name, given, kind)
             out[name] = given
     if loose:
-        raise _refused(f"unexpected argument {loose[0]!r} of {path}")
+        name, equals, value = loose[0].partition("=")
+        option = f"; did you mean --{_plain(name)} {value}?"
+        hint = option if equals and _plain(name) in _option_names(slots) else ""
+        raise _refused(f"unexpected argument {loose[0]!r} of {path}{hint}")
     return out
 
 

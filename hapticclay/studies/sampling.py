@@ -63,7 +63,7 @@ class Range:
         Raises:
             ParameterError: it is none of these.
         """
-        bound = 'must be like "1:1000:50log", "0.2:2:20", "0.2:2" or "1,2,5"'
+        bound = 'must be like "1:1000:50log", "0.2:2:20", "0.2:2" or "1,2,5", from low to high'
         items = (
             text if isinstance(text, list | tuple) else None if isinstance(text, str) else [text]
         )
@@ -158,6 +158,9 @@ class Sweep:
             self._size()
         if not self.vary:
             raise ParameterError("grid", "", "must vary a parameter, as in b=1:1000:50log")
+        for name in self.vary.keys() & self.fixed.keys():
+            bound = "is varied: leave it out of the fixed ones"
+            raise ParameterError(name, self.fixed[name], bound)
         if (self.runs is None) != (self.design == "grid"):
             raise ParameterError(
                 "runs", self.runs, "must be given for 'lhs' and 'sobol', and for them alone"

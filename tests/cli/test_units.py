@@ -188,6 +188,9 @@ def test_one_number_for_two_quantities_is_refused(capsys):
             "run constant --no-plots --format svg",
             "format = 'svg': is for figures, which --no-plots",
         ),
+        ("run constant --render physical", "render = 'physical': is of sampled control"),
+        ("run constant --set render=physical", "render = 'physical': is of sampled control"),
+        ("sweep --grid b=1:5:2 --fixed b=3", "b = 3.0: is varied: leave it out of the fixed ones"),
         ("run constant --b 5 --set b=6", "--b, --set b: give one once"),
         ("accuracy constant --integrator fast", "integrator = 'fast': is varied by this command"),
         ("accuracy constant --dt 1e-3", "dt = '1e-3': is varied by this command"),
@@ -245,6 +248,41 @@ def test_a_push_that_tries_no_loop_is_said(capsys, tmp_path):
     code, _, err = run(capsys, f"zwidth --B 1 --force 2N --out {tmp_path}")
     assert code == 0 and "--force did not count: no push tries a loop that is linear" in err
     assert json.loads((tmp_path / "zwidth.json").read_text())["press"]["force"] == 2.0
+
+
+@pytest.mark.parametrize(
+    "words,told",
+    [
+        ("run constant -b 50", "-b: no option of run constant; did you mean --b?"),
+        (
+            "run constant -operator",
+            "-operator: no option of run constant; did you mean --operator?",
+        ),
+        ("run constant b=50", "unexpected argument 'b=50' of run constant; did you mean --b 50?"),
+        ("run constant x=50", "unexpected argument 'x=50' of run constant\n"),
+        ("sweep --grid b=9:5:3", "from low to high"),
+    ],
+)
+def test_a_slip_is_told_what_was_meant(capsys, words, told):
+    code, out, err = run(capsys, words)
+    assert (code, out) == (2, "") and err.count("\n") == 1 and told in err
+
+
+@pytest.mark.parametrize(
+    "text,plain",
+    [
+        ("Ns/m", "N.s/m"), ("N s/m", "N.s/m"), ("N * s / m", "N.s/m"), ("Nm", "N.m"),
+        ("Ns^2/m^2", "N.s^2/m^2"), ("kg m^2", "kg.m^2"), ("mN s/m", "mN.s/m"),
+        ("N.s/m per s", "N.s/m/s"),
+    ],
+)  # fmt: skip
+def test_a_unit_may_be_written_as_in_a_paper(text, plain):
+    assert units.parse_unit(text) == units.parse_unit(plain) is not None
+
+
+@pytest.mark.parametrize("text", ["Nss", "Na", "N,s", "ms m s x", "", "N/", "N..s"])
+def test_other_texts_are_no_units(text):
+    assert units.parse_unit(text) is None
 
 
 # ---- files of another kind -----------------------------------------------------------------------
