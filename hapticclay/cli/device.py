@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from ..errors import ParameterError, number
+from ..errors import ParameterError, number, number_in
 from ..files import writable
 from . import console
 from .device_options import deliver_loops, write_report
@@ -195,10 +195,14 @@ def trajectory_of(words: tuple[str, ...]) -> Trajectory | None:
         return None
     if len(words) == 1 and Path(words[0]).suffix.lower() == ".csv":
         return Trajectory.of_file(words[0])
+    units = ("m", "m", "m", "m", "m/s")
     try:
-        x = [float(word) for word in words]
+        x = [number_in("hand", w, unit) for w, unit in zip(words, units, strict=False)]
+    except ParameterError:  # of a unit
+        raise
     except ValueError:
         x = []
+    x = x if len(x) == len(words) else []
     if len(x) == 2:
         return Trajectory.to((x[0], x[1]))
     if len(x) == 5 and x[:2] != x[2:4]:

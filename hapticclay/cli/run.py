@@ -7,13 +7,14 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import tyro
 
 from ..files import writable
 from ..model.constants import AXES
 from . import console
+from .unused import Unused, undrawn
 
 if TYPE_CHECKING:
     from ..model.clay import Clay
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 EVERYWHERE = (-math.inf, -math.inf), (math.inf, math.inf)  # corners of all clay [m]
 MOST_CLAYS = 33  # dampings whose gain limits are computed
 MOST_ROWS = 6  # of a kind that the table shows
+CHOSEN = "is chosen by --error: leave it out"
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,13 @@ class RunCommand:
     error: str | None = None
     plots: bool = True
     figures: console.FigureOptions = console.FigureOptions()
+
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("integrator",), CHOSEN, ("error",)),
+        Unused(("dt",), CHOSEN, ("error",), ("control=sampled",)),
+        Unused(("dt",), CHOSEN, ("error", "Ts")),
+        *undrawn("no-plots"),
+    )
 
     def __call__(self) -> int:
         out = self.out or console.default_folder("run", self.scenario)

@@ -159,12 +159,12 @@ class Identified(Result):
     source: str = ""
 
     def headline(self) -> str:
-        """Block, axis and coefficients with their intervals, in one line."""
+        """Block, axis or source, and coefficients with their intervals, in one line."""
         told = (
             f"{c.name} {c.value:.5g} ({c.low:.5g} to {c.high:.5g}) {c.unit}"
             for c in self.coefficients
         )
-        return f"{self.what} of {self.axis}: {', '.join(told)}"
+        return f"{self.what} of {self.source or self.axis}: {', '.join(told)}"
 
     def tables(self) -> dict[str, dict[str, Any]]:
         """Coefficients, and the response beside those of the fit and of the paper."""
