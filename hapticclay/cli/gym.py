@@ -7,8 +7,9 @@ from typing import Annotated, ClassVar, Literal
 
 import tyro
 
-from ..errors import ParameterError, integer
+from ..errors import integer
 from .console import progress_bar, text_table
+from .unused import Unused
 
 SEEDS, EPISODES, NOISE = 100, 100, 0.1  # where none is given
 
@@ -42,20 +43,21 @@ class GymCommand:
     name: str | None = None
     engine: Literal["auto", "python", "native"] = "auto"
 
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("seeds",), "is for baselines: say gym baselines", ("action=dataset",)),
+        Unused(
+            ("episodes", "noise", "name"),
+            "is for a data set: say gym dataset",
+            ("action=baselines",),
+        ),
+    )
+
     def __call__(self) -> int:
         return self._dataset() if self.action == "dataset" else self._baselines()
-
-    def _without(self, *names: str) -> None:
-        """Refuses options of the other action."""
-        other = "baselines" if self.action == "dataset" else "dataset"
-        for name in names:
-            if (value := getattr(self, name)) is not None:
-                raise ParameterError(name, value, f"must not be given: it is for gym {other}")
 
     def _baselines(self) -> int:
         from ..gym import baselines, scores
 
-        self._without("episodes", "noise", "name")
         seeds = integer("seeds", SEEDS if self.seeds is None else self.seeds, 2, 100_000)
         rows, means = [], {}
         for name, maker in baselines.BASELINES[self.env].items():
@@ -72,7 +74,6 @@ class GymCommand:
     def _dataset(self) -> int:
         from ..gym import dataset
 
-        self._without("seeds")
         episodes = EPISODES if self.episodes is None else self.episodes
         noise = NOISE if self.noise is None else self.noise
         stem = self.env.partition("-")[0].lower()
