@@ -237,10 +237,12 @@ def of_positions(
     ]
     at, sliding = (np.concatenate([np.arange(*x) for x in some]) for some in (pieces, single))
     place = np.where(good[at], p[at], 0.0)
-    force = direction[sliding] * f[sliding]
-    one_way = [Stretch(t[a:b], (), told[a:b]) for a, b in single]
-    spacing, (of_p, of_f) = chosen_spacing([Series(stretches, place), Series(one_way, force)])
-    sliding, force = sliding[told[sliding]], force[told[sliding]]
+    one_way = [x for a, b in single for x in _without_gaps(told, a, b)]
+    told_at = np.concatenate([np.arange(*x) for x in one_way])
+    forces = [Stretch(t[a:b], (), told[a:b]) for a, b in one_way]
+    series = [Series(stretches, place), Series(forces, direction[told_at] * f[told_at])]
+    spacing, (of_p, of_f) = chosen_spacing(series)
+    sliding = sliding[told[sliding]]
     sign = direction[sliding]
     motion = Motion(stretches, spacing, np.searchsorted(at, sliding), sign)
     c = motion.follow(place)
@@ -251,7 +253,7 @@ def of_positions(
     return Sliding(
         t[sliding],
         sign,
-        force,
+        sign * f[sliding],
         place,
         c,
         float(slow.min()),
@@ -273,6 +275,13 @@ def _unbroken(inside: np.ndarray, p: Cleaned) -> np.ndarray:
         if stop - first > LEAST_PER_KNOT:
             out[first:stop] = False
     return out
+
+
+def _without_gaps(kept: np.ndarray, start: int, stop: int) -> list[tuple[int, int]]:
+    """Parts of a run that begin and end with kept samples, without long gaps, not too short."""
+    good = np.flatnonzero(kept[start:stop]) + start
+    parts = np.split(good, np.flatnonzero(np.diff(good) > LEAST_PER_KNOT) + 1)
+    return [(int(x[0]), int(x[-1]) + 1) for x in parts if len(x) >= LEAST_PER_KNOT]
 
 
 def _slowest(motion: Motion, runs: list[tuple[int, int]], margin: int, sigma: float) -> np.ndarray:
