@@ -219,7 +219,16 @@ def coefficient_table(results: Sequence[Identified], paper: bool = True) -> str:
     counts = ", ".join(f"{r.what}{r.axis} {len(r.frequency)}" for r in results)
     table = console.text_table(rows, head, "lllrrrr"[: len(head)])
     way = "".join(f"; {r.source}: {r.estimate}" for r in results if r.scenario is None)
-    return f"{table}\nlines: {counts}; lowest coherence {low:.6f}{way}"
+    lines = [table, f"lines: {counts}; lowest coherence {low:.6f}{way}"]
+    for r in results:
+        if r.scenario is None and r.what == "S":
+            mass, damper, spring = r.device
+            lines.append(
+                f"as a device: mass {mass:.5g} kg, damper {damper:.5g} N.s/m, "
+                f"spring {spring:.5g} N/m"
+            )
+        lines += [f"warning: {x}" for x in r.warnings]
+    return "\n".join(lines)
 
 
 def drift_table(found: Drift) -> str:

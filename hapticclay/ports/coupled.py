@@ -21,6 +21,7 @@ from ..simulation.stepwise import Simulation
 from .client import PLAIN, DeviceClient, DeviceSample, Limits
 from .client_log import ClientLog, Timing
 from .commands import NOTHING, Pair
+from .device import ended_as_planned
 from .planes import PLANES, to_plane, to_space
 
 SETTLING = 50  # exchanges without force to measure the period of the device
@@ -255,6 +256,8 @@ def render(
         if not simulation.t:
             raise ParameterError("device", url, "must answer in time")
         record = simulation.record()
+        if not client.lost:
+            record = ended_as_planned(record)
         notes = {**record.notes, "device": hand.notes()}
     return Rendered(replace(record, notes=notes), client.log, client.log.timing())
 

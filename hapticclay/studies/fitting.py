@@ -41,7 +41,7 @@ from .flow_models import (
     to_theta,
 )
 from .measurement import Measurement
-from .outliers import NAMED, Cleaned, cleaned, robust_deviation, sentence
+from .outliers import LOST, Cleaned, cleaned, robust_deviation, sentence, times
 from .sliding import (
     FAST,
     LEAST_SLIDING,
@@ -433,18 +433,16 @@ def _left_out(r: Fitted, data: _Columns, out: np.ndarray) -> tuple[str, ...]:
     """Warnings about outliers."""
     told, n = [], r.samples
     if len(r.position_outliers):
-        why = "the position jumps away and back, or stands still and jumps on: lost packets?"
-        told.append(sentence("position", r.position_outliers, n, why))
+        told.append(sentence("position", r.position_outliers, n, LOST))
     steps = data.place.steps if data.place else ()
     steps = [i for i in steps if data.inside[i]]
     if steps:
-        at = ", ".join(f"{x:.6g}" for x in data.t[steps[:NAMED]].tolist())
         told.append(
-            f"the position jumps and does not return, {len(steps)} times (t = {at} s"
-            f"{', ...' if len(steps) > NAMED else ''}): the motion is fitted in parts"
+            f"the position jumps and does not return at t = {times(data.t[steps])} s: the motion "
+            "is fitted in parts"
         )
     if len(r.force_outliers):
-        why = f"they lie more than {OUTLYING:g} deviations from any law"
+        why = f"more than {OUTLYING:g} deviations from any law"
         if n_wrong := np.count_nonzero(wrong_way(data.f, data.place, data.v)[out]):
             why += (
                 f"; {n_wrong} of them drive the motion: wrong signs, or a delay between the columns"

@@ -141,6 +141,7 @@ class Identified(Result):
         periods: periods kept of each run; 0 for a measured record without a period.
         realisations: number of runs.
         source: name of the measured columns; empty for the simulated arm.
+        warnings: limits of the result, one sentence each.
     """
 
     drawn_by = "hapticclay.views.identification_plots:identified_plot"
@@ -158,6 +159,7 @@ class Identified(Result):
     periods: int
     realisations: int
     source: str = ""
+    warnings: tuple[str, ...] = ()
 
     def headline(self) -> str:
         """Block, axis and coefficients with their intervals, in one line."""
@@ -184,6 +186,18 @@ class Identified(Result):
         return "whole record, with its start and end"
 
     @property
+    def device(self) -> tuple[float, float, float]:
+        """Mass [kg], damper [N.s/m] and spring [N/m] of what moves: a device, or an arm at a pose.
+
+        Raises:
+            ParameterError: of G, whose input is no force.
+        """
+        if self.what == "G":
+            raise ParameterError("what", self.what, 'must be "S" or "Th": their input is a force')
+        a, b, c = self.values
+        return (a, b, c) if self.what == "Th" else (1.0 / a, b / a, c / a)
+
+    @property
     def values(self) -> tuple[float, ...]:
         """The fitted coefficients, in order."""
         return tuple(c.value for c in self.coefficients)
@@ -208,6 +222,7 @@ class Identified(Result):
             "seed": self.seed,
             "periods": self.periods,
             "realisations": self.realisations,
+            "warnings": list(self.warnings),
             "units": {
                 "frequency": "Hz",
                 "response": {"G": "m/m", "S": "m/N", "Th": "N/m"}[self.what],

@@ -23,6 +23,7 @@ BLOCK = 200  # samples over which the deviation of the prediction is measured
 LONGEST = 24  # samples from a jump to the jump back
 SIDES = (8, 3)  # samples on each side that bridge a gap; fewer where another gap is near
 FAR = 4.0  # outliers lie so much farther from the bridge than the samples that carry it
+LOST = "jumps away and back, or values that repeat before a jump: lost packets?"
 NAMED = 3  # times that a sentence names
 
 
@@ -97,7 +98,7 @@ def runs_of(mask: np.ndarray) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
-def sentence(column: str, t: Sequence[float], samples: int, why: str) -> str:
+def sentence(column: str, t: Sequence[float] | np.ndarray, samples: int, why: str) -> str:
     """A warning about samples that are left out.
 
     Args:
@@ -106,9 +107,18 @@ def sentence(column: str, t: Sequence[float], samples: int, why: str) -> str:
         samples: number of samples of the column.
         why: what is wrong with them.
     """
-    at = ", ".join(f"{x:.6g}" for x in t[:NAMED]) + (", ..." if len(t) > NAMED else "")
-    many = "s are" if len(t) > 1 else " is"
-    return f"{len(t)} of {samples} {column} sample{many} left out, at t = {at} s: {why}"
+    are = "are" if len(t) > 1 else "is"
+    return f"{len(t)} of {samples} {column}s {are} left out, at t = {times(t)} s: {why}"
+
+
+def times(t: Sequence[float] | np.ndarray) -> str:
+    """The first of some times, in words.
+
+    Args:
+        t: the times [s].
+    """
+    more = ", ..." if len(t) > NAMED else ""
+    return ", ".join(f"{x:.6g}" for x in t[:NAMED]) + more
 
 
 def _jumps(x: np.ndarray, count: float) -> np.ndarray:
