@@ -17,6 +17,7 @@ import json
 import math
 import multiprocessing
 import statistics
+from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -46,7 +47,11 @@ BLOCKS: tuple[tuple[str, bool], ...] = (
 
 
 def one(
-    seed: int, blocks: tuple[tuple[str, bool], ...] = BLOCKS, axes: str = "xy", **kw: Any
+    seed: int,
+    blocks: tuple[tuple[str, bool], ...] = BLOCKS,
+    axes: str = "xy",
+    sensors: Mapping[str, hc.studies.Noise] = SENSORS,
+    **kw: Any,
 ) -> list[dict[str, Any]]:
     """A row for each coefficient of each block and sensor:
 
@@ -71,7 +76,7 @@ def one(
             }
             for what, shaping in blocks
             for axis in axes
-            for name, noise in SENSORS.items()
+            for name, noise in sensors.items()
             for c in hc.studies.identify(
                 axis, what, inertia_shaping=shaping, noise=noise, seed=seed, **kw
             ).coefficients

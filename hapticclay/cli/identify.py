@@ -29,7 +29,7 @@ MEASURED_ONLY = ("what", "columns", "band", "held", "paper")
 
 @dataclass(frozen=True)
 class IdentifyCommand:
-    """Identify G, Sh and Th on the simulated arm (Figs. 4, 5, 6); takes half a minute.
+    """Identify G, Sh and Th on the simulated arm (Figs. 4, 5, 6); takes a minute.
 
     With --csv, identify one of them from measured columns in SI units.
 
