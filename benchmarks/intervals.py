@@ -112,6 +112,11 @@ def page(found: list[dict[str, Any]]) -> str:
             f"{x['covered']:.3f}, {x['half']:.1e}"
         )
     n = found[0]["seeds"]
+    mean = {
+        name: statistics.mean(x["covered"] for x in found if x["sensors"] == name)
+        for name in SENSORS
+    }
+    cells["all", "", "mean share"] = [f"{x:.3f}" for x in mean.values()]
     return (
         "\n\n".join(
             [

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import named
+from ..display import brief
 from ..errors import ParameterError, array_of, choice
 from ..units import parse_unit
 
@@ -54,6 +55,9 @@ class Measurement:
         ParameterError: a column is not such an array, is constant or too short; a value is not
             finite; the sampling is uneven.
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     t: np.ndarray
     input: np.ndarray

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..display import brief
 from ..errors import choice
 from ..model.constants import TS
 from ..theory import gain_crossings, loop_passivity, stability_margins
@@ -63,6 +64,9 @@ class StabilityMap:
         limit: name of the line of the linear loop of the runs: above it, the gain margin is below
             1; "" for none.
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     kind: str
     loop: PushedLoop

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arguments import checked
+from ..display import brief
 from ..errors import ParameterError, number, pair
 from ..model.arm import inverse_kinematics, jacobian, mobility
 from ..scene.scenario import Scenario
@@ -41,6 +42,9 @@ class Handle:
         stiffness: stiffness of the hand [N/m], shape (2,).
         normal: unit normal of the wall, shape (2,).
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     inertia: np.ndarray
     damping: np.ndarray

@@ -161,7 +161,7 @@ def test_a_position_that_jumps_for_good_parts_the_motion():
 def test_a_smooth_column_stays_as_it_is(seed, noise, count, band):
     """Of sines up to a twentieth of the sampling rate, noisy or rounded: no outlier, same bits."""
     rng = np.random.default_rng(seed)
-    omega = 2.0 * np.pi * rng.uniform(*band, 4)
+    omega = 2.0 * np.pi * rng.uniform(band[0], band[1], 4)
     x = 0.01 * np.sin(omega * T[:, None] + rng.uniform(0.0, 6.3, 4)) @ rng.uniform(0.3, 1.0, 4)
     x = x + noise * rng.standard_normal(N)
     x = count * np.round(x / count) if count else x
