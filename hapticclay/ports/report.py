@@ -84,8 +84,6 @@ class LoopReport(Result):
         period: median of the simulated time between two messages [s].
         delay: simulated time from a measurement to the force computed from it [s];
             NaN if the forces do not determine it.
-        longest_delay: longest delay that explains the forces as well [s]; inf where older answers
-            than those that were tried may.
         limited: share of the messages whose force was limited, or added to that of others.
         K: stiffness estimated from the forces [N/m]; NaN if they do not determine it.
         B: damping estimated from the forces [N.s/m]; NaN if they do not determine it.
@@ -100,6 +98,9 @@ class LoopReport(Result):
         line_B: damping along the theoretical limit line [N.s/m], from 0 on.
         line_K: largest stable stiffness there [N/m]: the Z-width at this period, delay and hand.
         note: why K and B could not be estimated; "" if they were.
+        longest_delay: longest delay that explains the forces as well [s]; inf where older answers
+            than those that were tried may; NaN
+            without a wall.
     """
 
     drawn_by = "hapticclay.views.loop_plots:loop_plot"
@@ -109,7 +110,6 @@ class LoopReport(Result):
     intervals: tuple[float, float]
     period: float
     delay: float
-    longest_delay: float
     limited: float
     K: float
     B: float
@@ -122,6 +122,7 @@ class LoopReport(Result):
     line_B: tuple[float, ...]
     line_K: tuple[float, ...]
     note: str = ""
+    longest_delay: float = math.nan
 
     @property
     def verdict(self) -> str:
