@@ -103,8 +103,9 @@ class DeviceCommand:
                 if ended := server.service.device.ended:
                     print(f"hapticclay: the arm stopped: {ended}", file=sys.stderr)
                     break
+            planned = not stop.is_set()
             server.close()
-            return self._deliver(server, out)
+            return self._deliver(server, out, planned)
 
     def _server(self) -> Any:
         from ..ports.buttons import ButtonScript
@@ -137,18 +138,21 @@ class DeviceCommand:
             inverse3=shown,
         )
 
-    def _deliver(self, server: DeviceServer, out: Path) -> int:
-        """Writes and prints what happened."""
+    def _deliver(self, server: DeviceServer, out: Path, planned: bool) -> int:
+        """Writes and prints what happened; `planned` where the session lasted its duration."""
+        from ..ports.device import ended_as_planned
+
         service = server.service
         if not service.device.t:
             print("nothing was recorded")
             return 0
-        record = server.record()
-        deliver(record, out, self.figures if self.plots else None)
+        record = ended_as_planned(server.record()) if planned else server.record()
+        deliver(record, out, self.figures if self.plots else None, paced=True)
         if service.skipped:
             share = service.skipped / (service.skipped + service.samples)
             text = f"{service.skipped} control samples ({share:.1%}) were skipped"
-            print(f"hapticclay: {text}: the computer was late", file=sys.stderr)
+            why = "the computer was late; --clock tick skips none"
+            print(f"hapticclay: {text}: {why}", file=sys.stderr)
         figures = self.figures if self.plots else None
         deliver_loops(server.exchanges, record.scenario, out, figures)
         return 0

@@ -30,7 +30,7 @@ MEASURED_ONLY = ("what", "columns", "band", "held", "paper")
 
 @dataclass(frozen=True)
 class IdentifyCommand:
-    """Identify G, Sh and Th on the simulated arm (Figs. 4, 5, 6); takes half a minute.
+    """Identify G, Sh and Th on the simulated arm (Figs. 4, 5, 6); takes a minute.
 
     With --csv, identify one of them from measured columns in SI units.
 
@@ -221,7 +221,16 @@ def coefficient_table(results: Sequence[Identified], paper: bool = True) -> str:
     counts = ", ".join(f"{r.what}{r.axis if paper else ''} {len(r.frequency)}" for r in results)
     table = console.text_table(rows, head, "".join("r" if x in NUMBERS else "l" for x in head))
     way = "".join(f"; {r.source}: {r.estimate}" for r in results if r.scenario is None)
-    return f"{table}\nlines: {counts}; lowest coherence {low:.6f}{way}"
+    lines = [table, f"lines: {counts}; lowest coherence {low:.6f}{way}"]
+    for r in results:
+        if r.scenario is None and r.what == "S":
+            mass, damper, spring = r.device
+            lines.append(
+                f"as a device: mass {mass:.5g} kg, damper {damper:.5g} N.s/m, "
+                f"spring {spring:.5g} N/m"
+            )
+        lines += [f"warning: {x}" for x in r.warnings]
+    return "\n".join(lines)
 
 
 def drift_table(found: Drift) -> str:

@@ -117,7 +117,7 @@ class ViewCommand:
         record = session.record()
         out = self.out or console.default_folder("view", record.scenario)
         figures = self.figures if self.plots else None
-        deliver(record, out, figures)
+        deliver(record, out, figures, paced=True)
         self.devices.deliver(session, out, figures)
         return 0
 

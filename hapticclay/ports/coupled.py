@@ -21,6 +21,7 @@ from ..simulation.stepwise import Simulation
 from .client import DeviceClient, DeviceSample
 from .client_log import ClientLog, Timing
 from .commands import NOTHING, Pair
+from .device import ended_as_planned
 from .limits import PLAIN, Limits
 from .planes import PLANES, to_plane, to_space
 
@@ -257,6 +258,8 @@ def render(
         if not simulation.t:
             raise ParameterError("device", url, "must answer in time")
         record = simulation.record()
+        if not client.lost:
+            record = ended_as_planned(record)
         notes = {**record.notes, "device": hand.notes()}
     return Rendered(replace(record, notes=notes), client.log, client.log.timing())
 

@@ -217,6 +217,17 @@ class SimulatedDevice:
         return replace_scenario(self._simulation.record(), self.scenario)
 
 
+def ended_as_planned(record: Record) -> Record:
+    """A record of a session that lasted as long as it was to last.
+
+    Args:
+        record: the record; one that ended in another way is returned as it is.
+    """
+    if record.outcome.code != "interrupted":
+        return record
+    return replace(record, outcome=replace(record.outcome, code="time limit"))
+
+
 def replace_scenario(record: Record, scenario: Scenario) -> Record:
     """A record whose scenario does not contain the law that the client replaces.
 

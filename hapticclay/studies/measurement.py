@@ -16,6 +16,7 @@ import numpy as np
 
 from ..arguments import named
 from ..columns import Sheet, unreadable
+from ..display import brief
 from ..errors import ParameterError, array_of, choice
 
 COLUMNS = {  # columns of a file and their contents
@@ -50,6 +51,9 @@ class Measurement:
         ParameterError: a column is not such an array, is constant or too short; a value is not
             finite; the sampling is uneven.
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     t: np.ndarray
     input: np.ndarray

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..display import brief
 from ..errors import choice
 from ..model.constants import TS
 from ..scene.virtual_wall import Device, VirtualWall
@@ -64,6 +65,9 @@ class StabilityMap:
         limit: name of the line of the linear loop of the runs: above it, the gain margin is below
             1; "" for none.
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     kind: str
     loop: PushedLoop

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..arguments import named
-from ..display import html_table
+from ..display import brief, html_table
 from ..errors import (
     ParameterError,
     array_of,
@@ -118,6 +118,9 @@ class Nyquist:
         N: clockwise encirclements of -1 by the image of the contour.
         P: poles of L right of the axis.
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     omega: np.ndarray
     L: np.ndarray
