@@ -71,6 +71,23 @@ def quantity(field: str, text: str, unit: str = "") -> float | None:
         raise ParameterError(field, text, str(error)) from None
 
 
+def number_in(field: str, text: object, unit: str = "") -> float:
+    """The number that a text stands for, "5" or "5 cm", in the unit of a field.
+
+    Args:
+        field: name for the error.
+        text: the number, with or without a unit; or a number.
+        unit: unit of the field, "" for none.
+
+    Raises:
+        ParameterError: the unit is unknown, or has another dimension than the field's.
+        ValueError: it is no number.
+        TypeError: likewise.
+    """
+    given = quantity(field, text, unit) if isinstance(text, str) else None
+    return float(text) if given is None else given  # type: ignore[arg-type]
+
+
 def number(
     field: str,
     value: object,

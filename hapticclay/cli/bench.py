@@ -5,9 +5,11 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from ..errors import ParameterError
 from ..files import writable
+from .unused import Unused
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,10 @@ class BenchCommand:
     quick: bool = False
     anew: bool = False
     check: bool = False
+
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("quick", "anew"), "is for measuring: leave it out with --check", ("check",)),
+    )
 
     def __call__(self) -> int:
         checkout = Path(__file__).resolve().parents[2]

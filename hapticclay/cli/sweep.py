@@ -10,12 +10,13 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import tyro
 
 from ..errors import ParameterError, integer
 from . import console
+from .unused import Unused, undrawn
 
 if TYPE_CHECKING:
     from ..studies.sampling import Sweep
@@ -26,6 +27,7 @@ STATUS_LINE = (
 )
 STATUS_EVERY = 0.1, 60.0  # share of the runs, and time [s], between two of these lines
 MAPPED = ("status", "fe_over_v_x", "speed_x", "end_time")  # columns that are drawn
+SAMPLED = "design=lhs", "design=sobol"
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,17 @@ class SweepCommand:
     scheduler: str | None = None
     maps: bool = True
     figures: console.FigureOptions = console.FigureOptions()
+
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(
+            ("grid", "fixed", "experiment", "design", "runs", "seed", "chunk"),
+            "must stand in the SPEC.toml, where one is given",
+            ("spec",),
+        ),
+        Unused(("seed",), "is of a sample: give --design lhs or sobol", (), ("spec", *SAMPLED)),
+        Unused(("workers",), "is for this machine: leave it out with --scheduler", ("scheduler",)),
+        *undrawn("no-maps"),
+    )
 
     def __call__(self) -> int:
         from ..studies import sweep_store

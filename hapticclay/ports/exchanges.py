@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import named
-from ..errors import ParameterError
+from ..columns import Sheet, unreadable
 from ..files import atomic
 from .rows import MOST_ROWS, Rows
 
@@ -131,15 +131,13 @@ class Exchanges:
         """
         file = Path(path) / FILE if Path(path).is_dir() else Path(path)
         try:
-            with file.open(newline="") as f:
-                head, *rows = list(csv.reader(f)) or [[]]
-            if tuple(head) != COLUMNS:
-                raise ValueError("other columns")
-            return cls.of_table(np.array([[float(x) for x in row] for row in rows]))
-        except (OSError, ValueError) as error:
-            why = getattr(error, "strerror", None) or error
-            bound = f"must be a file of exchanges ({why})"
-            raise ParameterError("record", str(path), bound) from None
+            sheet = Sheet.read("record", file)
+        except OSError as error:
+            raise unreadable("record", file, error) from None
+        if tuple(sheet.head) != COLUMNS:
+            raise sheet.refusal("must be a file of exchanges (other columns)")
+        columns = sheet.numbers({name: i for i, name in enumerate(COLUMNS)}, {})
+        return cls.of_table(np.column_stack([columns[name] for name in COLUMNS]))
 
 
 FILE = "exchanges.csv"  # stored with the record of a session

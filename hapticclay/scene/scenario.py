@@ -40,7 +40,7 @@ Force = Annotated[tuple[float, float], Bound(-1e6, 1e6, "N")]
 STEP_LEAST = 1e-6  # [s]
 StepLength = Annotated[float, Bound(STEP_LEAST, 0.02, "s")]
 Duration = Annotated[float, Bound(0.0, 1e5, "s", above=True)]
-Length = Annotated[float, Bound(-10.0, 10.0, "m")]
+Length = Annotated[float | None, Bound(-10.0, 10.0, "m")]
 Position = Annotated[tuple[float, float], Bound(unit="m")]
 TorqueLimit = Annotated[tuple[float, float], Bound(0.0, 1e6, "N.m", above=True, names=JOINTS)]
 SamplePeriod = Annotated[float | None, Bound("dt", 1.0, "s")]
@@ -107,7 +107,7 @@ class Scenario:
     inertia_shaping: bool = False
     dt: StepLength = TS
     t_max: Duration = 60.0
-    length: Annotated[float | None, Bound(-10.0, 10.0, "m")] = PATH_LENGTH
+    length: Length = PATH_LENGTH
     start: Position = (0.0, 0.0)
     velocity: Annotated[tuple[float, float], Bound(-10.0, 10.0, "m/s")] = (0.0, 0.0)
     origin: Position = ORIGIN

@@ -428,7 +428,7 @@ class Record:
             if file.exists() and not file.is_file():  # reading a pipe would block
                 raise ValueError("it is not a regular file")
             if file.is_file() and not zipfile.is_zipfile(file):
-                raise ValueError("it is no .npz file")
+                raise ValueError("give its folder, or its record.npz; this is another file")
             with open(file, "rb") as f, np.load(f, allow_pickle=False) as z:
                 check_headers(z.zip)
                 head = json.loads(str(z["summary"]))

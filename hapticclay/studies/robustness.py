@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
+from ..display import brief
 from ..errors import ParameterError, choice, integer
 from ..results import Result
 from ..scene.virtual_wall import VirtualWall
@@ -45,6 +46,9 @@ class RiskMap:
         runs: number of runs of each cell, shape (n, m).
         events: number of unstable runs of each cell, shape (n, m).
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     x_name: str
     y_name: str

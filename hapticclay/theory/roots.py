@@ -14,6 +14,13 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 VARIABLE = Polynomial([0.0, 1.0])  # s itself
+ROUNDED = 1e-14  # a sum below this share of its terms is their rounding
+NEARLY_REAL = 1e-3  # imaginary part of a double root that rounding has split, as a share of it
+SCAN_DENSITY = 24.0  # points of a scan per decade of omega^2, ...
+SCAN_BEYOND = 6.0  # which extends by so many decades on either side of all roots, ...
+REFINED = 8  # times that a minimum is looked for on a grid 20 times as fine
+NOISE = 1e-12  # relative differences of values up to this are rounding
+SCAN_NEAR = np.linspace(-5.0, 5.0, 21)  # and closes in on a root, in units of its imaginary part
 
 
 def roots(p: Polynomial) -> np.ndarray:
@@ -156,15 +163,147 @@ def least_ratio(R: Polynomial, Q: Polynomial) -> tuple[float, float]:
     Returns:
         (value, omega [rad/s]).
     """
-    R, Q = R.trim(), Q.trim()
-    x = np.concatenate(([0.0], positive_roots(R.deriv() * Q - R * Q.deriv())))
+    unit = _typical_size(R, Q)
+    R, Q = _in_unit(R, unit), _in_unit(Q, unit)
+    found = np.concatenate((nonzero_roots(R), nonzero_roots(Q)))
+    value, x = _least_value(lambda x: _ratio(R, Q, x), R, Q, found)
+    return value, math.sqrt(unit * x)
+
+
+def peak_ratio(p: Polynomial, q: Polynomial) -> tuple[float, float]:
+    """Largest |p/q| on the imaginary axis, 0 and infinity included, and its frequency.
+
+    The values come from p and q themselves: their squares lose half of the digits at a lightly
+    damped root of q.
+
+    Args:
+        p: polynomial with real coefficients.
+        q: polynomial with real coefficients.
+
+    Returns:
+        (value, omega [rad/s]).
+    """
+    unit = _typical_size(p, q)
+    p, q = _in_unit(p, unit), _in_unit(q, unit)
+    P, Q = on_axis(p), on_axis(q)
+    found = -(np.concatenate((nonzero_roots(p), nonzero_roots(q))).astype(complex) ** 2)
+    value, x = _least_value(
+        lambda x: -np.abs(_ratio(P, Q, np.sqrt(x))),
+        -squared_magnitude(p),
+        squared_magnitude(q),
+        found,
+    )
+    return -value, unit * math.sqrt(x)
+
+
+def _typical_size(*polynomials: Polynomial) -> float:
+    """Geometric mean of the roots' magnitudes; in this unit powers neither overflow nor vanish."""
+    size = np.abs(np.concatenate([nonzero_roots(p) for p in polynomials]))
+    size = size[(size > 0.0) & np.isfinite(size)]
+    return float(np.exp(np.mean(np.log(size)))) if len(size) else 1.0
+
+
+def _in_unit(p: Polynomial, unit: float) -> Polynomial:
+    """p as a polynomial in its variable over a unit."""
+    p = p.trim()
+    return Polynomial(np.multiply(p.coef, unit ** np.arange(len(p.coef))))
+
+
+def _ratio(p: Polynomial, q: Polynomial, x: np.ndarray) -> np.ndarray:
+    """p/q at x >= 0, infinity included; infinity where both vanish."""
+    n = max(p.degree(), q.degree()) + 1
+    far = x > 1.0  # there in powers of 1/x
+
+    def value(y: Polynomial) -> np.ndarray:
+        back = Polynomial(np.pad(y.coef, (0, n - len(y.coef)))[::-1])
+        return np.where(far, back(1.0 / np.where(far, x, 1.0)), y(np.where(far, 1.0, x)))
+
     with np.errstate(divide="ignore", invalid="ignore"):
-        value = np.nan_to_num(R(x) / Q(x), nan=math.inf, posinf=math.inf, neginf=-math.inf)
-    excess = R.degree() - Q.degree()
-    end = R.coef[-1] / Q.coef[-1] if excess == 0 else math.copysign(math.inf, R.coef[-1])
-    end = 0.0 if excess < 0 else end
-    i = int(np.argmin(value))
-    return (float(value[i]), math.sqrt(x[i])) if value[i] <= end else (float(end), math.inf)
+        out = value(p) / value(q)
+    return np.where(np.isnan(out), math.inf, out)
+
+
+def _least_value(
+    value: Callable[[np.ndarray], np.ndarray], R: Polynomial, Q: Polynomial, found: np.ndarray
+) -> tuple[float, float]:
+    """Least value of a function with the extremes of R/Q over x >= 0, and its place.
+
+    The roots of R and Q are passed, because those of a square are less accurate.
+
+    The extremes are the roots of the slope R'Q - RQ'. Its coefficients can cancel, of R and Q of
+    equal degree the highest always do, and the roots are then those of rounding errors. So they
+    only join a scan, dense around every root of R and Q, and the least value found is refined.
+    """
+    slope = _difference(R.deriv(), Q, R, Q.deriv())
+    ends = np.array([0.0, math.inf])
+    at_ends, x = value(ends), np.union1d(_scan(found), _polished(slope))
+    y = value(x)
+    best, place = refined_minimum(value, x, y, int(np.argmin(y)))
+    i = int(np.argmin(at_ends))
+    end = float(at_ends[i])
+    # near an end the values differ from that of the end by their rounding
+    if best < (end - NOISE * abs(end) if math.isfinite(end) else end):
+        return best, place
+    return end, float(ends[i])
+
+
+def refined_minimum(
+    f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, y: np.ndarray, i: int
+) -> tuple[float, float]:
+    """A minimum of f, and its place, from the values y at ascending x around the least, y[i].
+
+    The function may be infinite; the search then ends at the border of where it is finite.
+
+    Args:
+        f: function of arrays, shape (n,) to (n,).
+        x: shape (n,).
+        y: f(x), shape (n,).
+        i: index of a y that is no larger than its neighbours.
+    """
+    for _ in range(REFINED):
+        if math.isinf(y[i]):
+            break
+        rises = np.flatnonzero(y > y[i] + NOISE * abs(y[i]))  # two places may differ by rounding
+        low, high = rises[rises < i].max(initial=0), rises[rises > i].min(initial=len(x) - 1)
+        x = np.union1d(np.linspace(x[low], x[high], 41), x[i])
+        y = f(x)
+        i = int(np.argmin(y))
+    return float(y[i]), float(x[i])
+
+
+def _difference(a: Polynomial, b: Polynomial, c: Polynomial, d: Polynomial) -> Polynomial:
+    """a b - c d, without the coefficients that are rounding errors."""
+    size = Polynomial(np.abs(a.coef)) * Polynomial(np.abs(b.coef))
+    size += Polynomial(np.abs(c.coef)) * Polynomial(np.abs(d.coef))
+    out = (a * b - c * d).coef
+    n = max(len(out), len(size.coef))
+    out, size = (np.pad(x, (0, n - len(x))) for x in (out, size.coef))
+    return Polynomial(np.where(np.abs(out) > ROUNDED * size, out, 0.0))
+
+
+def _polished(p: Polynomial) -> np.ndarray:
+    """Positive real roots of a polynomial, after two steps of Newton's method."""
+    x = nonzero_roots(p)
+    x = x.real[(np.abs(x.imag) <= NEARLY_REAL * np.abs(x)) & (x.real > 0.0)]
+    slope = p.deriv()
+    with np.errstate(all="ignore"):
+        for _ in range(2):
+            step = x - p(x) / slope(x)
+            x = np.where(np.isfinite(step) & (step > 0.0), step, x)
+    return x
+
+
+def _scan(found: np.ndarray) -> np.ndarray:
+    """x > 0, ascending: evenly spaced in the logarithm, and dense where a root is near the axis."""
+    size = np.abs(found)
+    found, size = (x[(size > 0.0) & np.isfinite(size)] for x in (found, size))
+    low, high = size.min(initial=1.0), size.max(initial=1.0)
+    decades = math.log10(high / low) + 2.0 * SCAN_BEYOND
+    ends = low * 10.0**-SCAN_BEYOND, high * 10.0**SCAN_BEYOND
+    even = np.geomspace(*ends, 2 + int(SCAN_DENSITY * decades))
+    near = (found.real[:, None] + np.abs(found.imag)[:, None] * SCAN_NEAR).ravel()
+    near = np.concatenate((near, size))
+    return np.unique(np.concatenate((even, near[(near > ends[0]) & (near < ends[1])])))
 
 
 def positive_bands(p: Polynomial) -> tuple[tuple[float, float], ...]:

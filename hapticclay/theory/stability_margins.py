@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..arguments import named
-from ..display import html_table
+from ..display import brief, html_table
 from ..errors import (
     ParameterError,
     array_of,
@@ -28,6 +28,7 @@ from .loops import Loop, of_loop
 BREAKS = ("force", "compensator")
 ON_AXIS = 1e-9  # poles this near the axis, as a share of their size, count as on it
 ARC = 1e-6  # radius of the arc around one, as a share of its frequency
+DIPS = 20  # dips of |1 + L| that are refined, the deepest ones on the grid
 LINEAR = "one axis at the nominal pose, linear, motors within their torque limits"
 
 
@@ -117,6 +118,9 @@ class Nyquist:
         N: clockwise encirclements of -1 by the image of the contour.
         P: poles of L right of the axis.
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     omega: np.ndarray
     L: np.ndarray
@@ -258,9 +262,8 @@ def margins(loop: Loop, *, at: str = "compensator") -> Margins:
     delay, delay_at = _extreme(lag / omega, omega, every, np.argmin, math.inf)
     if n.degree() == d.degree() and abs(n.coef[-1]) >= abs(d.coef[-1]):
         delay, delay_at = 0.0, math.inf  # L does not roll off: any delay makes it encircle -1
-    far, near = roots.squared_magnitude(d - n), roots.squared_magnitude(d + n)
-    worst, disk_at = roots.least_ratio(-far, near)
-    disk = 2.0 / math.sqrt(-worst)
+    worst, disk_at = roots.peak_ratio(d - n, d + n)
+    disk = 2.0 / worst
     return Margins(
         True, (less, more), phase, delay, disk, (less_at, more_at), phase_at, delay_at, disk_at
     )
@@ -302,8 +305,6 @@ def _response_nyquist(family: gain_crossings.LoopFamily, K: float) -> Nyquist:
 
 def _response_margins(family: gain_crossings.LoopFamily, K: float) -> Margins:
     """Margins of L = -K h."""
-    from scipy.optimize import minimize_scalar
-
     if not family.stable(K):
         return NO_MARGINS
     found = [*gain_crossings.gain_crossings(family), (family.most, math.inf)]
@@ -317,24 +318,36 @@ def _response_margins(family: gain_crossings.LoopFamily, K: float) -> Margins:
     phase, phase_at = _extreme(turn, omega, every, np.argmin, math.inf)
     delay, delay_at = _extreme(lag / omega, omega, every, np.argmin, math.inf)
 
-    def far(omega: np.ndarray) -> np.ndarray:
-        L = -K * family.h(omega)
-        return np.abs((1.0 - L) / (1.0 + L))
-
-    grid = np.append(family.grid, family.ends)
-    size = far(grid)
-    i = int(np.argmax(size[: len(family.grid)]))
-    worst, disk_at = float(size.max()), float(grid[np.argmax(size)])
-    around = family.grid[max(i - 1, 0)], family.grid[min(i + 1, len(family.grid) - 1)]
-    best = minimize_scalar(
-        lambda x: -far(np.array([x]))[0], bounds=around, method="bounded", options={"xatol": 1e-12}
-    )
-    if -best.fun > worst:  # type: ignore[union-attr]
-        worst, disk_at = -float(best.fun), float(best.x)  # type: ignore[union-attr]
+    disk, disk_at = _response_disk(family, K, [w for _, w in found])
     return Margins(
-        True, (less, more), phase, delay, 2.0 / worst, (less_at, more_at), phase_at, delay_at,
-        disk_at,
-    )  # fmt: skip
+        True, (less, more), phase, delay, disk, (less_at, more_at), phase_at, delay_at, disk_at
+    )
+
+
+def _response_disk(
+    family: gain_crossings.LoopFamily, K: float, crossed: Sequence[float]
+) -> tuple[float, float]:
+    """The disk margin of L = -K h, and its frequency.
+
+    Near a frequency at which a pole can cross the axis, |1 + L| may dip between two points of any
+    grid. So those frequencies are points of it, and the deepest dips are refined.
+    """
+
+    def near(omega: np.ndarray) -> np.ndarray:
+        L = -K * family.h(omega)
+        return np.abs((1.0 + L) / (1.0 - L))
+
+    inner = [w for w in crossed if family.grid[0] < w < math.inf]
+    omega = np.unique(np.concatenate((family.grid, family.ends, inner)))
+    size = near(omega)
+    around = np.concatenate(([math.inf], size, [math.inf]))
+    dips = np.flatnonzero((size <= around[:-2]) & (size <= around[2:]))
+    places = dips[np.argsort(size[dips])][:DIPS].tolist()
+    least, at = min(roots.refined_minimum(near, omega, size, i) for i in places)
+    if family.most < math.inf:  # L does not roll off: it comes as near to -1 again and again
+        far = abs(1.0 - K / family.most) / (1.0 + K / family.most)
+        least, at = min((least, at), (far, math.inf))
+    return 2.0 * least, at
 
 
 def _extreme(
@@ -396,12 +409,12 @@ def small_gain(loop: Loop, *, equation: int = 13) -> Verdict:
     n2, d2 = roots.squared_magnitude(n), roots.squared_magnitude(d)
     how = "extreme of a ratio of polynomials: exact. "
     if equation == 9:
-        worst, omega = roots.least_ratio(roots.squared_magnitude(n + d), d2)
-        margin = math.sqrt(max(worst, 0.0))
+        peak, omega = roots.peak_ratio(d, n + d)
+        margin = 1.0 / peak
         how += "Necessary for stability, not sufficient"
-        return Verdict(worst > 0.0, margin, omega, (LINEAR,), how, "least |1 + L|")
-    worst, omega = roots.least_ratio(-n2, d2)
-    margin = 1.0 / math.sqrt(-worst) if worst else math.inf
+        return Verdict(margin > 0.0, margin, omega, (LINEAR,), how, "least |1 + L|")
+    peak, omega = roots.peak_ratio(n, d)
+    margin = 1.0 / peak if peak else math.inf
     how += "Sufficient for stability, not necessary"
     fails = roots.positive_bands(n2 - d2)
     measures = "least right side over left side"

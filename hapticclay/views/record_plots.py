@@ -188,7 +188,8 @@ def _with_picture(figure: Figure) -> Figure:
 
     def picture() -> bytes:
         file = io.BytesIO()
-        figure.savefig(file, format="png")
+        with figure_style():
+            figure.savefig(file, format="png")
         return file.getvalue()
 
     figure._repr_png_ = picture  # type: ignore[attr-defined]

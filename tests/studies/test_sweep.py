@@ -25,7 +25,7 @@ from hapticclay.cli import sweep as sweep_command
 from hapticclay.errors import ParameterError
 from hapticclay.studies import sampling, sweep, sweep_rows, sweep_store
 from hapticclay.studies.sampling import Range, Sweep, parse_fixed, parse_grid
-from hapticclay.views import style, sweep_plots
+from hapticclay.views import sweep_plots
 
 GRID = "b=10:1000:3log gain.x=1:2:2"
 
@@ -372,7 +372,10 @@ def test_maps(tmp_path):
         ax.get_xlabel() == "b [N.s/m]" and ax.get_xscale() == "log" and ax.get_yscale() == "linear"
     )
     shown = {t.get_text() for t in figure.legends[0].get_texts()}
-    assert shown == {*table["status"].to_pylist(), "gain margin < 1"}  # gain 1 on y, at b = 100
+    assert shown == {
+        *table["status"].to_pylist(),
+        "gain margin of y < 1",
+    }  # gain 1 on y, at b = 100
     sweep_plots.sweep_plot(table, "speed_x").savefig(tmp_path / "a.png")
     with pytest.raises(ParameterError, match="column"):
         sweep_plots.sweep_plot(table, "speedx")
@@ -619,8 +622,15 @@ def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
     assert set(sweep_plots.missing_reasons(free, "fe_over_v_x")) == {"no clay reached"}
 
 
-@pytest.mark.parametrize("value", ["status", "speed_x"])
-def test_a_sampled_map_rings_the_runs_whose_gain_margin_is_below_one(value):
+@pytest.mark.parametrize(
+    "value,ringed",
+    [
+        ("status", {"x": [10.0, 31.0], "y": [57.0, 88.0]}),
+        ("speed_x", {"x": [10.0, 31.0]}),  # a column of one axis, by its own verdict
+        ("speed_y", {"y": [57.0, 88.0]}),
+    ],
+)
+def test_a_sampled_map_rings_the_runs_whose_gain_margin_is_below_one(value, ringed):
     pa = pytest.importorskip("pyarrow")
     margins = np.array([0.5, 1.0, 0.999, 3.0, math.nan, math.nan])  # of x; of y below
     runs = {
@@ -629,18 +639,22 @@ def test_a_sampled_map_rings_the_runs_whose_gain_margin_is_below_one(value):
         "gain.x": np.array([0.3, 1.7, 2.2, 0.9, 5.1, 4.4]),
         "status": ["diverged", *["time limit"] * 4, "refused"],
         "gain_margin_x": margins,
-        "gain_margin_y": np.array([2.0, 2.0, 2.0, 0.1, 7.0, math.nan]),
+        "gain_margin_y": np.array([2.0, 2.0, 2.0, 0.1, 7.0, 0.9]),
         "speed_x": np.array([math.nan, 0.1, 0.2, 0.3, 0.4, math.nan]),
         "b_x": np.full(6, 90.0),
     }
+    runs |= {"speed_y": runs["speed_x"], "b_y": runs["b_x"]}
     figure = sweep_plots.sweep_plot(pa.table(runs), value)
     labels = [t.get_text() for t in figure.legends[0].get_texts()]
-    (rings,) = [c for c in figure.axes[0].collections if c.get_label() == style.UNSTABLE["label"]]
-    assert labels.count("gain margin < 1") == 1
-    np.testing.assert_array_equal(rings.get_offsets()[:, 0], [10.0, 31.0, 57.0])
+    for axis in "xy":
+        label = f"gain margin of {axis} < 1"
+        found = [c for c in figure.axes[0].collections if c.get_label() == label]
+        assert labels.count(label) == len(found) == (axis in ringed)
+        for rings in found:
+            np.testing.assert_array_equal(rings.get_offsets()[:, 0], ringed[axis])
     runs |= {"gain_margin_x": np.full(6, 1.0), "gain_margin_y": np.full(6, math.nan)}
     legend = sweep_plots.sweep_plot(pa.table(runs), value).legends[0]
-    assert "gain margin < 1" not in [t.get_text() for t in legend.get_texts()]
+    assert not any("gain margin" in t.get_text() for t in legend.get_texts())
 
 
 def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
