@@ -24,8 +24,8 @@ class BenchCommand:
         out: Folder for bench.md, the data and the diagrams.
         quick: Run fewer jobs, settings and scenes: about two minutes.
         anew: Measure again what was measured before.
-        check: Measure nothing; name the parts in the folder that are older than kernel, formulas or model,
-            and exit with status 1 if there are any.
+        check: Measure nothing; name the parts in the folder that are older than kernel, formulas
+            or model, and exit with status 1 if there are any.
     """
 
     out: Path = Path("out/bench")
