@@ -140,7 +140,12 @@ def gain_crossings(loop: LoopFamily) -> list[tuple[float, float]]:
     if not np.any(z):  # the compensator has no input
         return []
     grid, z = loop.grid[z != 0.0], z[z != 0.0]
-    found = _zeros(phase_sine, np.log(grid), z.imag / np.abs(z), z.real > 0.0)
+    beyond = np.append(loop.poles, math.inf)  # at a pole h changes its sign without a zero
+    piece = np.searchsorted(beyond, grid)
+    found: list[float] = []
+    for i in range(len(beyond)):
+        x, y = np.log(grid[piece == i]), z[piece == i]
+        found += _zeros(phase_sine, x, y.imag / np.abs(y), y.real > 0.0)
     omega = np.array([*found, *loop.ends])
     size = loop.h(omega).real
     kept = size > loop.rounding(omega)
@@ -160,7 +165,7 @@ def unit_crossings(loop: LoopFamily, K: float) -> list[float]:
     """
 
     def level(x: np.ndarray) -> np.ndarray:
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore"):  # a zero or a pole on the border
             return np.log(K * np.abs(loop.h(np.exp(x))))
 
     x = np.log(loop.grid)
@@ -304,7 +309,8 @@ def delayed_loop(loop: LinearLoop) -> LoopFamily:
     def h(omega: np.ndarray) -> np.ndarray:
         s = 1j * omega
         late = np.exp(-s * delay)
-        return -driven(s) * late / (physical(s) + motors(s) * late)
+        with np.errstate(divide="ignore", invalid="ignore"):  # on a pole
+            return -driven(s) * late / (physical(s) + motors(s) * late)
 
     def rounding(omega: np.ndarray) -> np.ndarray:
         s = 1j * omega
@@ -323,7 +329,7 @@ def delayed_loop(loop: LinearLoop) -> LoopFamily:
 
     poles = compensator_poles(loop)
     grid = _late_grid(resonances, delay, bool(straight or more))
-    grid = _without(grid, poles)
+    grid = _around(grid, poles)
     rest = physical.coef[0] + motors.coef[0]
     ends = (0.0,) if rest and driven.coef[0] / rest < 0.0 else ()
     order = roots.multiplicity_of_zero(exact[0] + exact[1])
@@ -340,10 +346,12 @@ def compensator_poles(loop: LinearLoop) -> tuple[float, ...]:
     return tuple(exact_roots.square_root(x) for x, _ in found)
 
 
-def _without(grid: np.ndarray, poles: tuple[float, ...]) -> np.ndarray:
-    """The grid without its points on poles of h."""
+def _around(grid: np.ndarray, poles: tuple[float, ...]) -> np.ndarray:
+    """The grid without its points on poles of h, and with points beside them."""
     for pole in poles:
         grid = grid[np.abs(grid - pole) > SAME_FREQUENCY * pole]
+        beside = pole * np.array([1.0 - 2.0 * SAME_FREQUENCY, 1.0 + 2.0 * SAME_FREQUENCY])
+        grid = np.union1d(grid, beside[(beside > grid[0]) & (beside < grid[-1])])
     return grid
 
 
@@ -379,7 +387,11 @@ def sampled_loop(loop: LinearLoop) -> LoopFamily:
             # exp(j omega Ts) - 1, without the loss of digits at slow frequencies
             z1 = np.expm1(1j * omega[i : i + 256] * Ts)
             resolvent = z1[:, None, None] * np.eye(n) - less
-            out[i : i + 256] = np.linalg.solve(resolvent, beta[:, None])[:, :, 0]
+            try:
+                out[i : i + 256] = np.linalg.solve(resolvent, beta[:, None])[:, :, 0]
+            except np.linalg.LinAlgError:  # on a pole: beside it, by less than its rounding
+                resolvent = resolvent + np.abs(z1)[:, None, None] * 2.0**-50 * np.eye(n)
+                out[i : i + 256] = np.linalg.solve(resolvent, beta[:, None])[:, :, 0]
         return out
 
     def h(omega: np.ndarray) -> np.ndarray:
@@ -405,7 +417,7 @@ def sampled_loop(loop: LinearLoop) -> LoopFamily:
     low = min(1e-2 * np.abs(resonances).min(), 0.1 * top)
     near = frequency_grid(low, top * (1.0 - 1e-9), resonances.imag)
     poles = compensator_poles(loop)
-    grid = _without(np.union1d(np.linspace(low, top, 20 * n)[:-1], near), poles)
+    grid = _around(np.union1d(np.linspace(low, top, 20 * n)[:-1], near), poles)
     still = integrators == unseen and h(np.zeros(1))[0].real > 0.0
     ends = (0.0, top) if still else (top,)
     order = integrators - unseen
