@@ -47,10 +47,12 @@ def value(p: Polynomial, x: Fraction) -> Fraction:
         p: polynomial with rational coefficients.
         x: where.
     """
-    out = Fraction(0)
+    common = math.lcm(*(c.denominator for c in p.coef))
+    out, power = 0, 1  # of integers: one division at the end
     for c in p.coef[::-1]:
-        out = out * x + c
-    return out
+        out = out * x.numerator + c.numerator * (common // c.denominator) * power
+        power *= x.denominator
+    return Fraction(out * x.denominator, common * power)
 
 
 def derivative(p: Polynomial) -> Polynomial:
@@ -230,7 +232,7 @@ def positive_roots(p: Polynomial) -> list[Fraction]:
     Args:
         p: polynomial with real coefficients.
     """
-    f, found = rational(np.trim_zeros(p.coef)), set()
+    f, found = rational(_trimmed(p)), set()
     for group in _groups(_rough_roots(f)):
         found.update(_separated(f, group))
     return sorted(found)
@@ -245,7 +247,7 @@ def _rough_roots(p: Polynomial) -> list[Fraction]:
 
 def _scaled_roots(p: Polynomial) -> tuple[np.ndarray, Fraction]:
     """Roots other than zero in floats, in the unit that balances the first and last coefficient."""
-    c = [Fraction(x) for x in np.trim_zeros(p.coef)]
+    c = _trimmed(p)
     if len(c) < 2:
         return np.empty(0), Fraction(1)
     low, high = (x.numerator.bit_length() - x.denominator.bit_length() for x in (c[0], c[-1]))
@@ -253,6 +255,13 @@ def _scaled_roots(p: Polynomial) -> tuple[np.ndarray, Fraction]:
     scaled = [x * scale**i for i, x in enumerate(c)]
     most = max(map(abs, scaled))
     return np.roots([float(x / most) for x in scaled[::-1]]), scale
+
+
+def _trimmed(p: Polynomial) -> list[Fraction]:
+    """Coefficients without the zeros at both ends."""
+    c = [Fraction(x) for x in p.coef.tolist()]
+    kept = [i for i, x in enumerate(c) if x]
+    return c[kept[0] : kept[-1] + 1] if kept else []
 
 
 def approximate_roots(p: Polynomial) -> np.ndarray:
@@ -273,7 +282,7 @@ def root_sizes(p: Polynomial) -> tuple[float, float]:
     Args:
         p: polynomial, of floats or rational, with such a root.
     """
-    c = [Fraction(x) for x in np.trim_zeros(p.coef)]
+    c = _trimmed(p)
     logs = [math.log(abs(x.numerator)) - math.log(x.denominator) if x else -math.inf for x in c]
     last = len(c) - 1
     small = min((logs[0] - x) / i for i, x in enumerate(logs) if i)

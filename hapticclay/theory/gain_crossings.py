@@ -412,7 +412,11 @@ def sampled_loop(loop: LinearLoop) -> LoopFamily:
 
     z1 = eigenvalues(free).astype(complex)
     resonances = np.log1p(z1[np.abs(1.0 + z1) > 1e-6]) / Ts
-    resonances = np.concatenate((resonances, roots.nonzero_roots(t)))
+    slow = sum(linear_loop.delayed_servo(loop, rational))
+    resonances = np.concatenate(
+        (resonances, exact_roots.approximate_roots(slow), roots.nonzero_roots(t))
+    )
+    resonances = resonances[resonances != 0.0]
     top = np.pi / Ts
     low = min(1e-2 * np.abs(resonances).min(), 0.1 * top)
     near = frequency_grid(low, top * (1.0 - 1e-9), resonances.imag)
@@ -503,6 +507,8 @@ def _from_rest(
 def eigenvalues(a: np.ndarray) -> np.ndarray:
     """Eigenvalues, small ones as accurate as large ones: the small are computed from the inverse.
 
+    Of a matrix that is singular in floats the smallest are 0, within its rounding.
+
     Args:
         a: matrix, shape (n, n).
     """
@@ -510,6 +516,9 @@ def eigenvalues(a: np.ndarray) -> np.ndarray:
     z = z[np.argsort(np.abs(z))]
     small = int(np.sum(np.abs(z) < SMALL_ANGLE * np.abs(z[-1])))
     if small:
-        large = np.linalg.eigvals(np.linalg.inv(a))
+        try:
+            large = np.linalg.eigvals(np.linalg.inv(a))
+        except np.linalg.LinAlgError:
+            return z
         z[:small] = 1.0 / large[np.argsort(-np.abs(large))][:small]
     return z

@@ -220,6 +220,8 @@ def _exact_worst_case(loop: Loop, box: Box) -> tuple[float, float, Operator | No
 
     found = [(*gain_crossings.critical_gain(replace(loop, operator=th)), th) for th in corners]
     limit, omega, worst = min(found, key=lambda x: x[0])
+    if len(corners) == 1:
+        return limit, omega, worst
     top = min(limit, 1e6)
     if limit == 0.0 or (limit == math.inf and stable(top)):
         return limit, math.nan, worst

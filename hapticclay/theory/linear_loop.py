@@ -423,8 +423,7 @@ def sampled_differences(
         less[place] += new @ u
     for j, loop in enumerate(loops):
         own = slice(at[j] + 2, at[j + 1])
-        A, B = controller.held_compensator(loop.servo, loop.compensator, 1.0, Ts)
-        less[own, own], beta[own, j] = A - np.eye(len(B)), B
+        less[own, own], beta[own, j] = held_change(loop, 1.0)
         through = controller.controller_matrices(loop.servo, loop.compensator, 1.0)[1][-1]
         if through:  # of C, in y'' and so in u at once
             beta[newest : newest + n, j] = through * inertia[:, j]
@@ -527,8 +526,34 @@ def _moved_together(force: np.ndarray, w: np.ndarray, t: float) -> tuple[np.ndar
     a = np.zeros((3 * n, 3 * n))
     a[:n, n : 2 * n] = np.eye(n)
     a[n : 2 * n] = np.hstack((w @ force, w))
-    change = controller.matrix_exponential(t * a) - np.eye(3 * n)
+    change = _exponential_less_one(t * a)
     return change[: 2 * n, : 2 * n], change[: 2 * n, 2 * n :]
+
+
+def held_change(loop: LinearLoop, K: float) -> tuple[np.ndarray, np.ndarray]:
+    """Compensator and reference model over a sample under held net force: z+ = z + D z + B f.
+
+    Args:
+        loop: the loop, sampled.
+        K: gain of the compensator.
+
+    Returns:
+        D, shape (n, n), without the loss of digits of a difference, and B, shape (n,).
+    """
+    assert loop.Ts is not None
+    A, B = controller.controller_matrices(loop.servo, loop.compensator, K)
+    n = len(B)
+    change = _exponential_less_one(loop.Ts * np.block([[A, B[:, None]], [np.zeros((1, n + 1))]]))
+    return change[:n, :n], change[:n, n]
+
+
+def _exponential_less_one(a: np.ndarray) -> np.ndarray:
+    """exp(a) - 1; of a small matrix as a (1 + a/2 + ...), the second factor by an exponential."""
+    n = len(a)
+    if np.abs(a).sum(axis=1).max() > 1.0:  # the product would cancel, the difference does not
+        return controller.matrix_exponential(a) - np.eye(n)
+    larger = np.block([[a, np.eye(n)], [np.zeros((n, 2 * n))]])
+    return a @ controller.matrix_exponential(larger)[:n, n:]
 
 
 def held_motion(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.ndarray]:
