@@ -115,7 +115,7 @@ def first_instability(loop: LoopFamily) -> tuple[float, float]:
     if not loop.stable(0.5 * found[0][0] if found else 1.0):
         return 0.0, math.nan
     for i, (K, omega) in enumerate(found):
-        following = found[i + 1][0] if i + 1 < len(found) else 4.0 * K
+        following = min(found[i + 1][0] if i + 1 < len(found) else math.inf, 4.0 * K)
         if following > (1.0 + 1e-9) * K and not loop.stable(math.sqrt(K * following)):
             return K, omega
     return math.inf, math.nan
@@ -380,19 +380,12 @@ def sampled_loop(loop: LinearLoop) -> LoopFamily:
     less, beta, gamma, free, integrators, unseen = _acting_map(loop)
     t, Ts, n = loop.environment, loop.Ts, len(less)
     assert Ts is not None
+    waiting = linear_loop.whole_samples(loop.delay, Ts)[0]
 
     def states(omega: np.ndarray) -> np.ndarray:
-        out = np.empty((len(omega), n), dtype=complex)
-        for i in range(0, len(omega), 256):
-            # exp(j omega Ts) - 1, without the loss of digits at slow frequencies
-            z1 = np.expm1(1j * omega[i : i + 256] * Ts)
-            resolvent = z1[:, None, None] * np.eye(n) - less
-            try:
-                out[i : i + 256] = np.linalg.solve(resolvent, beta[:, None])[:, :, 0]
-            except np.linalg.LinAlgError:  # on a pole: beside it, by less than its rounding
-                resolvent = resolvent + np.abs(z1)[:, None, None] * 2.0**-50 * np.eye(n)
-                out[i : i + 256] = np.linalg.solve(resolvent, beta[:, None])[:, :, 0]
-        return out
+        # exp(j omega Ts) - 1, without the loss of digits at slow frequencies
+        parts = np.split(np.expm1(1j * omega * Ts), range(256, len(omega), 256))
+        return np.concatenate([_driven(less, beta, waiting, z1) for z1 in parts])
 
     def h(omega: np.ndarray) -> np.ndarray:
         return states(omega) @ gamma
@@ -426,6 +419,34 @@ def sampled_loop(loop: LinearLoop) -> LoopFamily:
     ends = (0.0, top) if still else (top,)
     order = integrators - unseen
     return LoopFamily(h, grid, stable, ends, math.inf, order, right, poles, rounding)
+
+
+def _driven(less: np.ndarray, beta: np.ndarray, waiting: int, z1: np.ndarray) -> np.ndarray:
+    """The states (z1 - less)^-1 beta, shape (m, n), at z1 = z - 1, shape (m,).
+
+    Each of the last states, which are forces that wait, follows from those before: what is left to
+    solve has the order of the loop without them.
+    """
+    m, n, a = len(z1), len(less), len(less) - waiting
+    share = np.zeros((m, n, a + 1), dtype=complex)  # of the first a states, and a constant
+    share[:, np.arange(a), np.arange(a)] = 1.0
+    for j in range(a, n):
+        share[:, j] = less[j, j - 1] * share[:, j - 1]
+        if j > a:
+            share[:, j, :a] += less[j, :a]
+        else:
+            share[:, j, : a - 1] += less[j, : a - 1]
+        share[:, j, a] += beta[j]
+        share[:, j] /= (z1 - less[j, j])[:, None]
+    into = less[:a] @ share
+    left = z1[:, None, None] * np.eye(a) - into[:, :, :a]
+    right = (into[:, :, a] + beta[:a])[:, :, None]
+    try:
+        first = np.linalg.solve(left, right)
+    except np.linalg.LinAlgError:  # on a pole: beside it, by less than its rounding
+        beside = np.abs(z1)[:, None, None] * 2.0**-50 * np.eye(a)
+        first = np.linalg.solve(left + beside, right)
+    return (share[:, :, :a] @ first)[:, :, 0] + share[:, :, a]
 
 
 def _outside(less: np.ndarray) -> int:
@@ -520,5 +541,6 @@ def eigenvalues(a: np.ndarray) -> np.ndarray:
             large = np.linalg.eigvals(np.linalg.inv(a))
         except np.linalg.LinAlgError:
             return z
+        z = z.astype(np.result_type(z, large))  # a pair that floats took for two real ones
         z[:small] = 1.0 / large[np.argsort(-np.abs(large))][:small]
     return z
