@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
 import functools
 import inspect
 import os
@@ -16,7 +15,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from .errors import ParameterError
+from .errors import ParameterError, nearest
 
 F = TypeVar("F", bound=Callable[..., Any])
 IN_WORDS: dict[Any, str] = {
@@ -48,7 +47,7 @@ def known_names(name: str, given: Mapping[str, Any], known: Collection[str]) -> 
     """
     for word, value in given.items():
         if word not in known:
-            near = difflib.get_close_matches(word, known, n=1)
+            near = nearest(word, known)
             told = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
             raise UnknownArgument(word, value, f"unexpected argument of {name}; {told}") from None
 

@@ -7,11 +7,15 @@ import contextvars
 import errno
 import functools
 import json
+import lzma
 import os
 import platform
 import re
 import stat
+import struct
 import tempfile
+import zipfile
+import zlib
 from collections.abc import Callable, Iterable, Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -19,10 +23,25 @@ from typing import Any
 
 from .errors import ParameterError
 
-MOST_READ = 2**30  # [bytes] of a file of data, and ...
+MOST_READ = 2**30  # [bytes] of a file of data, ...
+MOST_TABLE = 2**28  # ... of a table as text, whose cells take several times its size, and ...
 MOST_SETTINGS = 2**26  # ... of a file of settings, TOML or JSON
 DEEPEST = 100  # tables and lists in one another; what this package writes has some ten
 MOST_WHOLE = 2**64  # of whole numbers in a file: seeds are the largest
+DAMAGED = (  # what zipfile, its decompressors, NumPy and json raise, and a part of the wrong type
+    OSError,
+    EOFError,
+    LookupError,
+    ValueError,
+    ArithmeticError,
+    TypeError,
+    AttributeError,
+    RuntimeError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+)
 _KEY = r"""(?>[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _DEEP_KEY = re.compile(rf"(?<![\w-]){_KEY}(?:[ \t]*+\.[ \t]*+{_KEY}){{{DEEPEST}}}")
 
@@ -116,7 +135,7 @@ def read_bytes(path: str | os.PathLike[str], most: int = MOST_READ) -> bytes:
     """
     if kind := _kind_of_file(os.fspath(path)):
         raise Unfit(f"it is {kind}, not a regular file")
-    too_large = Unfit(f"it is larger than {most} bytes")
+    too_large = Unfit(f"it is larger than {most / 2**20:.3g} MiB")
     # not to wait, should a pipe have taken its place
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     with os.fdopen(handle, "rb") as file:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import difflib
 import functools
 import itertools
 import math
@@ -17,7 +16,7 @@ from typing import Any, Literal, NamedTuple, Union, get_args, get_origin, get_ty
 
 import tyro
 
-from ..errors import ParameterError, choice, quantity
+from ..errors import ParameterError, choice, nearest, quantity
 from ..units import is_quantity
 from .commands import COMMANDS, load_command
 from .console import scenario_words
@@ -276,7 +275,7 @@ def _check_option(name: str, given: list[str], kind: Any) -> None:
         kind = get_args(kind)[0]
         value = next((word for word in given if word not in get_args(kind)), "")
     names = [x for k in _members(kind) if get_origin(k) is Literal for x in get_args(k)]
-    near = difflib.get_close_matches(value, names, n=1)
+    near = nearest(value, names)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     raise ParameterError(name, value, f"must be {_meaning(kind)}{hint}")
 
@@ -307,7 +306,7 @@ def _option_names(slots: dict[str, Slot]) -> list[str]:
 
 def _unknown(word: str, path: str, slots: dict[str, Slot]) -> ParameterError:
     """The error for an option that a command lacks."""
-    near = difflib.get_close_matches(_plain(word), _option_names(slots), n=1)
+    near = nearest(_plain(word), _option_names(slots))
     hint = f"; did you mean --{near[0]}?" if near else f"; see hapticclay {path} --help"
     return _refused(f"{word}: no option of {path}{hint}")
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..arguments import named
 from ..errors import ParameterError, array_of, choice
+from ..files import MOST_TABLE, read_text
 from . import pieces
 from .signals import Signal
 
@@ -88,7 +89,7 @@ class Samples(Signal):
         if isinstance(columns, str) or len(columns) != 3:
             raise ParameterError("columns", columns, "must name three columns: time, x, y")
         try:
-            rows = csv.reader(Path(path).read_text("utf-8-sig").splitlines(keepends=True))
+            rows = csv.reader(read_text(path, MOST_TABLE).splitlines(keepends=True))
             head = [x.strip() for x in next(rows, [])]
             if not any(head):
                 raise ParameterError("path", str(path), "must begin with a line of column names")

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 import os
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields, number
+from ..files import MOST_TABLE, read_text
 from ..model.constants import TS
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
@@ -98,9 +99,9 @@ def read_columns(
         ParameterError: the file cannot be read, or lacks a column.
     """
     try:
-        with Path(path).open(newline="") as f:
-            rows = [tuple(float(row[name]) for name in names) for row in csv.DictReader(f)]
-    except (OSError, KeyError, TypeError, ValueError) as error:
+        text = io.StringIO(read_text(path, MOST_TABLE), newline="")
+        rows = [tuple(float(row[name]) for name in names) for row in csv.DictReader(text)]
+    except (OSError, KeyError, TypeError, ValueError, csv.Error) as error:
         bound = f"must be a CSV file with the columns {', '.join(names)} ({error!r})"
         raise ParameterError(field, str(path), bound) from None
     if not rows:

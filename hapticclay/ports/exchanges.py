@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arguments import named
 from ..errors import ParameterError
-from ..files import atomic
+from ..files import MOST_TABLE, atomic, read_text
 from .rows import MOST_ROWS, Rows
 
 COLUMNS = (
@@ -131,12 +131,12 @@ class Exchanges:
         """
         file = Path(path) / FILE if Path(path).is_dir() else Path(path)
         try:
-            with file.open(newline="") as f:
-                head, *rows = list(csv.reader(f)) or [[]]
+            text = io.StringIO(read_text(file, MOST_TABLE), newline="")
+            head, *rows = list(csv.reader(text)) or [[]]
             if tuple(head) != COLUMNS:
                 raise ValueError("other columns")
             return cls.of_table(np.array([[float(x) for x in row] for row in rows]))
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, csv.Error) as error:
             why = getattr(error, "strerror", None) or error
             bound = f"must be a file of exchanges ({why})"
             raise ParameterError("record", str(path), bound) from None

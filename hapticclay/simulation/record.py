@@ -17,7 +17,7 @@ import numpy as np
 from ..arguments import checked, named
 from ..display import html_table, one_line
 from ..errors import ParameterError, choice
-from ..files import atomic, versions
+from ..files import DAMAGED, atomic, parse_json, versions
 from ..model.clay import Clay
 from ..model.constants import AXES
 from ..model.signals import Multisine
@@ -396,11 +396,11 @@ class Record:
         """
         folder = Path(path)
         head = {k: v for k, v in self.summary().items() if k != "regions"}
-        arrays = {name: getattr(self, name) for name in ARRAYS} | self.extra
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in ARRAYS} | self.extra
         if self.ground is not None:
             arrays["ground"] = self.ground
         with atomic(folder / "record.npz") as f:
-            np.savez(f, allow_pickle=False, summary=np.array(json.dumps(head)), **arrays)
+            np.savez(f, summary=np.array(json.dumps(head)), **arrays)
         with atomic(folder / "summary.json") as f:
             f.write((json.dumps(self.summary(), indent=2) + "\n").encode())
         if "left_out" in head.get("notes", {}):  # a function has no file; an older one misleads
@@ -431,7 +431,7 @@ class Record:
                 raise ValueError("it is no .npz file")
             with open(file, "rb") as f, np.load(f, allow_pickle=False) as z:
                 check_headers(z.zip)
-                head = json.loads(str(z["summary"]))
+                head = parse_json(str(z["summary"]))
                 arrays = {name: z[name] for name in ARRAYS}
                 extra = {name: z[name] for name in EXTRA if name in z}
                 ground = z["ground"] if "ground" in z else None
@@ -457,16 +457,7 @@ class Record:
                     error=_accuracy(head.get("error")),
                     ground=ground,
                 )
-        except (
-            OSError,
-            EOFError,
-            KeyError,
-            ValueError,
-            TypeError,
-            AttributeError,
-            RecursionError,
-            zipfile.BadZipFile,
-        ) as error:
+        except DAMAGED as error:
             text = getattr(error, "strerror", None) or " ".join(str(error).split())
             what = text or type(error).__name__
             raise ParameterError("record", str(path), f"must be a saved record ({what})") from None

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..arguments import named
 from ..errors import ParameterError, array_of, choice
+from ..files import MOST_TABLE, read_text
 from ..units import parse_unit
 
 COLUMNS = {  # columns of a file and their contents
@@ -177,7 +178,7 @@ def _bad_file(path: Path, bound: str) -> ParameterError:
 def _read_table(path: Path) -> list[tuple[int, list[str]]]:
     """Lines of a CSV file without comments: number and cells."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path, MOST_TABLE)
     except OSError as error:
         raise _bad_file(path, f"must be a readable file ({error.strerror})") from None
     except UnicodeDecodeError:
