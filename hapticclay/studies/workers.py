@@ -13,16 +13,21 @@ if TYPE_CHECKING:
     from multiprocessing.process import BaseProcess
 
 UNGUARDED = 77  # exit status of a worker that came upon a study while it imported the script
+ALONE = "use workers=1 (--workers 1)"
 NO_GUARD = (
     'the study must stand below `if __name__ == "__main__":`, since each worker process imports '
-    "the script; or use workers=1"
+    f"the script; or {ALONE}"
+)
+NO_FILE = (
+    "worker processes import the script that starts them, and this one comes from no file: save "
+    f"it, or {ALONE}"
 )
 NOT_BEGUN = (
     "the worker processes ended while they imported the script that started them (its error "
-    "stands above): mend it, or use workers=1"
+    f"stands above): mend it, or {ALONE}"
 )
 KILLED = "a worker was killed (memory?); the same command resumes the sweep"
-DAEMON = "a daemonic process, as of multiprocessing.Pool, can start no workers: use workers=1"
+DAEMON = f"a daemonic process, as of multiprocessing.Pool, can start no workers: {ALONE}"
 _end: Any = None  # in a worker: the event that tells it to take no further run
 
 
@@ -45,6 +50,8 @@ def started(crew: int) -> Iterator[Callable[..., Future[Any]]]:
     leave_if_imported()
     if multiprocessing.current_process().daemon:
         raise ChildProcessError(DAEMON)
+    if _has_lost_script():
+        raise ChildProcessError(NO_FILE)
     context = multiprocessing.get_context("spawn")  # the engine's threads do not survive a fork
     try:
         end, begun = context.Event(), context.Event()
@@ -62,8 +69,8 @@ def started(crew: int) -> Iterator[Callable[..., Future[Any]]]:
             raise
         except (OSError, RuntimeError) as error:  # the latter for a thread
             told = getattr(error, "strerror", None) or error
-            bound = f"a worker process cannot be started ({told}): use fewer workers, or workers=1"
-            raise ChildProcessError(bound) from None
+            fault = f"a worker process cannot be started ({told}): use fewer, or {ALONE}"
+            raise ChildProcessError(fault) from None
         workers.update(multiprocessing.active_children())
         return job
 
@@ -79,9 +86,16 @@ def started(crew: int) -> Iterator[Callable[..., Future[Any]]]:
 def _no_semaphores(error: Exception) -> str:
     told = getattr(error, "strerror", None) or error
     return (
-        f"worker processes need shared memory, on Linux a writable /dev/shm ({told}): mount it, "
-        "or use workers=1"
+        f"worker processes cannot be started ({told}): they need shared memory, on Linux a "
+        f"writable /dev/shm; mount it, or {ALONE}"
     )
+
+
+def _has_lost_script() -> bool:
+    """Whether workers could not import the script, as one from standard input."""
+    main = sys.modules.get("__main__")
+    file = getattr(main, "__file__", None)
+    return getattr(main, "__spec__", None) is None and bool(file) and not os.path.exists(file)
 
 
 def _cause(workers: set[BaseProcess], begun: bool) -> str:
