@@ -45,8 +45,10 @@ class ParameterError(ValueError):
     """
 
     def __init__(self, field: str, value: object, bound: str):
-        self.field, self.value, self.bound = field, value, _middle_cut(bound)
-        super().__init__(f"{one_line(field, MOST_OF_NAME)} = {_short(value)}: {self.bound}")
+        text = bound if isinstance(bound, str) else _short(bound)
+        self.field, self.value, self.bound = field, value, _middle_cut(text)
+        name = one_line(field, MOST_OF_NAME) if isinstance(field, str) else _short(field)
+        super().__init__(f"{name} = {_short(value)}: {self.bound}")
 
     def __reduce__(self):
         return type(self), (self.field, self.value, self.bound), self.__dict__
@@ -216,6 +218,16 @@ def flag(field: str, value: object) -> bool:
     return value
 
 
+def is_series(value: object) -> bool:
+    """Whether a value can be iterated over and is no text; a NumPy scalar only seems so.
+
+    Args:
+        value: the value.
+    """
+    plain = isinstance(value, Iterable) and not isinstance(value, str | bytes)
+    return plain and getattr(value, "ndim", 1) != 0
+
+
 def numbers_of(
     field: str,
     value: object,
@@ -246,10 +258,10 @@ def numbers_of(
                 break
         else:
             return value
-    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+    if not is_series(value):
         bound = f"must be {len(names)} numbers ({', '.join(names)})"
         raise ParameterError(field, value, bound)
-    items = tuple(value)
+    items = tuple(value)  # type: ignore[arg-type]
     if len(items) != len(names):
         bound = f"must be {len(names)} numbers ({', '.join(names)})"
         raise ParameterError(field, value, f"{bound}, got {len(items)}")
@@ -564,7 +576,7 @@ def _check_tuple(kinds: tuple[Any, ...], bound: Bound) -> Check:
     def check(field: str, value: Any, part: Any) -> Any:
         names: Sequence[str] = bound.names
         if kinds[1:] == (...,):
-            if isinstance(value, str | bytes) or not hasattr(value, "__len__"):
+            if not is_series(value) or not hasattr(value, "__len__"):
                 raise ParameterError(field, value, "must be a sequence of numbers")
             names = _place_names(len(value))
         return numbers_of(field, value, names, **_bound_limits(bound, part))

@@ -94,7 +94,7 @@ def sources_kept(paths: Iterable[Path]) -> Iterator[None]:
     Args:
         paths: the files; of a folder, those in it.
     """
-    files = [f for p in paths for f in (p.iterdir() if p.is_dir() else [p])]
+    files = [f for p in paths for f in (p.iterdir() if os.path.isdir(p) else [p])]
     token = _read_from.set(frozenset(os.path.realpath(f) for f in files))
     try:
         yield
@@ -106,7 +106,7 @@ def _kind_of_file(path: str) -> str:
     """Kind of object at a path that prevents writing a file; "" for a regular file or nothing."""
     try:
         mode = os.stat(path).st_mode
-    except OSError:  # nothing is there, or writing will say what is wrong
+    except (OSError, ValueError):  # nothing is there, or the system will say what is wrong
         return ""
     kinds = {stat.S_IFREG: "", stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe"}
     return kinds.get(stat.S_IFMT(mode), "a device or socket")
@@ -122,6 +122,21 @@ class Unfit(OSError):
         return type(self), (self.strerror,)
 
 
+def check_regular(path: str | os.PathLike[str]) -> None:
+    """Refuses a path at which something other than a regular file lies.
+
+    Args:
+        path: the path.
+
+    Raises:
+        Unfit: there is a folder, a pipe, a device or a socket, or no file can have the name.
+    """
+    if "\0" in os.fsdecode(path):
+        raise Unfit("no name of a file holds a null byte")
+    if kind := _kind_of_file(os.fspath(path)):
+        raise Unfit(f"it is {kind}, not a regular file")
+
+
 def read_bytes(path: str | os.PathLike[str], most: int = MOST_READ) -> bytes:
     """Content of a regular file; a pipe or a device, which may never end, is not opened.
 
@@ -133,8 +148,7 @@ def read_bytes(path: str | os.PathLike[str], most: int = MOST_READ) -> bytes:
         Unfit: it is no regular file, or larger.
         OSError: it cannot be read.
     """
-    if kind := _kind_of_file(os.fspath(path)):
-        raise Unfit(f"it is {kind}, not a regular file")
+    check_regular(path)
     too_large = Unfit(f"it is larger than {most / 2**20:.3g} MiB")
     # not to wait, should a pipe have taken its place
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from .arguments import function_name
+from .arguments import checked, function_name
 from .display import html_table, one_line
 from .errors import ParameterError, choice, needing
 from .files import DAMAGED, atomic, parse_json, read_text, versions
@@ -108,6 +108,7 @@ class Result:
         return file
 
     @classmethod
+    @checked
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """Reads a file of `save`. No code is run, and only modules of this package are imported.
 

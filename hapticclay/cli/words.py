@@ -67,7 +67,7 @@ def ordered(words: Sequence[str]) -> list[str]:
         return [command, word, *rest]
     if is_scenario_file(word):
         return [command, "file", word, *rest]
-    if recorded and (os.sep in word or Path(word).exists()) and word not in EXPERIMENTS:
+    if recorded and (os.sep in word or os.path.exists(word)) and word not in EXPERIMENTS:
         return [command, "record", word, *rest]
     try:
         return [command, choice("experiment", word, tuple(EXPERIMENTS)), *rest]
@@ -155,7 +155,7 @@ def sources(words: Sequence[str]) -> list[Path]:
     """
     pairs = itertools.pairwise(["", *words])
     named = [Path(word) for before, word in pairs if before not in ("--out", "--page")]
-    return [p for p in named if p.is_file() or (p / "record.npz").is_file()]
+    return [p for p in named if any(map(os.path.isfile, (p, p / "record.npz")))]
 
 
 class Slot(NamedTuple):

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, number
 from ..files import MOST_TABLE, read_text
 from ..model.constants import TS
@@ -72,6 +72,7 @@ class Trajectory:
         return cls((0.0,), (target,))
 
     @classmethod
+    @checked
     def of_file(cls, path: str | os.PathLike[str]) -> Trajectory:
         """Reads a trajectory from a CSV file with the columns t [s], x and y [m].
 

@@ -17,7 +17,7 @@ import numpy as np
 from ..arguments import checked, named
 from ..display import html_table, one_line
 from ..errors import ParameterError, choice
-from ..files import DAMAGED, atomic, parse_json, versions
+from ..files import DAMAGED, atomic, check_regular, parse_json, versions
 from ..model.clay import Clay
 from ..model.constants import AXES
 from ..model.signals import Multisine
@@ -105,6 +105,7 @@ class Record:
     ground: np.ndarray | None = None
 
     @classmethod
+    @checked
     def of(cls, run: Run, wall: float) -> Record:
         """The record of a finished run.
 
@@ -410,6 +411,7 @@ class Record:
         return folder
 
     @classmethod
+    @checked
     def load(cls, path: str | os.PathLike[str]) -> Record:
         """Reads what `save` wrote.
 
@@ -423,10 +425,9 @@ class Record:
             ParameterError: there is no record, or it has another schema.
         """
         file = Path(path)
-        file = file / "record.npz" if file.is_dir() else file
+        file = file / "record.npz" if os.path.isdir(file) else file
         try:
-            if file.exists() and not file.is_file():  # reading a pipe would block
-                raise ValueError("it is not a regular file")
+            check_regular(file)
             if file.is_file() and not zipfile.is_zipfile(file):
                 raise ValueError("it is no .npz file")
             with open(file, "rb") as f, np.load(f, allow_pickle=False) as z:

@@ -55,7 +55,9 @@ class Distribution:
         Raises:
             ParameterError: it is none of these.
         """
-        law, *numbers = str(text).split(":")
+        if not isinstance(text, str):
+            raise ParameterError(field, text, "must be a text such as normal:0:0.02")
+        law, *numbers = text.split(":")
         choice(f"law of {field}", law, LAWS)
         try:
             first, second = map(float, numbers)
@@ -165,6 +167,8 @@ def parse_laws(text: str) -> dict[str, Distribution]:
         ParameterError: a word is not name=law:number:number, or a name stands twice.
     """
     out: dict[str, Distribution] = {}
+    if not isinstance(text, str):
+        raise ParameterError("vary", text, "must be a text such as delay=uniform:0:1e-3")
     for word in text.split():
         name, equals, law = word.partition("=")
         if not equals or not name or name in out:

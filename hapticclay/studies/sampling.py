@@ -87,7 +87,7 @@ class Range:
             values = tuple(float(x) for x in items)  # type: ignore[arg-type]
             if not values or not all(map(math.isfinite, values)):
                 raise ValueError
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ParameterError(field, text, bound) from None
         return cls(min(values), max(values), len(values), False, values)
 

@@ -169,7 +169,7 @@ def _number_in(file: Path) -> int:
 
 
 def _part_files(out: Path) -> list[Path]:
-    files = (out / "data").glob("part-*.parquet")
+    files = (out / "data").glob("part-*.parquet") if os.path.isdir(out / "data") else ()
     return sorted(files, key=lambda file: (_number_in(file), file.name))
 
 
@@ -316,7 +316,7 @@ def _remove(files: list[Path]) -> None:
 def _begun(out: Path) -> dict[str, Any] | None:
     """Content of a folder's sweep.json, empty if it is damaged; None if there is none."""
     file = out / "sweep.json"
-    if not file.is_file():
+    if not os.path.isfile(file):
         return None
     with contextlib.suppress(OSError, ValueError):
         found = parse_json(read_bytes(file, MOST_SETTINGS))

@@ -47,6 +47,7 @@ class Handle:
     normal: np.ndarray
 
     @classmethod
+    @checked
     def of(
         cls,
         scenario: Scenario,
