@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, pair
 from .cells import CellLaw, outline, pixels
 from .constants import AXES, B_MAX
@@ -186,6 +186,7 @@ class Smooth(CellLaw):
         return self.damping[first[0] : end[0], first[1] : end[1]].ravel().tolist()
 
     @classmethod
+    @checked
     def of_function(
         cls,
         b: Callable[[float, float], float],
@@ -213,6 +214,7 @@ class Smooth(CellLaw):
         return cls(*ends, tuple(tuple(b(at, across) for across in at_y) for at in at_x))
 
     @classmethod
+    @checked
     def of_image(
         cls,
         image: Any,
