@@ -87,12 +87,12 @@ def write_removed(groove, e, i):
 def with_work(parts, a, k, w):
     """The ledger with the works of a kick; w are the joint rates before it."""
     v, u, n, H, uh, tau, fe = k.at.v, k.motion.u, k.w, k.step.H, k.uh, k.tau, k.fe
-    dx, dy = hand.dampers(parts.hand)
+    dx, dy = hand.damping_force(parts.hand, k.step, v, u)
     vx, vy = 0.5 * (v[0] + u[0]), 0.5 * (v[1] + u[1])
     muscle = H * (uh[0] * vx + uh[1] * vy)
     motors = 0.5 * H * (tau[0] * (w[0] + n[0]) + tau[1] * (w[1] + n[1]))
     clay = H * (fe[0] * vx + fe[1] * vy)
-    taken = H * (dx * vx * vx + dy * vy * vy)
+    taken = H * (dx * vx + dy * vy)
     return Work(
         a.muscle + muscle, a.motors + motors, a.clay + clay, a.hand + taken,
         a.through + (abs(muscle) + abs(motors)), hardware_work(a.hardware, k, w, (vx, vy)),
