@@ -173,6 +173,7 @@ def run_table(record: Record) -> str:
         lines.append(f"error: {record.error}")
         if record.error.note:
             lines.append(f"why: {record.error.note}")
+    lines += _energy_lines(record)
     speed = record.t[-1] / record.wall_time if len(record.t) and record.wall_time else 0.0
     lines.append(f"{record.steps} steps in {record.wall_time:.2f} s, {speed:.0f} times real time")
     return "\n".join(lines)
@@ -186,6 +187,14 @@ def _crossing_lines(record: Record) -> list[str]:
     if len(record.crossings) > MOST_ROWS:
         lines.append(f"... and {len(record.crossings) - MOST_ROWS} more crossings")
     return lines
+
+
+def _energy_lines(record: Record) -> list[str]:
+    through = record.energy.get("throughput", 0.0)
+    if not through:
+        return []
+    share = abs(record.energy["residual"]) / through
+    return [f"energy: balanced within {share:.1e} of {through:.4g} J"]
 
 
 def _stop_lines(record: Record) -> list[str]:

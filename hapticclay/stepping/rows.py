@@ -95,11 +95,12 @@ def with_work(parts, a, k, w):
     taken = H * (dx * vx + dy * vy)
     return Work(
         a.muscle + muscle, a.motors + motors, a.clay + clay, a.hand + taken,
-        a.through + (abs(muscle) + abs(motors)), hardware_work(a.hardware, k, w, (vx, vy)),
+        a.through + (abs(muscle) + abs(motors)),
+        hardware_work(a.hardware, parts.sampler, k, w, (vx, vy)),
     )  # fmt: skip
 
 
-def hardware_work(work, k, w, v):
+def hardware_work(work, sampler, k, w, v):
     """What hardware has taken, with its work in a kick; v is the mean velocity."""
     if work is None:
         return work
@@ -108,6 +109,7 @@ def hardware_work(work, k, w, v):
     return HardwareWork(
         work.friction + friction_work(slip, H, rates), work.guard + guard_work(hold.guard, H, v),
         work.coupling + coupling_work(hold.pull, H, v),
+        work.rendered + rendered_work(sampler.clay, hold.force, H, v),
     )  # fmt: skip
 
 
@@ -121,6 +123,12 @@ def guard_work(guard, H, v):
     if guard is None:
         return 0.0
     return H * (guard[0] * v[0] + guard[1] * v[1])
+
+
+def rendered_work(physical, force, H, v):
+    if physical is None:
+        return H * (force[0] * v[0] + force[1] * v[1])
+    return 0.0
 
 
 def coupling_work(pull, H, v):
