@@ -13,7 +13,7 @@ from .driver import kick
 from .engine_step import accelerations, put
 from .instant import instant, moment
 from .kick import is_finite, place, place_after
-from .parts import FASTEST, INF
+from .parts import FASTEST
 from .rows import ROW
 from .state import (
     UNRESOLVED,
