@@ -100,6 +100,7 @@ class Hardware:
 
 SLIDES = (0.0, 1.0, -1.0)
 NOISE_BLOCK = 1024  # samples drawn at once
+ALL_WHOLE = 2.0**52  # floats beyond it are whole; none of them, nor NaN, needs an integer
 
 
 def round_to_even(x, step):
@@ -110,9 +111,10 @@ def round_to_even(x, step):
         step: in the unit of x.
 
     Returns:
-        The multiple.
+        The multiple; x itself if it is infinite or NaN.
     """
-    return round(x / step) * step
+    n = x / step
+    return (round(n) if abs(n) < ALL_WHOLE else n) * step
 
 
 def quantize(x, bits, span):
@@ -124,9 +126,9 @@ def quantize(x, bits, span):
         span: full scale, in the unit of x.
 
     Returns:
-        The output, in the unit of x.
+        The output, in the unit of x; NaN for NaN, with which a run ends.
     """
-    if not bits:
+    if not bits or x != x:
         return x
     half = 1 << (bits - 1)
     y = x * half / span

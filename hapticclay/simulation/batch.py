@@ -306,8 +306,11 @@ class Plan:
             return False
         if not self.carried[key]:
             pattern = self.patterns.of(key, jobs[0])
-            with self.compiled.first_call(carried, pattern.kind, "many runs of this kind"):
-                self.pool.lane().group(pattern, draws_of(jobs[:1]))
+            try:
+                with self.compiled.first_call(carried, pattern.kind, "many runs of this kind"):
+                    self.pool.lane().group(pattern, draws_of(jobs[:1]))
+            except self.compiled.Unavailable:
+                return False
             self.carried[key] = True
         return True
 

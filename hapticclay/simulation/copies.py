@@ -192,3 +192,17 @@ class CompiledSteps:
         rows.states[:count], rows.until[:count] = x.states, n
         self.make(*self.arguments, which, vector.STEPS)
         x.states[:] = rows.states[:count]
+
+
+def compiled_steps(*arguments: Any) -> CompiledSteps | None:
+    """Steps by machine code; None where it cannot be had.
+
+    Args:
+        *arguments: of `CompiledSteps`.
+    """
+    from ..stepping.compiled import Unavailable
+
+    try:
+        return CompiledSteps(*arguments)
+    except Unavailable:
+        return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import sys
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 from ..errors import ParameterError
 from ..scene.scenario import Scenario
 from ..stepping import scene
-from ..stepping.machine_code import kind_of, loading_time, ready_time
+from ..stepping.machine_code import failures, give_up, kind_of, loading_time, ready_time
 from ..stepping.run import PLAIN, Kernel, Run, plainly
 
 ENGINES = ("auto", "python", "native")
@@ -144,26 +145,31 @@ def saved_in_a_step(scenario: Scenario) -> float:
 
 
 def load_compiled() -> Any:
-    """Imports the compiled steps; prints a line with the cause if this fails.
+    """Imports the compiled steps and tries the compiler out; prints a line if either fails.
 
     Returns:
-        The module stepping.compiled; None where it fails.
+        The module stepping.compiled; None where it failed, now or before in this process.
     """
+    if failures:
+        return None
     try:
         from ..stepping import compiled
 
+        tried_out(compiled)
         return compiled
-    except (
-        ImportError,
-        OSError,
-        StopIteration,
-        AttributeError,
-    ) as error:  # of numba, or the engine's library
-        print(
-            f"hapticclay: Python runs what native cannot: {error or type(error).__name__}",
-            file=sys.stderr,
-        )
+    except Exception as error:  # whatever numba, LLVM or the engine's library raises
+        give_up(error)
         return None
+
+
+@functools.cache
+def tried_out(compiled: Any) -> None:
+    """Tries the compiler out, once in a process.
+
+    Args:
+        compiled: the module stepping.compiled.
+    """
+    compiled.try_out()
 
 
 NUMBA = "needs numba: pip install hapticclay[fast]"

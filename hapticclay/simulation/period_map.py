@@ -21,7 +21,7 @@ from ..stepping.run import PLAIN, EngineStore, with_checked
 from ..stepping.state import OPEN, State
 from ..stepping.vector import kind_of_steps
 from . import engines
-from .copies import CompiledSteps, Copies, PlainSteps, leaves_of, ring_of
+from .copies import Copies, PlainSteps, compiled_steps, leaves_of, ring_of
 
 KICK = 1e-6  # in SI units: the squares of angles are 1e-6 of it, their rounding is 1e-10 of it
 LINEAR = 1e-4  # share of the ends by which that of all kicks may miss the sum of those of each
@@ -229,11 +229,11 @@ class MapsOfKind:
         self.coupled = False  # whether one axis has acted on the other
         names = [x.part for x in self.rings]
         steps = expected * len(self.own[0]) * steps_of_period(parts)
-        self.steps: Any = (
-            CompiledSteps(self.store, s, parts, state, names, MOST + 1)
-            if repays(s, parts, state, steps)
-            else PlainSteps(self.store, s, parts, state, names)
-        )
+        self.steps: Any = None
+        if repays(s, parts, state, steps):
+            self.steps = compiled_steps(self.store, s, parts, state, names, MOST + 1)
+        if self.steps is None:
+            self.steps = PlainSteps(self.store, s, parts, state, names)
 
     def _start(self, s: Scenario, parts: Parts) -> State:
         return scene.start(parts, s, self.e)

@@ -65,10 +65,13 @@ class Record:
         outcome: how the run ended.
         crossings: of borders, in order.
         energy: work of the operator's muscle and of the motors; energy taken by the clay and by the
-            damper of Th, stored in the arm (kinetic) and in mass and spring of Th (hand_stored);
-            imbalance (residual) and sum of all magnitudes (throughput) [J]; for clay that springs
-            back, the part of the clay's share that its springs store and have dissipated
-            (springs_stored, springs_dissipated).
+            damper of Th, gained by the arm (kinetic) and by mass and spring of Th (hand_stored);
+            what these fail to balance by (residual), and the energy that came into play
+            (throughput): that at the start, and the magnitudes of both works, step by step [J].
+            For clay that springs back, the part of the clay's share that its springs store and
+            have dissipated (springs_stored, springs_dissipated). Clay that the motors hold takes
+            nothing itself (clay is 0): the work of its force, a part of motors, is rendered_clay.
+            With hardware: friction, passivity_controller, coupling (docs/hardware.md).
         steps: number of engine steps.
         wall_time: run time [s].
         versions: of the packages used.

@@ -102,8 +102,9 @@ class VectoredRuns:
                 if len(self.vectors) >= VECTORS:  # drop kinds without a run
                     kept = [(x, v) for x, v in self.vectors.items() if any(v is y for y in self.of)]
                     self.vectors = dict(kept)
-                self.vectors[key] = RunVector(run, self.common, self.compiled.KERNEL)
-                self._prepare(self.vectors[key])
+                if (made := self._prepared(run)) is None:
+                    return
+                self.vectors[key] = made
             self.of[k] = self.vectors[key]
             self._take(k)
 
@@ -112,10 +113,17 @@ class VectoredRuns:
         v.take(k, self.runs[k])
         v.push(np.array([k]), self.steady[[k]])
 
-    def _prepare(self, v: RunVector) -> None:
-        """Compiles what a kind needs, or loads it from disk."""
-        none = np.empty(0, np.int64)
-        v.advance = self.compiled.advancing(v.kind, v.parts, v.state, v.place(0), v.x, none, STEPS)
+    def _prepared(self, run: Run) -> RunVector | None:
+        """Compiles what the kind of a run needs, or loads it from disk; None if that fails."""
+        compiled, none = load_compiled(), np.empty(0, np.int64)
+        if compiled is None:
+            return None
+        v = RunVector(run, self.common, compiled.KERNEL)
+        try:
+            v.advance = compiled.advancing(v.kind, v.parts, v.state, v.place(0), v.x, none, STEPS)
+        except compiled.Unavailable:
+            return None
+        return v
 
     def _sync(self, k: int) -> Run:
         """The run, with its present state, force and gain."""

@@ -239,7 +239,10 @@ def changed(parts, blocks, s, before):
     fresh = fresh._replace(old=old.old, hit=hit, reaction=reaction, laws=laws)
     if fresh.growth is not None and old.growth is not None:
         fresh = fresh._replace(growth=Growth(fresh.growth.rate, old.growth.old))
-    return s._replace(clay=fresh)
+    work = s.work
+    if work.hardware is None:  # entries that begin with the changed scene
+        work = work._replace(hardware=blocks.work.hardware)
+    return s._replace(clay=fresh, work=work)
 
 
 def kept_blocks(fresh, before):

@@ -18,7 +18,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import FunctionType, ModuleType
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numba
 import numpy as np
@@ -82,7 +82,9 @@ from .inlining import EntryCompiler, InlinedCompiler
 from .machine_code import (
     COMPLETE,
     cache_folder,
-    compile_time,
+    failures,
+    give_up,
+    known_time,
     mark,
     ready_time,
 )
@@ -542,6 +544,25 @@ DYNAMICS = engine_step.Dynamics(
 # ---- kernels -------------------------------------------------------------------------------------
 
 QUIET = entry(monitor.is_quiet)
+
+
+class Unavailable(Exception):
+    """Machine code cannot be had; CPython makes the steps."""
+
+
+def is_quiet(*arguments: Any) -> bool:
+    """monitor.is_quiet; without machine code the monitor itself is asked.
+
+    Args:
+        *arguments: of that function.
+    """
+    try:
+        return QUIET(*arguments)
+    except Exception as error:  # as in `compiling`
+        give_up(error)
+        return False
+
+
 ready: set[Any] = set()  # kinds of scene whose whole steps are compiled or loaded in this process
 complete: set[Any] = set()  # those whose careful steps are, too
 advances: dict[Any, Callable[..., None]] = {}  # vector.advance by the types of its arguments
@@ -554,6 +575,29 @@ def natively(r: run.Run, room: int) -> None:
     Args:
         r: the run.
         room: largest number of rows.
+    """
+    try:
+        by_code(r, room)
+    except Unavailable:
+        plainly(r, room)
+
+
+def plainly(r: run.Run, room: int) -> None:
+    """Makes steps in CPython, from now on.
+
+    Args:
+        r: the run.
+        room: largest number of rows.
+    """
+    r.kernel = run.PLAIN
+    run.plainly(r, room)
+
+
+def by_code(r: run.Run, room: int) -> None:
+    """As `natively`.
+
+    Raises:
+        Unavailable: the compiler failed, before a step was made.
     """
     kind, parts, careful = r.kind, own_law.called(r.parts), 1
     while run.is_open(r, room):
@@ -615,8 +659,17 @@ def advancing(kind: Any, *arguments: Any) -> Callable[..., None]:
     sizes = [x[:0] if isinstance(x, np.ndarray) else x for x in arguments]
     with first_call(ready, kind, "steps of this kind, one call at a time"):
         ADVANCE_ALL(*sizes)
-    types_ = tuple(ADVANCE_ALL.typeof_pyval(x) for x in sizes)
-    return ADVANCE_ALL.overloads[types_].entry_point
+    return entry_point(ADVANCE_ALL, *sizes)
+
+
+def entry_point(entry: Any, *arguments: Any) -> Callable[..., Any]:
+    """An entry for the types of some arguments, for which it has been called before.
+
+    Args:
+        entry: from `entry`.
+        *arguments: of these types.
+    """
+    return entry.overloads[tuple(entry.typeof_pyval(x) for x in arguments)].entry_point
 
 
 def by_rows(r: run.Run, room: int) -> None:
@@ -629,7 +682,12 @@ def by_rows(r: run.Run, room: int) -> None:
     if not vector.is_vectored(r):
         natively(r, room)
         return
-    row_of(r).move(room)
+    try:
+        row = row_of(r)
+    except Unavailable:
+        plainly(r, room)
+        return
+    row.move(room)
 
 
 def try_step(r: run.Run) -> np.ndarray | None:
@@ -641,7 +699,10 @@ def try_step(r: run.Run) -> np.ndarray | None:
     if not vector.is_vectored(r):
         return None
     r.draw(1)
-    return row_of(r).sample()
+    try:
+        return row_of(r).sample()
+    except Unavailable:
+        return None
 
 
 @functools.cache
@@ -662,14 +723,22 @@ def compiling(kinds: set[Any], kind: Any, what: str) -> Iterator[None]:
         kinds: that are ready; this kind is added at the end.
         kind: of the scene.
         what: is compiled, in words.
+
+    Raises:
+        Unavailable: the compiler failed, now or before in this process.
     """
-    with Notice(what, compile_time(kind, started=bool(ready))) as notice, signals_held():
+    if failures:
+        raise Unavailable(failures[0])
+    with Notice(what, known_time(kind, started=bool(ready))) as notice, signals_held():
         if not isinstance(WHOLE_STEPS._cache, cache.FileCache):  # without a home none can miss it
             notice.begin()
         before, collects = cache.on_miss.set(notice.begin), gc.isenabled()
         gc.disable()  # numba makes millions of objects, and to search them for cycles takes long
         try:
             yield
+        except Exception as error:  # numba raises anything where its private parts differ
+            give_up(error)
+            raise Unavailable(failures[0]) from error
         finally:
             cache.on_miss.reset(before)
             if collects:
@@ -743,5 +812,59 @@ def calls(model: Any, data: Any) -> tuple[Any, ...]:
     return STEP, DYNAMICS, model._address, data._address
 
 
-KERNEL = run.Kernel(natively, calls, lambda x: x.ctypes.data, QUIET)
+# ---- whether it works with the numba that is installed -------------------------------------------
+
+
+class Tried(NamedTuple):
+    """Parts as small as they can be."""
+
+    number: Any
+    whole: Any
+    table: Any
+    nothing: Any
+
+
+def trial(like, numbers, arrays, scratch):
+    """A bit of all that the other entries are made of.
+
+    Args:
+        like: a Tried.
+        numbers: those of it, shape (1, 2).
+        arrays: addresses and lengths of its arrays, shape (1, 3).
+        scratch: room, shape (1, 9).
+    """
+    parts, alike = vector.parts_at(like, numbers, arrays, 0), many.filled(like, numbers, 0)
+    step, d = kick.step_around(parts.number, alike.number), hand.dampers(parts.nothing)
+    address = scratch.ctypes.data
+    vector.put_state(step, scratch, 0)
+    engine_step.put(address, 5, d)
+    vector.copied(address + 56, address, 8)
+    x, y = engine_step.pair(address)
+    found = engine_step.numbers_at(step, address, 0)
+    return found.after + x + y + vector.table_at(address)[0][0, 7] + parts.table[alike.whole]
+
+
+TRIAL = entry(trial)
+
+
+def try_out() -> None:
+    """Compiles and calls a small entry, or loads it from disk.
+
+    Private parts of numba that the code above uses differ between its versions, and what is
+    missing shows when something is compiled.
+
+    Raises:
+        Exception: whatever numba raises where machine code cannot be had.
+    """
+    table, numbers = np.array([8.0, 16.0]), np.array([[2.0, 1.0]])
+    arrays, like = np.array([[table.ctypes.data, 2, 1]]), Tried(0.0, 0, table, None)
+    arguments = like, numbers, arrays, np.zeros((1, 9))
+    with signals_held():
+        first = TRIAL(*arguments)
+        again = entry_point(TRIAL, *arguments)(*arguments)
+    if not first == again == 2.0 + 2.0 + 0.5 + 2.0 + 16.0:
+        raise RuntimeError(f"numba {numba.__version__} compiles other steps")
+
+
+KERNEL = run.Kernel(natively, calls, lambda x: x.ctypes.data, is_quiet)
 BY_ROWS = KERNEL._replace(advance=by_rows, ahead=try_step)

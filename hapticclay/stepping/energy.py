@@ -41,7 +41,7 @@ def balance(work: Sequence[Any], first: Sequence[Any], last: Sequence[Any]) -> d
     Floats, or arrays over runs.
 
     Args:
-        work: of muscle, motors, clay and damper of the hand, and throughput [J].
+        work: of muscle, motors, clay and damper of the hand, and sum of the magnitudes [J].
         first: from `stored`, at the start.
         last: from `stored`, at the end.
 
@@ -58,5 +58,5 @@ def balance(work: Sequence[Any], first: Sequence[Any], last: Sequence[Any]) -> d
         "kinetic": kinetic,
         "hand_stored": at_hand,
         "residual": muscle + motors - clay - damper - kinetic - at_hand,
-        "throughput": through,
+        "throughput": through + first[0] + first[1],
     }

@@ -51,6 +51,19 @@ def dampers(hand):
     return hand[0].damper, hand[1].damper
 
 
+def damping_force(hand, step, v, u):
+    """Force of the dampers in a kick, as `resisting` counts it, (x, y) [N].
+
+    Args:
+        hand: the operator's arm.
+        step: around the sample.
+        v: velocity before the kick, (x, y) [m/s].
+        u: velocity after it, (x, y) [m/s].
+    """
+    (dx, dy), L, R = dampers(hand), step.L, step.R
+    return dx * (L * v[0] + R * u[0]), dy * (L * v[1] + R * u[1])
+
+
 def springs(hand):
     """Springs of the hand, (x, y) [N/m]."""
     if hand is None:

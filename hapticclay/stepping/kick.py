@@ -10,7 +10,7 @@ from math import cos, sin
 
 from ..model import arm, pieces
 from . import hand, laws, servo, springs, stiff, viscous, yielding
-from .parts import INF
+from .parts import FASTEST
 from .state import Acting, Axis, Handle, Kick, Load, Loop, Motion, Reaction, Step
 
 NONE = (0.0, 0.0)
@@ -262,14 +262,14 @@ def velocity(special, grain, k):
 
 
 def is_finite(k):
-    """Whether the rates after a kick are finite."""
-    return abs(k.w[0]) + abs(k.w[1]) < INF
+    """Whether the rates after a kick are those of an arm."""
+    return abs(k.w[0]) + abs(k.w[1]) < FASTEST
 
 
 def is_calm_end(part, r, q, w, h):
     """Whether a step with joint rates w ends within a region."""
     w1, w2 = w
-    if not abs(w1) + abs(w2) < INF:
+    if not abs(w1) + abs(w2) < FASTEST:
         return False
     x, y = place(part, (q[0] + h * w1, q[1] + h * w2))
     return r.low[0] <= x <= r.high[0] and r.low[1] <= y <= r.high[1]

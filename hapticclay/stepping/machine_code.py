@@ -7,6 +7,7 @@ import functools
 import hashlib
 import os
 import platform
+import re
 import sys
 from collections.abc import Iterator
 from importlib.metadata import version
@@ -27,6 +28,8 @@ COMPILING_PART = {
 CARRY, COMPLETE = "many runs made together", "steps that may cross borders"
 STEPWISE = "many runs made step by step"
 TIMES = {CARRY: 2.7, COMPLETE: 1.6, STEPWISE: 2.5}
+LONGEST_CAUSE = 200  # letters of the cause that a line shows
+failures: list[str] = []  # why this process cannot compile, once that is known
 MARK = ".kind"  # ending of a file that names a kind of scene with stored machine code
 
 
@@ -47,6 +50,25 @@ def cache_folder() -> Path:
         or Path.home() / ".cache"
     )
     return Path(root) / "hapticclay" / digest.hexdigest()[:16]
+
+
+def give_up(error: Exception) -> None:
+    """Notes that this process cannot compile, and prints a line the first time.
+
+    Args:
+        error: what the compiler raised.
+    """
+    failures.append(_cause(error))
+    if len(failures) == 1:
+        print(f"hapticclay: Python runs what native cannot: {failures[0]}", file=sys.stderr)
+
+
+def _cause(error: Exception) -> str:
+    """The cause of an error, whose text may have many lines and colours, in one line."""
+    lines = [x.strip() for x in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines()]
+    lines = [x for x in lines if x and not x.startswith("Failed in ")]
+    cause = lines[0][:LONGEST_CAUSE] if lines else "no reason"
+    return f"{type(error).__name__}: {cause}"
 
 
 def _processor() -> str:
@@ -86,7 +108,7 @@ def is_kept(kind: Any) -> bool:
     Args:
         kind: from `kind_of`.
     """
-    with contextlib.suppress(OSError, RuntimeError):
+    with contextlib.suppress(ImportError, OSError, RuntimeError):
         return mark(kind).exists()
     return False
 
@@ -110,6 +132,34 @@ def compile_time(kind: Any, started: bool = True) -> float:
     times, whole = (TIMES[kind[0]], kind[1]) if kind[0] in TIMES else (1.0, kind)
     time = COMPILING + sum(COMPILING_PART.get(x, 0.0) for x in leaves(whole))
     return times * time + (0.0 if started else STARTING)
+
+
+def known_time(kind: Any, started: bool = True) -> float | None:
+    """As `compile_time`; None for kinds that take many times as long as the sum of their parts.
+
+    Friction in the joints compiles the laws of physical clay beside each case of stick and slip.
+
+    Args:
+        kind: as in `compile_time`.
+        started: as there.
+    """
+    parts = [dict(zip(p_.Sampler._fields, x[1:], strict=True)) for x in samplers(kind)]
+    if any(x["friction"] is not None and x["special"] is not None for x in parts):
+        return None
+    return compile_time(kind, started)
+
+
+def samplers(kind: Any) -> Iterator[Any]:
+    """The kinds of sampled control in a kind.
+
+    Args:
+        kind: as in `compile_time`.
+    """
+    if isinstance(kind, tuple):
+        if kind and kind[0] is p_.Sampler:
+            yield kind
+        for x in kind:
+            yield from samplers(x)
 
 
 def ready_time(kind: Any, started: bool = True) -> float:

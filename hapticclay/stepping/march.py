@@ -13,7 +13,7 @@ from .driver import kick
 from .engine_step import accelerations, put
 from .instant import instant, moment
 from .kick import is_finite, place, place_after
-from .parts import INF
+from .parts import FASTEST
 from .rows import ROW
 from .state import (
     UNRESOLVED,
@@ -249,8 +249,8 @@ def force_of(grip):
 
 
 def is_finite_point(z):
-    """Whether the joint rates of a point are finite."""
-    return abs(z.w[0]) + abs(z.w[1]) < INF
+    """Whether the joint rates of a point are those of an arm."""
+    return abs(z.w[0]) + abs(z.w[1]) < FASTEST
 
 
 # ---- a step of either method ---------------------------------------------------------------------

@@ -20,17 +20,18 @@ class Notice:
 
     Args:
         what: what is compiled.
-        expected: time that it takes, measured [s].
+        expected: time that it takes, measured [s]; None where it is not known.
     """
 
-    def __init__(self, what: str, expected: float):
-        self.told = f"hapticclay: compiling {what}, this once: about {expected:.0f} s"
+    def __init__(self, what: str, expected: float | None):
+        time_ = "" if expected is None else f": about {expected:.0f} s"
+        self.told = f"hapticclay: compiling {what}, this once{time_}"
         self.over = threading.Event()
         self.life = threading.Thread(target=self._live, daemon=True)
         self.since: float | None = None
 
     def begin(self) -> None:
-        """Prints the expected time, once."""
+        """Prints what is compiled and the expected time, once."""
         if self.since is not None or sys.stderr is None:
             return
         self.since, self.stream, self.terminal = time.monotonic(), sys.stderr, _on_terminal()

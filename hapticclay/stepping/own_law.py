@@ -82,8 +82,8 @@ def _compile_law(law: Any, n: int, m: int, outside: tuple[Any, ...]) -> Any:
         " pass",
     ]
     options: Any = {"error_model": "numpy"}
-    _let_call(law)
     try:
+        _let_call(law)
         if changed := _changed_outside(law):
             raise TypeError(f"it changes {changed}, a variable outside of it")
         scope: dict[str, Any] = {
@@ -95,7 +95,7 @@ def _compile_law(law: Any, n: int, m: int, outside: tuple[Any, ...]) -> Any:
         exec("def call(pointer):\n    " + "\n    ".join(lines), scope)  # tuples of fixed length
         kind = types.void(types.CPointer(types.float64))
         return numba.cfunc(kind, **options)(scope["call"])
-    except (numba.core.errors.NumbaError, TypeError, ValueError, AssertionError) as error:
+    except Exception as error:  # of the law, or of numba
         said = re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines()  # without colour codes
         said = [x.strip() for x in said if x.strip()]
         reason = next((x for x in said if not x.startswith("Failed in nopython mode")), "no reason")

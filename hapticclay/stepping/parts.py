@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 INF = float("inf")
+FASTEST = 1e30  # [rad/s] faster joints have no state: their powers would leave the floats
 
 
 class Time(NamedTuple):

@@ -87,19 +87,20 @@ def write_removed(groove, e, i):
 def with_work(parts, a, k, w):
     """The ledger with the works of a kick; w are the joint rates before it."""
     v, u, n, H, uh, tau, fe = k.at.v, k.motion.u, k.w, k.step.H, k.uh, k.tau, k.fe
-    dx, dy = hand.dampers(parts.hand)
+    dx, dy = hand.damping_force(parts.hand, k.step, v, u)
     vx, vy = 0.5 * (v[0] + u[0]), 0.5 * (v[1] + u[1])
     muscle = H * (uh[0] * vx + uh[1] * vy)
     motors = 0.5 * H * (tau[0] * (w[0] + n[0]) + tau[1] * (w[1] + n[1]))
     clay = H * (fe[0] * vx + fe[1] * vy)
-    taken = H * (dx * vx * vx + dy * vy * vy)
+    taken = H * (dx * vx + dy * vy)
     return Work(
         a.muscle + muscle, a.motors + motors, a.clay + clay, a.hand + taken,
-        a.through + (abs(muscle) + abs(motors)), hardware_work(a.hardware, k, w, (vx, vy)),
+        a.through + (abs(muscle) + abs(motors)),
+        hardware_work(a.hardware, parts.sampler, k, w, (vx, vy)),
     )  # fmt: skip
 
 
-def hardware_work(work, k, w, v):
+def hardware_work(work, sampler, k, w, v):
     """What hardware has taken, with its work in a kick; v is the mean velocity."""
     if work is None:
         return work
@@ -108,6 +109,7 @@ def hardware_work(work, k, w, v):
     return HardwareWork(
         work.friction + friction_work(slip, H, rates), work.guard + guard_work(hold.guard, H, v),
         work.coupling + coupling_work(hold.pull, H, v),
+        work.rendered + rendered_work(sampler.clay, hold.force, H, v),
     )  # fmt: skip
 
 
@@ -121,6 +123,12 @@ def guard_work(guard, H, v):
     if guard is None:
         return 0.0
     return H * (guard[0] * v[0] + guard[1] * v[1])
+
+
+def rendered_work(physical, force, H, v):
+    if physical is None:
+        return H * (force[0] * v[0] + force[1] * v[1])
+    return 0.0
 
 
 def coupling_work(pull, H, v):

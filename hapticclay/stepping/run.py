@@ -921,12 +921,13 @@ class Run:
         return out | self._hardware(out)
 
     def _hardware(self, out: dict[str, float]) -> dict[str, float]:
-        """Energy that the hardware takes; friction is not part of the motors' share."""
+        """Energy that hardware and held clay take; friction is not part of the motors' share."""
         x, io = self.state.work.hardware, self.scenario.hardware
-        if x is None or io is None:
+        if x is None:
             return {}
-        used = any(io.friction), io.passivity, io.coupling is not None
-        names = "friction", "passivity_controller", "coupling"
+        used = (any(io.friction), io.passivity, io.coupling is not None) if io else (False,) * 3
+        used = *used, scene.renders_clay(self.parts)
+        names = "friction", "passivity_controller", "coupling", "rendered_clay"
         found = {n: float(each) for n, each, on in zip(names, x, used, strict=True) if on}
         return found | {"residual": out["residual"] - found.get("friction", 0.0)}
 

@@ -297,7 +297,7 @@ def blocks(parts, s: Scenario):
     axis = s_.Axis(0.0, 0.0, 0.0, 0.0)
     growth = s_.Growth(NONE, NONE) if parts.clay and parts.clay.growth else None
     hit = s_.Hit(INF, 0.0) if parts.hits else None
-    works = s_.HardwareWork(0.0, 0.0, 0.0) if s.hardware and parts.sampler else None
+    works = s_.HardwareWork(0.0, 0.0, 0.0, 0.0) if counts_hardware(parts, s) else None
     clay = s_.Clay(
         s_.Region((0, 0), NONE, NONE), NONE, NONE, growth, hit,
         first_reaction(parts.special), first_laws(parts.special, NONE),
@@ -307,6 +307,17 @@ def blocks(parts, s: Scenario):
         clay, s_.Work(0.0, 0.0, 0.0, 0.0, 0.0, works), s_.Status(0, 0, 0, 0, (0, 0, 0, 0)),
         s_.Filled(0, 0, 0, 0),
     )  # fmt: skip
+
+
+def renders_clay(parts) -> bool:
+    """Whether the motors hold the force of clay that the loop computes."""
+    x = parts.sampler
+    return x is not None and x.own is None and x.clay is None and parts.clay is not None
+
+
+def counts_hardware(parts, s: Scenario) -> bool:
+    """Whether the ledger has entries of hardware, or of clay that the motors hold."""
+    return renders_clay(parts) or (parts.sampler is not None and s.hardware is not None)
 
 
 def start(parts, s: Scenario, e):

@@ -460,7 +460,7 @@ class Work(NamedTuple):
         clay: taken by the clay.
         hand: taken by the damper of the hand.
         through: sum of the magnitudes.
-        hardware: what hardware takes; None without any.
+        hardware: what hardware and held clay take; None without either.
     """
 
     muscle: float
@@ -472,17 +472,19 @@ class Work(NamedTuple):
 
 
 class HardwareWork(NamedTuple):
-    """Energy that hardware between computer and arm takes [J]; the last two are part of motors.
+    """Energy that motors and their hardware take [J]; all but friction is part of motors.
 
     Attributes:
         friction: of the joints.
         guard: of the passivity controller.
         coupling: of the virtual coupling.
+        rendered: of the force that the motors hold for the clay; 0 where the clay is physical.
     """
 
     friction: float
     guard: float
     coupling: float
+    rendered: float
 
 
 class Status(NamedTuple):
