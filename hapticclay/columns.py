@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from .display import one_line
 from .errors import ParameterError
+from .files import MOST_TABLE, read_bytes
 from .units import parse_unit
 
 if TYPE_CHECKING:
@@ -259,7 +260,7 @@ def unreadable(field: str, path: Path, error: OSError) -> ParameterError:
 
 
 def _text(field: str, path: Path) -> str:
-    data = path.read_bytes()
+    data = read_bytes(path, MOST_TABLE)
     bound = "must be text in UTF-8"
     if data.startswith(WIDE) or b"\0" in data:
         raise ParameterError(field, str(path), f"{bound}, seems to be UTF-16 or no text at all")

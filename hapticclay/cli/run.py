@@ -186,6 +186,7 @@ def run_table(record: Record, paced: bool = False) -> str:
         lines.append(f"error: {record.error}")
         if record.error.note:
             lines.append(f"why: {record.error.note}")
+    lines += _energy_lines(record)
     lines.append(_pace_line(record, paced))
     return "\n".join(lines)
 
@@ -208,6 +209,14 @@ def _crossing_lines(record: Record) -> list[str]:
     if len(record.crossings) > MOST_ROWS:
         lines.append(f"... and {len(record.crossings) - MOST_ROWS} more crossings")
     return lines
+
+
+def _energy_lines(record: Record) -> list[str]:
+    through = record.energy.get("throughput", 0.0)
+    if not through:
+        return []
+    share = abs(record.energy["residual"]) / through
+    return [f"energy: balanced within {share:.1e} of {through:.4g} J"]
 
 
 def _stop_lines(record: Record) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import difflib
 import functools
 import itertools
 import math
@@ -18,7 +17,7 @@ from typing import Any, Literal, NamedTuple, Union, get_args, get_origin, get_ty
 
 import tyro
 
-from ..errors import ParameterError, choice, quantity
+from ..errors import ParameterError, choice, nearest, quantity
 from ..units import is_quantity
 from .commands import COMMANDS, load_command
 from .console import scenario_words
@@ -92,9 +91,8 @@ def ordered(words: Sequence[str]) -> list[str]:
 
 def _is_record(word: str) -> bool:
     """Whether a word is the path of a record: a folder, or an .npz file, there or not."""
-    path = Path(word)
-    suffix = path.suffix.lower()
-    return path.is_dir() or suffix == ".npz" or (os.sep in word and not suffix)
+    suffix = Path(word).suffix.lower()
+    return os.path.isdir(word) or suffix == ".npz" or (os.sep in word and not suffix)
 
 
 def _positional(
@@ -220,7 +218,7 @@ def sources(words: Sequence[str]) -> list[Path]:
     """
     pairs = itertools.pairwise(["", *words])
     named = [Path(word) for before, word in pairs if before not in ("--out", "--page")]
-    return [p for p in named if p.is_file() or (p / "record.npz").is_file()]
+    return [p for p in named if any(map(os.path.isfile, (p, p / "record.npz")))]
 
 
 class Slot(NamedTuple):
@@ -364,7 +362,7 @@ def _check_option(name: str, given: list[str], kind: Any) -> None:
         kind = get_args(kind)[0]
         value = next((word for word in given if word not in get_args(kind)), "")
     names = [x for k in _members(kind) if get_origin(k) is Literal for x in get_args(k)]
-    near = difflib.get_close_matches(value, names, n=1)
+    near = nearest(value, names)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     raise ParameterError(name, value, f"must be {_meaning(kind)}{hint}")
 
@@ -401,7 +399,7 @@ def _option_names(slots: dict[str, Slot]) -> list[str]:
 
 def _unknown(word: str, path: str, slots: dict[str, Slot]) -> ParameterError:
     """The error for an option that a command lacks."""
-    near = difflib.get_close_matches(_plain(word), _option_names(slots), n=1)
+    near = nearest(_plain(word), _option_names(slots))
     hint = f"; did you mean --{near[0]}?" if near else f"; see hapticclay {path} --help"
     return _refused(f"{word}: no option of {path}{hint}")
 

@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..columns import BadCell, Sheet
 from ..errors import ParameterError, array_of, choice
 from . import pieces
@@ -64,6 +64,7 @@ class Samples(Signal):
         object.__setattr__(self, "values", tuple(map(tuple, values.tolist())))
 
     @classmethod
+    @checked
     def csv(
         cls,
         path: str | os.PathLike[str],

@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass
 from typing import Annotated
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, number
 from .device import read_columns
 
@@ -50,6 +50,7 @@ class ButtonScript:
         return self.pressed[i - 1] if i else frozenset()
 
     @classmethod
+    @checked
     def of_file(cls, path: str | os.PathLike[str]) -> ButtonScript:
         """Reads a script from a CSV file with the columns t [s], a, b, c, home (0 or 1).
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..columns import Sheet, unreadable
 from ..errors import Bound, ParameterError, check_fields, number
 from ..model.constants import TS
@@ -78,6 +78,7 @@ class Trajectory:
         return cls((0.0,), (target,))
 
     @classmethod
+    @checked
     def of_file(cls, path: str | os.PathLike[str]) -> Trajectory:
         """Reads a trajectory from a CSV file with the columns t [s], x and y [m].
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..columns import Sheet, unreadable
 from ..files import atomic
 from .rows import MOST_ROWS, Rows
@@ -120,6 +120,7 @@ class Exchanges:
         return Path(path)
 
     @classmethod
+    @checked
     def load(cls, path: str | os.PathLike[str]) -> Exchanges:
         """Reads what `save` wrote.
 
@@ -129,7 +130,7 @@ class Exchanges:
         Raises:
             ParameterError: the file cannot be read, or holds something else.
         """
-        file = Path(path) / FILE if Path(path).is_dir() else Path(path)
+        file = Path(path) / FILE if os.path.isdir(path) else Path(path)
         try:
             sheet = Sheet.read("record", file)
         except OSError as error:

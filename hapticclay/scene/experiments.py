@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from math import cos, radians
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, ParamSpec, get_origin
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, field_types
 from ..formulas.constants import B_MAX
 from ..model.cells import Profile
@@ -125,6 +125,7 @@ class Experiment:
         raise NotImplementedError
 
     @classmethod
+    @checked
     def of(cls, words: Mapping[str, Any], *changes: Mapping[str, Any]) -> Scenario:
         """The scenario of an experiment whose parameters are given as in `parameters`.
 

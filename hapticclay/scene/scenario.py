@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..display import html_table, one_line
 from ..errors import Bound, ParameterError, check_fields, choice, number, quantity
 from ..model import samples, shapes  # noqa: F401  # so that files and options know every Signal
@@ -161,6 +161,7 @@ class Scenario:
         return html_table(f"Scenario {self.name}", scenario_rows(self))
 
     @classmethod
+    @checked
     def of(cls, settings: Mapping[str, Any], *changes: Mapping[str, Any]) -> Scenario:
         """Makes a scenario from plain data: fields, or an experiment with parameters and fields.
 
@@ -189,6 +190,7 @@ class Scenario:
         return cls(**values)
 
     @classmethod
+    @checked
     def load(cls, path: str | os.PathLike[str], *changes: Mapping[str, Any]) -> Scenario:
         """Reads a scenario from a file (docs/scenarios.md).
 

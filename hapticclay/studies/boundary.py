@@ -10,7 +10,7 @@ from typing import Annotated, TypeVar
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, number
 from ..formulas import arm as arm_law
 from ..formulas.constants import B_MAX
@@ -72,6 +72,7 @@ class PushedLoop(Loop):
         number("delay", self.delay, 0.0, 1.0 if self.Ts else 0.0, unit="s")
 
     @classmethod
+    @checked
     def of(cls, scenario: Scenario, axis: str = "x", b: float | None = None) -> PushedLoop:
         """A runnable loop of one axis of a scenario, in uniform clay.
 

@@ -57,7 +57,9 @@ class Distribution:
         Raises:
             ParameterError: it is none of these.
         """
-        law, *numbers = str(text).split(":")
+        if not isinstance(text, str):
+            raise ParameterError(field, text, "must be a text such as normal:0:0.02")
+        law, *numbers = text.split(":")
         choice(f"law of {field}", law, LAWS)
         try:
             first, second = (number_in(field, x, unit) for x in numbers)
@@ -171,6 +173,8 @@ def parse_laws(text: str, unit_of: Callable[[str], str] = lambda _: "") -> dict[
         ParameterError: a word is not name=law:number:number, or a name stands twice.
     """
     out: dict[str, Distribution] = {}
+    if not isinstance(text, str):
+        raise ParameterError("vary", text, "must be a text such as delay=uniform:0:1e-3")
     for word in text.split():
         name, equals, law = word.partition("=")
         if not equals or not name or name in out:

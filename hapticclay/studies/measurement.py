@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..columns import Sheet, unreadable
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
@@ -78,6 +78,7 @@ class Measurement:
         return float(self.t[-1] - self.t[0]) / (len(self.t) - 1)
 
     @classmethod
+    @checked
     def load(cls, path: str | Path, columns: Mapping[str, str] | None = None) -> Measurement:
         """Read a CSV file, whose first line names its columns.
 

@@ -52,6 +52,7 @@ class Handle:
     normal: np.ndarray
 
     @classmethod
+    @checked
     def of(
         cls,
         scenario: Scenario,

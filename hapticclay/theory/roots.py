@@ -8,10 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
+
+from . import exact_roots
+from .exact_roots import axis_parts, exact, square_root, value, within_rounding
 
 VARIABLE = Polynomial([0.0, 1.0])  # s itself
 ROUNDED = 1e-14  # a sum below this share of its terms is their rounding
@@ -21,6 +26,8 @@ SCAN_BEYOND = 6.0  # which extends by so many decades on either side of all root
 REFINED = 8  # times that a minimum is looked for on a grid 20 times as fine
 NOISE = 1e-12  # relative differences of values up to this are rounding
 SCAN_NEAR = np.linspace(-5.0, 5.0, 21)  # and closes in on a root, in units of its imaginary part
+LEAST, MOST = 1e-300, 1e300  # between these a K is a number
+SAME = 1e-12  # of their size: roots that cross at such K leave no room between them
 
 
 def roots(p: Polynomial) -> np.ndarray:
@@ -54,10 +61,12 @@ def positive_roots(p: Polynomial) -> np.ndarray:
 def hurwitz(p: Polynomial) -> bool:
     """Return True if every root of p other than zero lies left of the imaginary axis.
 
+    The answer is exact.
+
     Args:
-        p: polynomial.
+        p: polynomial, of floats or rational.
     """
-    return bool(np.all(nonzero_roots(p).real < 0.0))
+    return not np.any(p.coef) or exact_roots.roots_right(p) == (0, 0)
 
 
 def multiplicity_of_zero(p: Polynomial) -> int:
@@ -113,43 +122,80 @@ def crossings(A: Polynomial, B: Polynomial) -> list[tuple[float, float]]:
 
     The result is exact. On the imaginary axis A + K B vanishes, so Im(A B*) = 0. The positive roots
     of this polynomial in omega give every K at which a pair of roots can cross. A single root can
-    cross at 0 and at infinity. Roots that stay at zero do not count.
+    cross at 0 and at infinity. Roots that stay at zero do not count. Roots of A and of B on the
+    axis within rounding do not count either: the loop has them at K = 0 and at infinity.
 
     Args:
-        A: polynomial.
+        A: polynomial, of floats or rational.
         B: polynomial, of no higher degree.
 
     Returns:
         (K, omega [rad/s]), K ascending.
     """
-    AB = cross_spectrum(A, B)
-    omega = positive_roots(Polynomial(AB.coef.imag))
-    with np.errstate(divide="ignore", invalid="ignore"):  # B(j omega) = 0: no K places a pole there
-        K = -AB(omega).real / np.abs(on_axis(B)(omega)) ** 2
-        n = multiplicity_of_zero(A)
-        ends = [-A.coef[n] / B.coef[n] if n == multiplicity_of_zero(B) else math.nan]
-        ends += [-A.coef[-1] / B.coef[-1] if A.degree() == B.degree() else math.nan]
-    K, omega = np.concatenate((K, ends)), np.concatenate((omega, [0.0, math.inf]))
-    return [(float(K[i]), float(omega[i])) for i in np.argsort(K) if 0.0 < K[i] < math.inf]
+    return [(x.K, x.omega) for x in _every_crossing(A, B) if not x.end]
+
+
+@dataclass(frozen=True)
+class _Crossing:
+    """A root of A + K B on the axis; end is -1 for one of A, 1 for one of B, within rounding."""
+
+    K: float
+    omega: float
+    end: int = 0
+
+
+def _every_crossing(A: Polynomial, B: Polynomial) -> list[_Crossing]:
+    """The crossings with K > 0 at a root of A, between, and at a root of B, K ascending."""
+    A, B = exact(A).trim(), exact(B).trim()
+    (Ae, Ao), (Be, Bo) = axis_parts(A), axis_parts(B)
+    across = -(Ae * Be + Polynomial([Fraction(0), Fraction(1)]) * Ao * Bo)
+    size2 = Be * Be + Polynomial([Fraction(0), Fraction(1)]) * Bo * Bo
+    found = []
+    for x in exact_roots.positive_roots(Ao * Be - Ae * Bo):
+        if value(size2, x):  # else B(j omega) = 0: no K places a pole there
+            end = -1 if within_rounding(A, x) else int(within_rounding(B, x))
+            found.append((value(across, x) / value(size2, x), square_root(x), end))
+    n = multiplicity_of_zero(A)
+    if n == multiplicity_of_zero(B):
+        found.append((-A.coef[n] / B.coef[n], 0.0, 0))
+    if A.degree() == B.degree():
+        found.append((-A.coef[-1] / B.coef[-1], math.inf, 0))
+    within = [(float(K), *at) for K, *at in found if LEAST < K < MOST]
+    return [_Crossing(*x) for x in sorted(within)]
 
 
 def first_crossing(A: Polynomial, B: Polynomial) -> tuple[float, float]:
     """Smallest K > 0 at which a root of A + K B leaves the left half plane, and its frequency.
 
     Args:
-        A: polynomial.
+        A: polynomial, of floats or rational.
         B: polynomial, of no higher degree.
 
     Returns:
         (K, omega [rad/s]); (inf, nan) if no root crosses, (0, nan) if one lies right of the axis at
         small K.
     """
-    found = crossings(A, B)
-    if not hurwitz(A + (0.5 * found[0][0] if found else 1.0) * B):
+    A, B = exact(A), exact(B)
+
+    def stable(low: float, high: float) -> bool:
+        """Whether the loop is, between two successive crossings."""
+        if high == math.inf:
+            K = 2.0 * low if low else 1.0
+        else:
+            K = math.sqrt(low) * math.sqrt(high) if low else 0.5 * high
+        return hurwitz(A + Fraction(K) * B)
+
+    found = _every_crossing(A, B)
+    low = max((x.K for x in found if x.end < 0), default=0.0)
+    found = [x for x in found if x.end >= 0 and x.K > low]
+    gains = [*(x.K for x in found), math.inf]
+    if not stable(low, gains[0]):
         return 0.0, math.nan
-    for K, omega in found:
-        if not hurwitz(A + (1.0 + 1e-6) * K * B):
-            return K, omega
+    for x, after in zip(found, gains[1:], strict=True):
+        if x.end:
+            break
+        if after > (1.0 + SAME) * x.K and not stable(x.K, after):
+            return x.K, x.omega
     return math.inf, math.nan
 
 

@@ -180,7 +180,7 @@ def _added_up(record: Record) -> dict[str, float]:
     if not {"muscle", "hand_damper", "hand_stored", "motors", "clay"} <= set(e):
         return {}
     hand = e["muscle"] - e["hand_damper"] - e["hand_stored"]
-    return {"hand": hand, "motors": e["motors"], "clay": e["clay"]}
+    return {"hand": hand, "motors": e["motors"], "clay": e.get("rendered_clay", e["clay"])}
 
 
 def _with_picture(figure: Figure) -> Figure:
