@@ -12,7 +12,9 @@ HAPTICCLAY_NATIVE=no: build nothing.
 
 import importlib
 import os
+import shlex
 import shutil
+import subprocess
 import sys
 import sysconfig
 import types
@@ -41,7 +43,7 @@ DIRECTIVES = {  # the arithmetic of C: whole numbers are no objects, nothing is 
     "initializedcheck": False,
 }
 # no rounding is left out; see kernel/probe.py
-FLAGS = ["/O2", "/fp:precise"] if os.name == "nt" else ["-O2", "-g0", "-ffp-contract=off"]
+FLAGS = ["/O2", "/fp:precise"] if os.name == "nt" else ["-O1", "-g0", "-ffp-contract=off"]
 FLAGS += os.environ.get("HAPTICCLAY_CFLAGS", "").split()
 LINKED = ["-Wl,-s"] if sys.platform == "linux" else []  # no names for debuggers
 LINKED += os.environ.get("HAPTICCLAY_LDFLAGS", "").split()
@@ -73,7 +75,20 @@ def lacked():
     headers = Path(sysconfig.get_path("include"))
     if not (headers / "Python.h").is_file():
         return f"no Python.h in {headers}"
-    return ""
+    return "" if os.name == "nt" else compiler_lacked(headers)
+
+
+def compiler_lacked(headers):
+    """What is wrong with the C compiler: it reads the headers, which takes no time."""
+    command = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc")
+    if not shutil.which(command[0]):
+        return f"no C compiler ({command[0]})"
+    text = "#include <Python.h>\n#include <math.h>\n#include <string.h>\n"
+    trial = subprocess.run(
+        [*command, "-E", "-xc", f"-I{headers}", "-"], input=text, capture_output=True, text=True
+    )
+    is_read = not trial.returncode and "PyModule_Create2" in trial.stdout
+    return "" if is_read else f"the C compiler ({command[0]}) does not work"
 
 
 def write(path, text):
@@ -148,7 +163,7 @@ class BuildNative(build_ext):
         lacks = lacked()
         made = [] if lacks else self.compile()
         if not lacks and not made:
-            lacks = "the C compiler failed or was lacking"
+            lacks = "the C compiler failed"
         if lacks:
             print(f"hapticclay: no compiled kernel ({lacks}): runs will be slow", file=sys.stderr)
         lay_out(folder, made, lacks)
