@@ -1,15 +1,18 @@
 # Needs python3 (3.11 or newer) and make; everything else goes into .venv here.
+# With a C compiler and Python's headers, runs are compiled; without, they are slow.
 PYTHON ?= python3
 BIN := .venv/bin
 unexport PYTHONDONTWRITEBYTECODE  # the tests start hundreds of processes, which would compile each module anew
 
-.PHONY: demo test coverage check docs pages linkcheck bench build release clean
+KERNEL := setup.py $(wildcard hapticclay/formulas/*.p* hapticclay/kernel/*.p*)
+
+.PHONY: demo test sanitize coverage check docs pages linkcheck bench build release clean
 .DELETE_ON_ERROR:
 
-.venv/run.done: pyproject.toml
+.venv/run.done: pyproject.toml $(KERNEL)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "hapticclay needs Python 3.11 or newer, this is %s" % sys.version.split()[0])'
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[fast]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
 	@touch $@
 
 .venv/dev.done: .venv/run.done
@@ -23,6 +26,9 @@ demo: .venv/run.done  ## set up, run the constant cut, reproduce the paper, say 
 
 test: .venv/dev.done  ## set up and run all tests, on all cores
 	$(BIN)/python -m pytest --durations=20
+
+sanitize: .venv/dev.done  ## the kernel's tests of bits, compiled to find wrong addresses and undefined behaviour
+	.ci/sanitize $(BIN)/python
 
 coverage: .venv/dev.done  ## the same but what tracing disturbs, and which lines they reach: out/coverage/index.html
 	$(BIN)/python -m pytest -m "not perf and not untraced" --cov --cov-report=term --cov-report=html:out/coverage --cov-report=xml:out/coverage/coverage.xml
@@ -57,4 +63,4 @@ release: .venv/dev.done  ## the same, if the published benchmarks were measured 
 	$(MAKE) build
 
 clean:
-	rm -rf .venv out dist docs/gallery
+	rm -rf .venv out dist build hapticclay/native docs/gallery

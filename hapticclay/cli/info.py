@@ -44,6 +44,7 @@ def record_text(record: Record, size: int) -> str:
     import numpy as np
 
     from ..scene.text import scenario_rows
+    from ..simulation.engines import made_by
     from ..simulation.record import RECORD_SCHEMA
 
     r, n = record, len(record.t)
@@ -63,6 +64,7 @@ def record_text(record: Record, size: int) -> str:
     now = versions()["hapticclay"]
     if r.versions.get("hapticclay") != now:
         rows.append(("read by", f"hapticclay {now}"))
+    rows.append(("runs here", f"made by {made_by()}"))
     width = max(len(name) for name, _ in rows)
     lines += [f"{name:{width}}  {value}" for name, value in rows]
     return printable("\n".join([*lines, "", array_table(r)]))
