@@ -125,9 +125,7 @@ def spoiled_scratch():
 
         return march
 
-    return patched(
-        (kick, "begin", begins), (sampled, "event", happens), (march, "march", marches)
-    )
+    return patched((kick, "begin", begins), (sampled, "event", happens), (march, "march", marches))
 
 
 def repeated():
