@@ -9,7 +9,8 @@ from scipy.integrate import solve_ivp
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.stepping import laws, run
+from hapticclay.kernel import user_laws
+from hapticclay.simulation import run
 from tests.hunt import some
 from tests.oracles import Arm, axis_rates, drag_law, hardening_law
 from tests.oracles.hardening_law import DAMPING, WAY
@@ -31,12 +32,12 @@ METHODS = {
 
 @pytest.fixture
 def hardening(monkeypatch):
-    monkeypatch.setattr(laws, "TABLE", [hardening_law])
+    monkeypatch.setattr(user_laws, "TABLE", [hardening_law])
 
 
 @pytest.fixture
 def both(monkeypatch):
-    monkeypatch.setattr(laws, "TABLE", [hardening_law, drag_law])
+    monkeypatch.setattr(user_laws, "TABLE", [hardening_law, drag_law])
 
 
 def scene(**kw):
@@ -134,9 +135,7 @@ def same(a, b):
 
 
 @pytest.mark.parametrize("name", [name for name in METHODS if name != "held"])  # as "hardware"
-def test_machine_code_and_steps_one_by_one_give_the_same_bits(both, name):
-    from hapticclay.stepping import compiled
-
+def test_both_engines_and_steps_one_by_one_give_the_same_bits(both, name):
     s = dataclasses.replace(scene(**METHODS[name]), t_max=0.1, force=(1.0, 0.3))
     a, b = hc.simulate(s, engine="python"), hc.simulate(s, engine="native")
     assert not same(a, b) and a.energy == b.energy
@@ -147,20 +146,21 @@ def test_machine_code_and_steps_one_by_one_give_the_same_bits(both, name):
         while one.outcome is None:
             one.step()
         assert not same(a, one.record())
-    brief = run.completed(s, 10**9, compiled.KERNEL, run.EngineStore(), None, True)[0].brief()
+    brief = run.completed(s, 10**9, "native", run.Place(), None, True)[0].brief()
     assert tuple(map(float, brief[3][0])) == tuple(a.p[-1].tolist())
     assert tuple(map(float, brief[3][3])) == tuple(a.fe[-1].tolist()) and brief[4] == a.energy
 
 
+@pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("name", ["continuous", "accurate", "physical"])
-def test_a_run_goes_on_from_a_snapshot_with_the_law_as_it_was(both, name):
+def test_a_run_goes_on_from_a_snapshot_with_the_law_as_it_was(both, name, engine):
     s = dataclasses.replace(scene(**METHODS[name]), t_max=0.1)
-    whole, parts = run.Run(s, 1), run.Run(s, 1)
+    whole, parts = run.Run(s, 1, engine), run.Run(s, 1, engine)
     whole.go(None)
     parts.pause = parts.scenario.t_max // s.dt // 2
     parts.go(None)
     saved = parts.snapshot()
-    other = run.Run(s, 1)
+    other = run.Run(s, 1, engine)
     other.return_to(pickle.loads(pickle.dumps(saved)))
     other.go(None)
     for name, x in whole.arrays().items():
