@@ -14,8 +14,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hapticclay.stepping import engine, machine_code, monitor, run, scene
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.stepping.test_kick import CASES
 
 import hapticclay as hc
 from hapticclay import stepping
@@ -24,8 +26,6 @@ from hapticclay.model.clay import Clay
 from hapticclay.model.signals import Multisine
 from hapticclay.simulation import batch, engines, record
 from hapticclay.simulation.record import Record
-from hapticclay.stepping import engine, machine_code, monitor, run, scene
-from tests.stepping.test_kick import CASES
 
 fast = pytest.mark.skipif(
     importlib.util.find_spec("numba") is None, reason="needs numba: pip install hapticclay[fast]"

@@ -10,13 +10,6 @@ import itertools
 
 import numpy as np
 import pytest
-
-import hapticclay as hc
-from hapticclay.model import support
-from hapticclay.model.cells import Profile
-from hapticclay.model.clay import LAWS, Clay
-from hapticclay.model.constants import TS
-from hapticclay.simulation import record
 from hapticclay.stepping.machine_code import kind_of
 from hapticclay.stepping.run import EngineStore, Run, completed
 from hapticclay.stepping.scene import parts_of
@@ -24,6 +17,13 @@ from tests.stepping.test_compiled import GROWING, LAYERS, WAVE, fast
 from tests.stepping.test_kick import HANDS, OTHER, ZEROS
 from tests.stepping.test_own_controller import to_pose
 from tests.stepping.test_signals_in_runs import CASES as SIGNALS
+
+import hapticclay as hc
+from hapticclay.model import support
+from hapticclay.model.cells import Profile
+from hapticclay.model.clay import LAWS, Clay
+from hapticclay.model.constants import TS
+from hapticclay.simulation import record
 
 PHYSICAL = dict(
     jitter=5e-5, dropout_probability=0.05, encoder=65536, velocity="difference",

@@ -13,8 +13,8 @@ import pytest
 import hapticclay as hc
 from hapticclay.cli.app import main
 from hapticclay.errors import ParameterError
-from hapticclay.model.sampled_controller import LawCaller, LawFailed
 from hapticclay.kernel import scene
+from hapticclay.model.sampled_controller import LawCaller, LawFailed
 from tests.hunt import some
 from tests.oracles import paper_law
 

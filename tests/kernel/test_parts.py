@@ -20,8 +20,8 @@ from hapticclay.model.clay import Clay
 from hapticclay.model.signals import Multisine
 from hapticclay.studies import boundary, growth
 from tests.hunt import HUNTS, some
-from tests.oracles import parts, store
 from tests.kernel.test_engines import same
+from tests.oracles import parts, store
 
 SEEDS = some(range(16), 4)  # orders 1 to 4 of C in turns; four along x, four along y, twice
 TS = 3.6e-4
