@@ -50,6 +50,7 @@ class VectoredRuns:
         self.states = np.zeros(n * native, layout.dtype_of(records.State))
         self.spares = [one(records.State) for _ in range(workers * native)]
         self.engines = np.zeros((workers, n), np.int64)  # addresses, by thread and run
+        self.kept: list[list[mover.Mover]] = [[] for _ in scenarios]  # what lies there
         places = [Place(self.movers[0]) for _ in scenarios]
         self.runs = [
             self._new(k, s, x) for k, (s, x) in enumerate(zip(scenarios, places, strict=True))
@@ -77,7 +78,8 @@ class VectoredRuns:
         self.force[k], self.gain[k] = s.force, s.gain
         self.looked_at[k], self.diverging[k] = -np.inf, False
         if self.engine == "native":
-            self.engines[:, k] = [x.of(s).row.ctypes.data for x in self.movers]
+            self.kept[k] = [x.of(s) for x in self.movers]
+            self.engines[:, k] = [x.row.ctypes.data for x in self.kept[k]]
         self.is_shown = False
 
     def _sync(self, k: int) -> Run:
