@@ -42,13 +42,16 @@ DIRECTIVES = {  # the arithmetic of C: whole numbers are no objects, nothing is 
     "wraparound": False,
     "initializedcheck": False,
 }
-# no rounding is left out; see kernel/probe.py
-FLAGS = ["/O2", "/fp:precise"] if os.name == "nt" else ["-O1", "-g0", "-ffp-contract=off"]
+# every rounding stays, and the order of sums; kernel/probe.py finds a compiler that does otherwise
+ROUNDED = ["-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"]
+GCC = ["-O3", "-g0", "-fno-semantic-interposition", *ROUNDED]
+FLAGS = ["/O2", "/fp:precise"] if os.name == "nt" else GCC
 FLAGS += os.environ.get("HAPTICCLAY_CFLAGS", "").split()
 LINKED = ["-Wl,-s"] if sys.platform == "linux" else []  # no names for debuggers
 LINKED += os.environ.get("HAPTICCLAY_LDFLAGS", "").split()
 # one build for CPython 3.11 and later; the build without a lock has no stable interface yet
-IS_LIMITED = sys.implementation.name == "cpython" and not sysconfig.get_config_var("Py_GIL_DISABLED")
+HAS_LOCK = not sysconfig.get_config_var("Py_GIL_DISABLED")
+IS_LIMITED = sys.implementation.name == "cpython" and HAS_LOCK
 LIMITED = [("Py_LIMITED_API", "0x030B0000")] if IS_LIMITED else []
 CORES = os.cpu_count() or 1
 HOW = (sys.implementation.cache_tag, sysconfig.get_platform(), Cython and Cython.__version__)
@@ -60,7 +63,8 @@ def kernel_modules():
     package = types.ModuleType("kernel_at_build")
     package.__path__ = [str(PACKAGE / "kernel")]
     sys.modules[package.__name__] = package
-    return [importlib.import_module(f"kernel_at_build.{x}") for x in ("native", "layout", "records")]
+    names = "native", "layout", "records"
+    return [importlib.import_module(f"kernel_at_build.{x}") for x in names]
 
 
 native, layout, records = kernel_modules()

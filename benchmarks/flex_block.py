@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from hapticclay.stepping.engine import build, mujoco, warnings_caught
 
 from hapticclay.model.arm import PAPER, inverse_kinematics
 from hapticclay.scene.scenario import Scenario
-from hapticclay.stepping.engine import build, mujoco, warnings_caught
 from hapticclay.views import film
 from hapticclay.views.stage import THICKNESS, picture_spec
 

@@ -18,6 +18,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from hapticclay.stepping import engine
 from tabulate import tabulate
 
 import hapticclay as hc
@@ -25,7 +26,6 @@ from hapticclay.model.arm import PAPER
 from hapticclay.model.hardware import Coupling, Hardware
 from hapticclay.model.signals import Multisine
 from hapticclay.simulation import engines
-from hapticclay.stepping import engine
 from hapticclay.views import stage
 
 from . import common

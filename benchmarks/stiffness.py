@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from hapticclay.stepping.engine import warnings_caught
 from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay.model.constants import S
-from hapticclay.stepping.engine import warnings_caught
 
 from . import common, hits
 from .peers import mujoco_plain, ours

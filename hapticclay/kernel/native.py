@@ -40,7 +40,9 @@ def sources() -> Iterator[str]:
     for name in compiled()[:-1]:
         yield f"{name}.py"
     for room in ROOMS:
-        yield from (f"{room}/{x.name}" for pattern in ("*.pxd", "*.pyx") for x in _in(room, pattern))
+        yield from (
+            f"{room}/{x.name}" for pattern in ("*.pxd", "*.pyx") for x in _in(room, pattern)
+        )
     yield from DECLARATIONS
 
 
