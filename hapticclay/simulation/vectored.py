@@ -171,7 +171,13 @@ class VectoredRuns:
         for k in which[alone].tolist() if self.engine == "native" else which.tolist():
             self._one(k, n)
         if self.engine == "native":
+            self._draw(which[~alone], n)
             self._together(which[~alone], n)
+
+    def _draw(self, which: np.ndarray, n: int) -> None:
+        """Draws what the hardware of runs leaves to chance in the next n steps."""
+        for k in which[self.models["chance"][which] != 0].tolist():
+            self.runs[k].draw(n)
 
     def _one(self, k: int, n: int) -> None:
         """Advances a run for which something is to be prepared, or in Python."""
@@ -250,6 +256,7 @@ class VectoredRuns:
             for k in live[alone].tolist() if self.engine == "native" else live.tolist():
                 self.shown[k] = self.runs[k].ahead()
             if self.engine == "native" and not alone.all():
+                self._draw(live[~alone], 1)
                 self._call(self._peek, live[~alone])
                 self._put_force(live[~alone])
             self.is_shown = True
