@@ -48,7 +48,8 @@ FLAGS += os.environ.get("HAPTICCLAY_CFLAGS", "").split()
 LINKED = ["-Wl,-s"] if sys.platform == "linux" else []  # no names for debuggers
 LINKED += os.environ.get("HAPTICCLAY_LDFLAGS", "").split()
 # one build for CPython 3.11 and later; the build without a lock has no stable interface yet
-IS_LIMITED = sys.implementation.name == "cpython" and not sysconfig.get_config_var("Py_GIL_DISABLED")
+HAS_LOCK = not sysconfig.get_config_var("Py_GIL_DISABLED")
+IS_LIMITED = sys.implementation.name == "cpython" and HAS_LOCK
 LIMITED = [("Py_LIMITED_API", "0x030B0000")] if IS_LIMITED else []
 CORES = os.cpu_count() or 1
 HOW = (sys.implementation.cache_tag, sysconfig.get_platform(), Cython and Cython.__version__)
@@ -60,7 +61,8 @@ def kernel_modules():
     package = types.ModuleType("kernel_at_build")
     package.__path__ = [str(PACKAGE / "kernel")]
     sys.modules[package.__name__] = package
-    return [importlib.import_module(f"kernel_at_build.{x}") for x in ("native", "layout", "records")]
+    names = ("native", "layout", "records")
+    return [importlib.import_module(f"{package.__name__}.{x}") for x in names]
 
 
 native, layout, records = kernel_modules()

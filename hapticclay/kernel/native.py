@@ -40,7 +40,9 @@ def sources() -> Iterator[str]:
     for name in compiled()[:-1]:
         yield f"{name}.py"
     for room in ROOMS:
-        yield from (f"{room}/{x.name}" for pattern in ("*.pxd", "*.pyx") for x in _in(room, pattern))
+        yield from (
+            f"{room}/{x.name}" for pattern in ("*.pxd", "*.pyx") for x in _in(room, pattern)
+        )
     yield from DECLARATIONS
 
 
@@ -104,7 +106,9 @@ def check_modules(known: dict[str, int]) -> None:
             raise ImportError(f"damaged: native/{name} is not as it was built")
         for other in EXTENSION_SUFFIXES[: EXTENSION_SUFFIXES.index(f".{suffix}")]:
             if (file.parent / (stem + other)).exists():
-                raise ImportError(f"mixed: native/{file.parent.name}/{stem + other} is of another")
+                raise ImportError(
+                    f"mixed: native/{file.parent.name}/{stem + other} is of another build"
+                )
 
 
 def check_numbers(made: Any) -> None:
