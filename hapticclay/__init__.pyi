@@ -8,6 +8,7 @@ from . import walls as walls
 from .errors import Bound as Bound
 from .errors import ParameterError as ParameterError
 from .errors import Warning as Warning
+from .kernel.engine import build as build
 from .model.arm import Arm as Arm
 from .model.cells import Grid as Grid
 from .model.cells import Profile as Profile
@@ -50,17 +51,16 @@ from .scene.virtual_wall import VirtualWall as VirtualWall
 from .simulation.accuracy import Accuracy as Accuracy
 from .simulation.batch import simulate_batch as simulate_batch
 from .simulation.column_batch import simulate_columns as simulate_columns
+from .simulation.monitor import Outcome as Outcome
 from .simulation.record import Record as Record
 from .simulation.record import observed_passivity as observed_passivity
 from .simulation.record import out_of_band_ratio as out_of_band_ratio
 from .simulation.record import port_energy as port_energy
+from .simulation.run import Crossing as Crossing
 from .simulation.simulate import simulate as simulate
 from .simulation.simulation_batch import SimulationBatch as SimulationBatch
 from .simulation.stepwise import Sample as Sample
 from .simulation.stepwise import Simulation as Simulation
-from .stepping.engine import build as build
-from .stepping.monitor import Outcome as Outcome
-from .stepping.run import Crossing as Crossing
 from .views.figure import Figure as Figure
 from .views.images import gray_image as gray_image
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,7 +29,7 @@ class InfoCommand:
 
     def __call__(self) -> int:
         record = console.load_record(self.record)
-        file = self.record / "record.npz" if self.record.is_dir() else self.record
+        file = self.record / "record.npz" if os.path.isdir(self.record) else self.record
         print(record_text(record, file.stat().st_size))
         return 0
 

@@ -18,7 +18,7 @@ def round_to_even(x, step):
         step: in the unit of x.
 
     Returns:
-        The multiple.
+        The multiple; x itself if it is infinite or NaN.
     """
     return numbers.nearest(x / step) * step
 
@@ -32,9 +32,9 @@ def quantize(x, bits, span):
         span: full scale, in the unit of x.
 
     Returns:
-        The output, in the unit of x.
+        The output, in the unit of x; NaN for NaN, with which a run ends.
     """
-    if not bits:
+    if not bits or x != x:
         return x
     half = 2.0 ** (bits - 1)
     y = x * half / span
@@ -181,7 +181,7 @@ def passivity_controller(energy, f, v, Ts, W):
     return math.copysign(low, v) if along < low else f
 
 
-def virtual_coupling(tool, p, v, b, spring, damper, Ts):
+def virtual_coupling(tool, p, v, b, coupling, Ts):
     """Spring and damper between handle and massless tool in clay, implicit over a sample.
 
     b v_t = spring (p - tool+) + damper (v - v_t), tool+ = tool + Ts v_t (Colgate, Stanley, Brown,
@@ -199,11 +199,12 @@ def virtual_coupling(tool, p, v, b, spring, damper, Ts):
         (position of the tool after the sample [m], its velocity [m/s]); b times the velocity is the
         resisting force.
     """
+    spring, damper = coupling
     u = (spring * (p - tool) + damper * v) / (b + damper + spring * Ts)
     return tool + Ts * u, u
 
 
-def tool_that_yields(tool, p, v, b, law, along, spring, damper, Ts):
+def tool_that_yields(tool, p, v, b, law, along, coupling, Ts):
     """As `virtual_coupling`, for both axes in yielding clay: below the yield force the tool rests.
 
     (b + damper + spring Ts) v_t + (Fy + K |v_t|^n) v_t/|v_t| = spring (p - tool) + damper v.
@@ -221,6 +222,7 @@ def tool_that_yields(tool, p, v, b, law, along, spring, damper, Ts):
     Returns:
         Velocity of the tool (x, y) [m/s]; resisting force (x, y) [N].
     """
+    spring, damper = coupling
     qx, qy = spring * (p[0] - tool[0]) + damper * v[0], spring * (p[1] - tool[1]) + damper * v[1]
     dx, dy = b[0] + damper + spring * Ts, b[1] + damper + spring * Ts
     if along:

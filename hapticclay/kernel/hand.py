@@ -20,6 +20,12 @@ def resistance(m, p, v, c, i):
     return a.spring * p - a.mass * c + a.damper * v
 
 
+def damping_force(m, k, i):
+    """Force of the damper of an axis in a kick, as `load` counts it [N]."""
+    o = k.axis[i]
+    return m.axis[i].damper * (k.L * o.v + k.R * o.u)
+
+
 def force(m, k, i):
     """Mean force of the operator in a kick [N]."""
     o = k.axis[i]

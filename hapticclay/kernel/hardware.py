@@ -84,19 +84,19 @@ def drive(m, s, t1, t2):
 
 def couple(m, s, k, bx, by):
     """Force of the clay through the coupling, (x, y) [N]; moves its tool."""
-    now, after, c, d, T = s.now, s.next, m.coupling_spring, m.coupling_damper, m.Ts
+    now, after, T, coupling = s.now, s.next, m.Ts, (m.coupling_spring, m.coupling_damper)
     x, y = k.x, k.y
     if m.flow:
         a, b = s.x, s.y
         fyk = a.Fy, a.Kn, a.n, b.Fy, b.Kn, b.n
         tool = now.x.tool, now.y.tool
         ux, uy, fx, fy = law.tool_that_yields(
-            tool, (x.p, y.p), (x.v, y.v), (bx, by), fyk, m.flow == 2, c, d, T
+            tool, (x.p, y.p), (x.v, y.v), (bx, by), fyk, m.flow == 2, coupling, T
         )
         after.x.tool, after.y.tool = now.x.tool + T * ux, now.y.tool + T * uy
     else:
-        after.x.tool, ux = law.virtual_coupling(now.x.tool, x.p, x.v, bx, c, d, T)
-        after.y.tool, uy = law.virtual_coupling(now.y.tool, y.p, y.v, by, c, d, T)
+        after.x.tool, ux = law.virtual_coupling(now.x.tool, x.p, x.v, bx, coupling, T)
+        after.y.tool, uy = law.virtual_coupling(now.y.tool, y.p, y.v, by, coupling, T)
         fx, fy = bx * ux, by * uy
     after.x.pull, after.y.pull, after.x.pull_rate, after.y.pull_rate = fx, fy, ux, uy
     return fx, fy

@@ -58,16 +58,17 @@ def without_clay(m, s, k, fx, fy):
     return fx, fy
 
 
-def seen_force(m, s, px, py, vx, vy, pullx, pully):
-    """Force of the clay as the controller evaluates it [N]; pull is that of physical yielding."""
+def seen_force(m, s, k):
+    """Force of the clay as the controller evaluates it at the handle in k, (x, y) [N]."""
     if not m.clay:
         return 0.0, 0.0
+    px, py, vx, vy = k.x.p, k.y.p, k.x.v, k.y.v
     x, y = viscous.force(m, viscous.now(m, s, 0, 0), viscous.now(m, s, 1, 0), vx, vy)
     if not m.special:
         return x, y
     fx = fy = 0.0
     if m.flow:
-        fx, fy = motion_force(m, s, vx, vy, pullx, pully)
+        fx, fy = motion_force(m, s, vx, vy, k.x.pull, k.y.pull)
     if m.springs:
         fx, fy = fx + springs.seen_force(m, s, 0, px), fy + springs.seen_force(m, s, 1, py)
     if m.laws:

@@ -8,7 +8,7 @@ from . cimport modes
 from . cimport yielding
 
 cdef long GROWTH_BLOCK, OPEN, UNRESOLVED, ROW
-cdef double TOUCH, NEAR, EVEN
+cdef double TOUCH, NEAR, EVEN, FASTEST
 
 cdef long substeps(Model m, long long i) noexcept nogil
 cdef double pace(Model m, State s, double target, double after, bint on_grid) noexcept nogil

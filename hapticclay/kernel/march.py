@@ -13,6 +13,7 @@ TOUCH = 1e-13  # [m] as borders.TOUCH
 NEAR = 1e-6  # share of a step: a time so close to its end counts as its end
 EVEN = 1e-4  # share of the slack of signals: a time so close to a prepared one counts as that one
 OPEN, UNRESOLVED = 0, 4
+FASTEST = 1e30  # [rad/s] faster joints have no state: their powers would leave the floats
 ROW = 16
 
 
@@ -205,8 +206,8 @@ def finish(x, v, sums, i, h):
 
 
 def is_finite(z):
-    """Whether the joint rates of a point are finite."""
-    return abs(z.w1) + abs(z.w2) < math.inf
+    """Whether the joint rates of a point are those of an arm."""
+    return abs(z.w1) + abs(z.w2) < FASTEST
 
 
 # ---- what is kept of it --------------------------------------------------------------------------

@@ -7,7 +7,8 @@ import math
 
 import numpy as np
 
-from ..model import compensator, controller
+from ..formulas import compensator
+from ..model import controller
 from ..model.compensator import Compensator
 from ..model.controller import Servo
 from .sampled import SLACK

@@ -1,6 +1,5 @@
 cimport cython
 from .records cimport Kick, Model, State
-from ..formulas cimport cmath as math
 from . cimport arm
 from . cimport ends
 from . cimport kick

@@ -7,8 +7,6 @@
 | it may end | at a sample | at an event too | within a sample |
 """
 
-import math
-
 from . import arm, ends, kick, march, rows, sampled, servo, signals, yielding
 
 CONTINUOUS, SAMPLED, ACCURATE = range(3)
@@ -47,10 +45,10 @@ def place_behind(m, s, after):
 
 
 def is_sound(m, s):
-    """Whether the step tried ends with finite rates."""
+    """Whether the step tried ends with rates of an arm."""
     if m.method == ACCURATE:
         return march.is_finite(s.a.end)
-    return abs(s.k.w1) + abs(s.k.w2) < math.inf
+    return abs(s.k.w1) + abs(s.k.w2) < march.FASTEST
 
 
 def keep(m, s, after, shows):
@@ -79,9 +77,10 @@ def take(m, s, after):
         servo.take(m, s, k)
         if m.command:
             signals.add_command(m, s, k)
-    for i in range(2):
-        z, o = s.axis[i], k.axis[i]
-        z.owed, z.stuck, z.anchor = o.owed, o.stuck, o.anchor
+    if m.special and m.acts:
+        for i in range(2):
+            z, o = s.axis[i], k.axis[i]
+            z.owed, z.stuck, z.anchor = o.owed, o.stuck, o.anchor
     s.g1, s.g2 = k.g1, k.g2
     arm.step_engine(m, s, k, after, even)
     if k.still > 0.0:  # the engine's rounding would let it creep

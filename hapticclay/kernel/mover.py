@@ -33,6 +33,7 @@ ARRAYS = {  # fields of Engine, and arrays of the engine's data
     "forces": "qfrc_bias",
 }
 _asking = threading.Lock()
+_asked: dict[int, tuple[int, int]] = {}  # addresses, by the thread that asks for them
 
 
 @functools.cache
@@ -50,19 +51,28 @@ def address(name: str) -> int:
     return found
 
 
+@ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+def _note(model: int, data: int) -> None:
+    """Notes the addresses with which the engine calls it, for the thread that asks for them.
+
+    Other threads may step meanwhile, and call it too.
+    """
+    if threading.get_ident() in _asked:
+        _asked[threading.get_ident()] = model, data
+
+
 def addresses_of(model: Any, data: Any) -> tuple[int, int]:
     """Addresses of a model and its data: the engine passes them to a callback."""
-    found: list[int] = []
-    kind = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
-    note = kind(lambda model, data: found.extend((model, data)))
+    me = threading.get_ident()
     with _asking:
         before = mujoco.get_mjcb_passive()
-        mujoco.set_mjcb_passive(note)
+        _asked[me] = 0, 0
+        mujoco.set_mjcb_passive(_note)
         try:
             mujoco.mj_passive(model, data)
         finally:
             mujoco.set_mjcb_passive(before)
-    return found[0], found[1]
+        return _asked.pop(me)
 
 
 class Mover:
@@ -91,7 +101,7 @@ class Mover:
             made.bias = bias
             made.model, made.data = self.model, self.data
             for name, array in self.places.items():
-                setattr(made, name, memoryview(array))
+                setattr(made, name, memoryview(array))  # pyright: ignore[reportArgumentType]
             self._plain = made
         return self._plain
 
@@ -99,7 +109,7 @@ class Mover:
     def row(self) -> np.ndarray:
         """The record for compiled code, shape (1,)."""
         if self._row is None:
-            made = np.zeros(1, layout.dtype_of(records.Engine))
+            made: Any = np.zeros(1, layout.dtype_of(records.Engine))
             for name, function in CALLS.items():
                 made[name] = address(function)
             made["model"], made["data"] = addresses_of(self.model, self.data)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..errors import ParameterError
-from ..model.constants import B_MAX
+from ..formulas.constants import B_MAX
 from ..model.operator import NO_HAND
 from ..model.spring import RESOLVED
 from ..scene.scenario import Scenario

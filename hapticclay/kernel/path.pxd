@@ -24,8 +24,8 @@ cdef void begin(State s, double after, bint on_grid) noexcept nogil
 cdef void take(Model m, State s, double after, double target) noexcept nogil
 cdef void cross(Model m, State s, long i, long up) noexcept nogil
 cdef double bound(Model m, State s, double after) noexcept nogil
-@cython.locals(standing=cython.bint)
 cdef (double, long, long, bint) towards(Model m, State s, double after, long overx, long overy, bint first) noexcept nogil
+cdef (double, long, long, bint) border_ahead(Model m, State s, double after, double herex, double herey, long overx, long overy) noexcept nogil
 @cython.locals(first=cython.bint)
 cdef void step_to_event(Model m, State s) noexcept nogil
 cdef bint may_follow(Model m, State s) noexcept nogil

@@ -136,22 +136,9 @@ def towards(m, s, after, overx, overy, first):
             after, again = ends.meet(m, s, after)
             if again:
                 continue
-        px, py = methods.place_behind(m, s, after)
-        sx, sy = borders.side(s.x, px), borders.side(s.y, py)
-        if sx == 0 and sy == 0:
+        length, i, at, standing = border_ahead(m, s, after, herex, herey, overx, overy)
+        if i < 0:
             return after, axis, up, False
-        borders.pass_alike(m, s, herex, herey, px, py)
-        sx, sy = borders.side(s.x, px), borders.side(s.y, py)
-        sx = sx if overx == 0 or overx == sx else 0
-        sy = sy if overy == 0 or overy == sy else 0
-        if sx == 0 and sy == 0:
-            return after, axis, up, False
-        i, at = borders.stood_on(s, herex, herey, sx, sy)
-        length, standing = 0.0, at != 0
-        if not standing:
-            if s.landings >= LANDINGS:
-                return after, axis, up, False
-            length, i, at = borders.first_border(m, s, after, px, py, sx, sy)
         if borders.is_same_beyond(m, s, i, at):
             borders.move_on(m, s, herex, herey, i, at, 0.0)
         elif standing:
@@ -160,6 +147,29 @@ def towards(m, s, after, overx, overy, first):
             after, axis, up = length, i, at
             if m.modal:
                 ends.put(s, 0.0, 0.0)
+
+
+def border_ahead(m, s, after, herex, herey, overx, overy):
+    """The border that the step tried crosses first.
+
+    Returns:
+        Length of the step to it [s]; its coordinate, -1 for none; its side; whether the handle
+        stands on it.
+    """
+    px, py = methods.place_behind(m, s, after)
+    if borders.side(s.x, px) == 0 and borders.side(s.y, py) == 0:
+        return after, -1, 0, False
+    borders.pass_alike(m, s, herex, herey, px, py)
+    sx, sy = borders.side(s.x, px), borders.side(s.y, py)
+    sx = sx if overx == 0 or overx == sx else 0
+    sy = sy if overy == 0 or overy == sy else 0
+    i, at = borders.stood_on(s, herex, herey, sx, sy)
+    if at != 0:
+        return 0.0, i, at, True
+    if (sx == 0 and sy == 0) or s.landings >= LANDINGS:
+        return after, -1, 0, False
+    length, i, at = borders.first_border(m, s, after, px, py, sx, sy)
+    return length, i, at, False
 
 
 def step_to_event(m, s):

@@ -4,6 +4,9 @@ Units stand beside the names. A flag is 1 or 0; a number that only one part of a
 without that part, and no function reads it then.
 """
 
+# the annotations of a declaration are what `layout.record` reads, not types
+# pyright: reportInvalidTypeForm=false, reportGeneralTypeIssues=false
+
 from .layout import Kind, floats, many, real, record, thing, whole, wholes
 
 CONTROLLER_ORDER = 4  # most states of a compensator
@@ -189,7 +192,8 @@ class Model:
     control: own_control
     buffer: floats
     buffer_size: whole  # its numbers of state
-    hardware: whole  # the ledger counts it
+    renders: whole  # the motors hold the force of clay that the loop computes
+    hardware: whole  # the ledger counts what motors and their hardware take
     # accurate method
     substeps: whole  # engine steps per sample
     blocks: wholes  # the same by block of samples, where the clay grows
@@ -381,9 +385,10 @@ class Work:
     clay: real
     hand: real
     through: real
-    friction: real
-    guard: real
-    coupling: real
+    friction: real  # of the joints; the next three are part of motors
+    guard: real  # of the passivity controller
+    coupling: real  # of the virtual coupling
+    rendered: real  # of the force that the motors hold for the clay
 
 
 @record
@@ -579,5 +584,6 @@ class Summary:
 
 RECORDS = (
     Engine, ModelAxis, KickAxis, Kick, LawSlot, Span, Model, StateAxis, MachineAxis, Machine, Work,
-    PointAxis, Point, GripAxis, Grip, InstantAxis, Instant, Sums, ModeAxis, Stride, Watch, State, Summary,
+    PointAxis, Point, GripAxis, Grip, InstantAxis, Instant, Sums, ModeAxis, Stride, Watch, State,
+    Summary,
 )  # fmt: skip

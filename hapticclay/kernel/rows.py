@@ -31,16 +31,16 @@ def write(m, s, k, after):
     row[n + 8], row[n + 9], row[n + 10], row[n + 11] = k.tau1, k.tau2, dx, dy
     row[n + 12], row[n + 13], row[n + 14], row[n + 15] = bx, by, r1, r2 - r1
     if m.told:
-        write_force(m, s, k, vx, vy, bx, by, fx, fy)
+        write_force(m, s, k, end, vx, vy, fx, fy)
     if m.holds:
         machine, out = sampled.machine_of(s, after), m.rendered
         out[3 * s.row], out[3 * s.row + 1] = machine.x.force, machine.y.force
 
 
-def write_force(m, s, k, vx, vy, bx, by, fx, fy):
+def write_force(m, s, k, end, vx, vy, fx, fy):
     """Writes the force of the clay where b v does not give it; f is that of yielding."""
     out, n = m.rendered, 3 * s.row
-    x, y = viscous.force(m, bx, by, vx, vy)
+    x, y = viscous.force(m, viscous.now(m, s, 0, end), viscous.now(m, s, 1, end), vx, vy)
     x, y = x + fx, y + fy
     if m.springs:
         x, y = x + springs.force(s, 0, k.L), y + springs.force(s, 1, k.L)
@@ -82,15 +82,23 @@ def add_work(m, of, to, k, w1, w2, machine):
     muscle = H * (x.uh * vx + y.uh * vy)
     motors = 0.5 * H * (k.tau1 * (w1 + k.w1) + k.tau2 * (w2 + k.w2))
     clay = H * (x.fe * vx + y.fe * vy)
-    taken = H * (m.x.damper * vx * vx + m.y.damper * vy * vy)
+    taken = H * (hand.damping_force(m, k, 0) * vx + hand.damping_force(m, k, 1) * vy)
     to.muscle, to.motors, to.clay = of.muscle + muscle, of.motors + motors, of.clay + clay
     to.hand, to.through = of.hand + taken, of.through + (abs(muscle) + abs(motors))
     if m.hardware:
-        a, b = machine.x, machine.y
-        r1, r2 = 0.5 * (w1 + k.w1), 0.5 * (w2 + k.w2)
-        to.friction = of.friction - H * (k.slip1 * r1 + k.slip2 * r2)
-        to.guard = of.guard + H * (a.guard * vx + b.guard * vy)
-        to.coupling = of.coupling + H * (a.pull * (vx - a.pull_rate) + b.pull * (vy - b.pull_rate))
+        add_hardware_work(m, of, to, k, w1, w2, machine)
+
+
+def add_hardware_work(m, of, to, k, w1, w2, machine):
+    """The same of hardware, and of clay that the motors hold."""
+    a, b, x, y, H = machine.x, machine.y, k.x, k.y, k.H
+    vx, vy = 0.5 * (x.v + x.u), 0.5 * (y.v + y.u)
+    r1, r2 = 0.5 * (w1 + k.w1), 0.5 * (w2 + k.w2)
+    to.friction = of.friction - H * (k.slip1 * r1 + k.slip2 * r2)
+    to.guard = of.guard + H * (a.guard * vx + b.guard * vy)
+    to.coupling = of.coupling + H * (a.pull * (vx - a.pull_rate) + b.pull * (vy - b.pull_rate))
+    if m.renders:
+        to.rendered = of.rendered + H * (a.force * vx + b.force * vy)
 
 
 def keep(m, s, k, after, shows):

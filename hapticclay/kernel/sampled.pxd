@@ -32,13 +32,13 @@ cdef void event(Model m, State s, long samples, double now) noexcept nogil
 cdef void rest(Model m, State s, Kick e) noexcept nogil
 cdef void put_times(Model m, Machine machine, long long k) noexcept nogil
 cdef void sample(Model m, State s) noexcept nogil
-cdef void answer(Model m, State s, Kick k, double w1, double w2, double fx, double fy, double pullx, double pully) noexcept nogil
+cdef void answer(Model m, State s, Kick k, double w1, double w2, double fx, double fy) noexcept nogil
 cdef (double, double) see(Model m, State s, Kick k) noexcept nogil
-cdef (double, double, double, double) on_sensor(Model m, State s, Kick k, double ux, double uy) noexcept nogil
+cdef (double, double) on_sensor(Model m, State s, Kick k, double ux, double uy) noexcept nogil
 cdef (double, double) acceleration(Model m, Kick k, double fx, double fy, double t1, double t2) noexcept nogil
 @cython.locals(B=(cython.double, cython.double, cython.double, cython.double))
 cdef (double, double) reaction(Model m, State s, Kick k, double fx, double fy, double t1, double t2) noexcept nogil
-cdef void compute(Model m, State s, Kick k, double fx, double fy, double pullx, double pully) noexcept nogil
+cdef void compute(Model m, State s, Kick k, double fx, double fy) noexcept nogil
 cdef double output(Model m, MachineAxis z, long i, double f) noexcept nogil
 cdef void own(Model m, State s, double q1, double q2, double w1, double w2, double fx, double fy) noexcept nogil
 cdef void advance(Model m, State s, long i, double shift) noexcept nogil

@@ -56,7 +56,7 @@ def by_hold(m, s, k, after):
 def across(m, s, k, after):
     """The same across the sample, whatever begins there."""
     kick.begin(k, s.before, after)
-    kick.take_up(s, k)
+    kick.take_up(m, s, k)
     r1, r2 = s.w1, s.w1 + s.w2
     arm.handle_at(m, k, s.q1, s.q2, r1, r2)
     arm.turning(k, r1, r2)
@@ -123,7 +123,7 @@ def event(m, s, samples, now):
 
 def rest(m, s, e):
     """A kick of no length."""
-    kick.take_up(s, e)
+    kick.take_up(m, s, e)
     arm.handle_at(m, e, s.q1, s.q2, s.w1, s.w1 + s.w2)
     e.w1, e.w2 = s.w1, s.w2
     for i in range(2):
@@ -143,12 +143,12 @@ def sample(m, s):
     seen = s.k
     w1, w2 = see(m, s, seen)
     ux, uy = signals.push_now(m, s)
-    fx, fy, pullx, pully = on_sensor(m, s, seen, ux, uy)
+    fx, fy = on_sensor(m, s, seen, ux, uy)
     fx, fy = hardware.measured(m, s, 0, fx), hardware.measured(m, s, 1, fy)
     dx, dy = signals.command_over_sample(m, s)
     if not hardware.is_lost(m, s.now.k):
         s.shown = 1
-        answer(m, s, seen, w1, w2, fx, fy, pullx, pully)
+        answer(m, s, seen, w1, w2, fx, fy)
         hardware.ask(s)
     if not m.own:
         advance(m, s, 0, dx)
@@ -156,7 +156,7 @@ def sample(m, s):
     put_times(m, s.next, s.now.k + 1)
 
 
-def answer(m, s, k, w1, w2, fx, fy, pullx, pully):
+def answer(m, s, k, w1, w2, fx, fy):
     """Response of the controller to a sample that is not lost."""
     q1, q2 = hardware.encoded(m, s.q1), hardware.encoded(m, s.q2)
     if m.window > 0:
@@ -169,7 +169,7 @@ def answer(m, s, k, w1, w2, fx, fy, pullx, pully):
         arm.turning(k, w1, w1 + w2)
     elif m.window > 0:
         arm.at_rates(k, w1, w2)
-    compute(m, s, k, fx, fy, pullx, pully)
+    compute(m, s, k, fx, fy)
 
 
 # ---- sense ---------------------------------------------------------------------------------------
@@ -200,7 +200,7 @@ def see(m, s, k):
 
 
 def on_sensor(m, s, k, ux, uy):
-    """Force of the operator on the sensor, and of physical clay that yields, (x, y) each [N].
+    """Force of the operator on the sensor, (x, y) [N]; that of physical clay that yields, into k.
 
     At the start the handle does not accelerate.
     """
@@ -211,21 +211,18 @@ def on_sensor(m, s, k, ux, uy):
         hx -= hand.resistance(m, x.p, x.v, x.c, 0)
         hy -= hand.resistance(m, y.p, y.v, y.c, 1)
     fx, fy = hx, hy
-    pullx = pully = 0.0
+    x.pull = y.pull = 0.0
     if m.acts:
         fx, fy = laws.without_clay(m, s, k, fx, fy)
         if m.special and m.flow:
-            pullx, pully = reaction(m, s, k, fx, fy, t1, t2)
+            x.pull, y.pull = reaction(m, s, k, fx, fy, t1, t2)
     if not m.hand:
-        return ux, uy, pullx, pully
+        return ux, uy
     if s.before == 0.0:
-        hx, hy = (
-            ux - hand.resistance(m, x.p, x.v, 0.0, 0),
-            uy - hand.resistance(m, y.p, y.v, 0.0, 1),
-        )
-        return hx, hy, pullx, pully
-    ax, ay = acceleration(m, k, fx - pullx, fy - pully, t1, t2)
-    return hx - m.x.mass * ax, hy - m.y.mass * ay, pullx, pully
+        hx = ux - hand.resistance(m, x.p, x.v, 0.0, 0)
+        return hx, uy - hand.resistance(m, y.p, y.v, 0.0, 1)
+    ax, ay = acceleration(m, k, fx - x.pull, fy - y.pull, t1, t2)
+    return hx - m.x.mass * ax, hy - m.y.mass * ay
 
 
 def acceleration(m, k, fx, fy, t1, t2):
@@ -264,10 +261,10 @@ def reaction(m, s, k, fx, fy, t1, t2):
 # ---- compute -------------------------------------------------------------------------------------
 
 
-def compute(m, s, k, fx, fy, pullx, pully):
+def compute(m, s, k, fx, fy):
     """Response of compensator and servo to a sample of the handle in k."""
     now, after, x, y = s.now, s.next, k.x, k.y
-    fex, fey = laws.seen_force(m, s, x.p, y.p, x.v, y.v, pullx, pully)
+    fex, fey = laws.seen_force(m, s, k)
     if m.coupling:
         fex, fey = hardware.couple(m, s, k, viscous.now(m, s, 0, 0), viscous.now(m, s, 1, 0))
     if m.guard:

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..formulas import groove as groove_law
 from ..formulas import pieces
+from ..formulas.constants import B_MAX
 from ..model import compensator, regions
 from ..model import hardware as devices
-from ..model.constants import B_MAX
 from ..model.sampled_controller import BUFFER, Controller, LawCaller
 from ..scene.scenario import Scenario
 from . import hardware, methods, modes, pace, records, user_laws
@@ -221,6 +221,8 @@ def put_sampler(
         caller = LawCaller(controller, buffer)
     if s.hardware is not None:
         put_hardware(m, arrays, s, s.hardware)
+    m.renders = int(m.clay and not m.acts and not m.own)
+    m.hardware = int(m.renders or s.hardware is not None)
     return caller
 
 
@@ -234,7 +236,7 @@ def put_memory(m: Any, s: Scenario) -> None:
 
 def put_hardware(m: Any, arrays: dict[str, np.ndarray], s: Scenario, io: Any) -> None:
     """The hardware between computer and arm."""
-    m.hardware, m.encoder = 1, int(io.encoder or 0)
+    m.encoder = int(io.encoder or 0)
     if io.jitter > 0.0 or io.dropout_probability > 0.0 or io.force_noise > 0.0:
         n = min(int(s.t_max / m.Ts), NOISE_AHEAD) + 8
         m.chance, arrays["chances"] = 1, devices.SampleNoise(io).table(0, n).ravel()

@@ -12,10 +12,11 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, number
+from ..formulas.constants import B_MAX
 from ..units import is_quantity
 from . import flow, groove, spring
 from .cells import Grid, Profile
-from .constants import AXES, B_MAX
+from .constants import AXES
 from .flow import Flow
 from .groove import Groove
 from .smooth import Smooth
@@ -135,6 +136,7 @@ class Clay:
         check_traits(present(self, LAWS), self, "clay.")
 
     @classmethod
+    @checked
     def of_groove(cls, groove: Groove) -> Clay:
         """Clay that stays cut, and no other clay.
 

@@ -69,8 +69,6 @@ ORIGIN_VARIABLE = (0.30, 0.19)
 GAIN = (1.0, 0.5)  # K = 1 on y is unstable in the printed model for 62 < b < 3900 N.s/m
 TORQUE_LIMIT = (40.0, 40.0)  # [N.m], ours: direct-drive motors for such inertias
 
-B_MAX = 1e9  # [N.s/m]; the engine refuses controls above 1e10
-
 
 def each_axis(part):
     """A part that both axes share, or a pair of parts, as a pair (x, y).

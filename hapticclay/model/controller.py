@@ -5,7 +5,7 @@ Feedback alone sets Sh; a reference model y = G delta with its acceleration fed 
     p'' = y'' + kd (y' - v) + kp (y - p) + W f        f = fh - fe
 
 in operational space, W = Lambda(q)^-1; inertia shaping replaces W by its value at the nominal
-pose. One kick of that law is in `stepping.servo`.
+pose. One kick of that law is in `kernel.servo`.
 """
 
 from __future__ import annotations
@@ -47,62 +47,6 @@ class Servo:
 
 
 SERVO = (Servo(G[0], S[0]), Servo(G[1], S[1]))  # as printed, of x and y
-
-
-def feedback_law(servo, delta, y, yd, p, v, c):
-    """Servo acceleration of one axis at an instant, without forces; see `feedback_vector`.
-
-    Args:
-        servo: numbers of the axis, see `Servo.numbers`.
-        delta: compensator output [m].
-        y: reference position [m].
-        yd: reference velocity [m/s].
-        p: handle position [m].
-        v: handle velocity [m/s].
-        c: centripetal acceleration, towards the centre [m/s^2].
-
-    Returns:
-        (acceleration of the handle, acceleration of the reference) [m/s^2].
-    """
-    ydd = servo[2] * (servo[0] * delta - y) - servo[1] * yd
-    return ydd - servo[4] * (v - yd) + servo[5] * (y - p) + c, ydd
-
-
-def velocity_per_force(n, W, d):
-    """Velocity lost in a kick per unit of additional force, (n + W d)^-1 W.
-
-    Args:
-        n: weight of u in the servo's law, (x, y) [1/s].
-        W: acceleration per unit of net hand force, (xx, xy, yy) [1/kg].
-        d: resisting force per unit of the velocity after the kick, (xx, yy, xy) [N.s/m].
-
-    Returns:
-        (xx, xy, yx, yy) [m/(N.s)].
-    """
-    a, b = n[0] + W[0] * d[0] + W[1] * d[2], W[0] * d[2] + W[1] * d[1]
-    c, e = W[1] * d[0] + W[2] * d[2], n[1] + W[1] * d[2] + W[2] * d[1]
-    det = a * e - b * c
-    return (
-        (e * W[0] - b * W[1]) / det,
-        (e * W[1] - b * W[2]) / det,
-        (a * W[1] - c * W[0]) / det,
-        (a * W[2] - c * W[1]) / det,
-    )
-
-
-def along_axes(c, s, x, y):
-    """Components of a vector along rotated axes.
-
-    Args:
-        c: cosine of the angle of rotation.
-        s: sine of that angle.
-        x: component along x.
-        y: component along y.
-
-    Returns:
-        (along the first axis, along the second).
-    """
-    return c * x + s * y, c * y - s * x
 
 
 def feedback_vector(servo: Servo) -> np.ndarray:

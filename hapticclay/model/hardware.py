@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import copysign, exp, inf, sqrt, tau
+from math import sqrt, tau
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from ..arguments import named
 from ..errors import Bound, ParameterError, check_fields
-from . import flow
 from .traits import LEFT_OUT, YES, Refusal, Told, Trait, present, told_values
 
 STIFF = 1e12  # [N/m, N.s/m] upper bound of a coupling
@@ -98,87 +97,7 @@ class Hardware:
             )
 
 
-SLIDES = (0.0, 1.0, -1.0)
 NOISE_BLOCK = 1024  # samples drawn at once
-
-
-def round_to_even(x, step):
-    """The multiple of step nearest to x; of two equally near, the even one.
-
-    Args:
-        x: value, in any unit.
-        step: in the unit of x.
-
-    Returns:
-        The multiple.
-    """
-    return round(x / step) * step
-
-
-def quantize(x, bits, span):
-    """Output of a converter: 2^bits levels from -span to span, with zero in the middle.
-
-    Args:
-        x: input, in any unit.
-        bits: resolution; 0 for an ideal converter without limits.
-        span: full scale, in the unit of x.
-
-    Returns:
-        The output, in the unit of x.
-    """
-    if not bits:
-        return x
-    half = 1 << (bits - 1)
-    y = x * half / span
-    # the bounds keep rounded values within the integers of a compiled run
-    level = half if y > half else -half if y < -half else round(y)
-    return min(level, half - 1) * span / half
-
-
-def encode(q, counts):
-    """Joint angle as an encoder reads it.
-
-    Args:
-        q: joint angle [rad].
-        counts: counts per turn; 0 for an exact reading.
-
-    Returns:
-        The reading [rad].
-    """
-    return round_to_even(q, tau / counts) if counts else q
-
-
-def velocity_difference(then, old, k, q, Ts):
-    """Mean rates of both joints since an earlier sample.
-
-    Args:
-        then: index of the earlier sample.
-        old: joint angles of the earlier sample [rad].
-        k: index of the present sample.
-        q: joint angles of the present sample [rad].
-        Ts: control sample [s].
-
-    Returns:
-        Rates of both joints [rad/s].
-    """
-    span = (k - then) * Ts
-    return (q[0] - old[0]) / span, (q[1] - old[1]) / span
-
-
-def low_pass(y, mean, cutoff, span):
-    """First-order low-pass filter over one interval; exact for a constant signal.
-
-    Args:
-        y: output before, in any unit.
-        mean: mean of the signal over the interval, in the unit of y.
-        cutoff: corner frequency [Hz].
-        span: length of the interval [s].
-
-    Returns:
-        Output after the interval.
-    """
-    keep = exp(-tau * cutoff * span)
-    return keep * y + (1.0 - keep) * mean
 
 
 def butterworth(cutoff: float, order: int, Ts: float) -> tuple[float, ...]:
@@ -206,155 +125,6 @@ def butterworth(cutoff: float, order: int, Ts: float) -> tuple[float, ...]:
     A, B = np.zeros((2, 2)), np.zeros(2)
     A[:order, :order], B[:order] = e[:order, :order], e[:order, order]
     return (*A.ravel().tolist(), *B.tolist())
-
-
-def filter_step(f, x0, x1, u):
-    """State of a filter after one sample.
-
-    Args:
-        f: from `butterworth`.
-        x0: first state before the sample, which is the output.
-        x1: second state before the sample.
-        u: input.
-
-    Returns:
-        The state after the sample.
-    """
-    return f[0] * x0 + f[1] * x1 + f[4] * u, f[2] * x0 + f[3] * x1 + f[5] * u
-
-
-def coulomb_friction(w, a11, a12, a22, limit):
-    """Coulomb friction of two joints in one kick, implicit.
-
-    After the kick, each joint either rests under a torque within its limit or slides against the
-    limit. The rates after the kick are w + a phi; with a positive definite, one of the nine cases
-    fits (a linear complementarity problem; Stewart, Trinkle, Int. J. Numerical Methods in
-    Engineering 39, 1996).
-
-    Args:
-        w: rates after the kick without friction [rad/s].
-        a11: rate of joint 1 per torque on joint 1 [rad/s per N.m].
-        a12: rate of joint 1 per torque on joint 2 [rad/s per N.m].
-        a22: rate of joint 2 per torque on joint 2 [rad/s per N.m].
-        limit: Coulomb torques of both joints [N.m].
-
-    Returns:
-        Torques on both joints [N.m].
-    """
-    best1, best2, least = 0.0, 0.0, inf
-    for case in range(9):
-        # sliding direction of each joint, 0 at rest
-        s1, s2 = SLIDES[case // 3], SLIDES[case % 3]
-        if s1 and s2:
-            f1, f2 = -s1 * limit[0], -s2 * limit[1]
-        elif s1:
-            f1 = -s1 * limit[0]
-            f2 = -(w[1] + a12 * f1) / a22
-        elif s2:
-            f2 = -s2 * limit[1]
-            f1 = -(w[0] + a12 * f2) / a11
-        else:
-            det = a11 * a22 - a12 * a12
-            f1, f2 = (a12 * w[1] - a22 * w[0]) / det, (a12 * w[0] - a11 * w[1]) / det
-        v1, v2 = w[0] + a11 * f1 + a12 * f2, w[1] + a12 * f1 + a22 * f2
-        # violation of the case: a resting joint beyond its limit, a sliding one reversed
-        wrong = max(
-            -s1 * v1 / a11 if s1 else abs(f1) - limit[0],
-            -s2 * v2 / a22 if s2 else abs(f2) - limit[1],
-        )
-        if wrong < least:
-            best1, best2, least = f1, f2, wrong
-        if wrong <= 0.0:
-            break
-    return min(max(best1, -limit[0]), limit[0]), min(max(best2, -limit[1]), limit[1])
-
-
-def passivity_controller(energy, f, v, Ts, W):
-    """Passivity controller of one axis: changes the resisting force if the clay would be active.
-
-    Hannaford, Ryu (IEEE Trans. Robotics and Automation 18, 2002), including the motion that the
-    held force causes: over a sample the clay takes Ts f (v - Ts W f/2). The controller recovers a
-    deficit of energy. As Ts W goes to zero, it does so by their damping, -energy/(Ts v^2). If the
-    hold overshoots and a force returns energy, it is replaced by the force that takes the most
-    energy, v/(Ts W), which stops the handle. So is a force that cannot recover the deficit within a
-    sample. Energy taken earlier is not returned: clay stores none.
-
-    Args:
-        energy: energy that the clay has taken [J].
-        f: requested force [N].
-        v: handle velocity [m/s].
-        Ts: hold [s].
-        W: mobility of the handle [1/kg].
-
-    Returns:
-        The force [N].
-    """
-    most, lack = v / (Ts * W), min(energy, 0.0)
-    left = v * v + 2.0 * W * lack
-    if lack and left <= 0.0:
-        return most
-    root = sqrt(left) if lack else abs(v)
-    along, low = copysign(1.0, v) * f, -2.0 * lack / (Ts * (abs(v) + root)) if lack else 0.0
-    if along * Ts * W > abs(v) + root:
-        return most
-    return copysign(low, v) if along < low else f
-
-
-def virtual_coupling(tool, p, v, b, coupling, Ts):
-    """Spring and damper between handle and massless tool in clay, implicit over a sample.
-
-    b v_t = spring (p - tool+) + damper (v - v_t), tool+ = tool + Ts v_t (Colgate, Stanley, Brown,
-    IROS 1995).
-
-    Args:
-        tool: position of the tool before the sample [m].
-        p: position of the handle [m].
-        v: velocity of the handle [m/s].
-        b: clay at the tool [N.s/m].
-        coupling: its stiffness [N/m] and damping [N.s/m].
-        Ts: control sample [s].
-
-    Returns:
-        (position of the tool after the sample [m], its velocity [m/s]); b times the velocity is the
-        resisting force.
-    """
-    spring, damper = coupling
-    u = (spring * (p - tool) + damper * v) / (b + damper + spring * Ts)
-    return tool + Ts * u, u
-
-
-def tool_that_yields(tool, p, v, b, law, along, coupling, Ts):
-    """As `virtual_coupling`, for both axes in yielding clay: below the yield force the tool rests.
-
-    (b + damper + spring Ts) v_t + (Fy + K |v_t|^n) v_t/|v_t| = spring (p - tool) + damper v.
-
-    Args:
-        tool: position of the tool before the sample, (x, y) [m].
-        p: position of the handle, (x, y) [m].
-        v: velocity of the handle, (x, y) [m/s].
-        b: clay at the tool, (x, y) [N.s/m].
-        law: Fy, K, n of x, then of y.
-        along: whether the clay yields along the motion, by the law of x; else each axis by itself.
-        coupling: its stiffness [N/m] and damping [N.s/m].
-        Ts: control sample [s].
-
-    Returns:
-        Velocity of the tool (x, y) [m/s]; resisting force (x, y) [N].
-    """
-    spring, damper = coupling
-    qx, qy = spring * (p[0] - tool[0]) + damper * v[0], spring * (p[1] - tool[1]) + damper * v[1]
-    dx, dy = b[0] + damper + spring * Ts, b[1] + damper + spring * Ts
-    if along:
-        ux, uy = flow.slowed(
-            (1.0 / dx, 0.0, 0.0, 1.0 / dy), qx / dx, qy / dy, 1.0, law[0], law[1], law[2]
-        )
-    else:
-        ux = flow.thinned(max(abs(qx) - law[0], 0.0) / dx, law[1] / dx, law[2])
-        uy = flow.thinned(max(abs(qy) - law[3], 0.0) / dy, law[4] / dy, law[5])
-        ux, uy = copysign(ux, qx), copysign(uy, qy)
-    fx, fy = flow.motion_force(law, along, ux, uy)
-    fx, fy = b[0] * ux + fx if ux else qx, b[1] * uy + fy if uy else qy
-    return ux, uy, fx, fy
 
 
 class SampleNoise:

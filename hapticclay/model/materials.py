@@ -9,7 +9,8 @@ from typing import Annotated
 
 from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, choice
-from .constants import B_CONSTANT, B_MAX
+from ..formulas.constants import B_MAX
+from .constants import B_CONSTANT
 from .flow import Flow, FlowIndex
 from .tool import Tool
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from ..arguments import named
 from ..errors import Bound, check_fields
-from .constants import B_MAX
+from ..formulas.constants import B_MAX
 from .traits import Trait
 
 

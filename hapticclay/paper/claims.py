@@ -11,8 +11,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..formulas import arm as arm_law
 from ..kernel.engine import arm_at
-from ..model import arm
 from ..model.arm import Arm
 from ..model.constants import (
     AXES,
@@ -76,7 +76,7 @@ def machine(runs: Runs) -> Iterator[Row]:
     )
     q = (1.2, -0.9)
     links = Arm().links
-    u1x, u1y, u2x, u2y = arm.jacobian(*q, links)
+    u1x, u1y, u2x, u2y = arm_law.jacobian(*q, links)
     eq14 = np.array([[u1x + u2x, u2x], [u1y + u2y, u2y]])
     yield row(
         "Jacobian J(q) | Eq. 14 | four entries | m",
@@ -85,7 +85,7 @@ def machine(runs: Runs) -> Iterator[Row]:
         "largest difference between the printed formula and MuJoCo's Jacobian at q = (1.2, -0.9) "
         "rad",
     )
-    _, J, M = arm_at(arm.inverse_kinematics(*NOMINAL, links))
+    _, J, M = arm_at(arm_law.inverse_kinematics(*NOMINAL, links))
     Lambda = np.linalg.inv(J @ np.linalg.inv(M) @ J.T)
     for i, axis in enumerate(AXES):
         yield row(
@@ -127,8 +127,8 @@ def machine(runs: Runs) -> Iterator[Row]:
 def _lambda_x(x: float, y: float) -> float:
     """Inertia of the arm along x, with the handle at world (x, y) [kg]."""
     links = Arm().links
-    q1, q2 = arm.inverse_kinematics(x, y, links)
-    xx, xy, yy = arm.mobility(arm.jacobian(q1, q2, links), links)
+    q1, q2 = arm_law.inverse_kinematics(x, y, links)
+    xx, xy, yy = arm_law.mobility(arm_law.jacobian(q1, q2, links), links)
     return float(np.linalg.inv(np.array([[xx, xy], [xy, yy]]))[0, 0])
 
 

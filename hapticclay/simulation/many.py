@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..formulas import regions
 from ..kernel import hardware, layout, native, path, records, scene, user_laws
 from ..kernel.memories import delay_in_samples
 from ..kernel.row import CHUNK, NativeRow
 from ..kernel.summary import CROSSINGS as SUMMARY_CROSSINGS
-from ..model import controller, regions
+from ..model import controller
 from ..model.cells import Profile
 from ..model.hardware import Hardware
 from ..model.operator import NO_HAND, mobility_with

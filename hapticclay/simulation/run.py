@@ -628,7 +628,7 @@ class Run:
         return tuple(self.last_rendered or self._force(bx, by, vx, vy))
 
     def _stored(self) -> tuple[float, float]:
-        """Energy of the arm, and of mass and spring of the operator's arm, after the last kick [J]."""
+        """Energy of the arm, and that stored in the operator's arm, after the last kick [J]."""
         m, s = self.row.m, self.row.s
         return energy.kinetic(m, s), energy.of_hand(m, s)
 
@@ -642,14 +642,15 @@ class Run:
         return out | self._hardware(out)
 
     def _hardware(self, out: dict[str, float]) -> dict[str, float]:
-        """Energy that the hardware takes; friction is not part of the motors' share."""
-        w, io = self.row.s.work, self.scenario.hardware
-        if io is None or not self.row.m.hardware:
+        """Energy that hardware and held clay take; friction is not part of the motors' share."""
+        w, m = self.row.s.work, self.row.m
+        if not m.hardware:
             return {}
         used = {
-            "friction": (w.friction, any(io.friction)),
-            "passivity_controller": (w.guard, io.passivity),
-            "coupling": (w.coupling, io.coupling is not None),
+            "friction": (w.friction, m.friction),
+            "passivity_controller": (w.guard, m.guard),
+            "coupling": (w.coupling, m.coupling),
+            "rendered_clay": (w.rendered, m.renders),
         }
         found = {name: float(x) for name, (x, on) in used.items() if on}
         return found | {"residual": out["residual"] - found.get("friction", 0.0)}
@@ -661,7 +662,7 @@ def balance(work: Sequence[Any], first: Sequence[Any], last: Sequence[Any]) -> d
     Floats, or arrays over runs.
 
     Args:
-        work: of muscle, motors, clay and damper of the hand, and throughput [J].
+        work: of muscle, motors, clay and damper of the hand, and sum of the magnitudes [J].
         first: from `stored`, at the start.
         last: from `stored`, at the end.
 
@@ -678,7 +679,7 @@ def balance(work: Sequence[Any], first: Sequence[Any], last: Sequence[Any]) -> d
         "kinetic": kinetic,
         "hand_stored": at_hand,
         "residual": muscle + motors - clay - damper - kinetic - at_hand,
-        "throughput": through,
+        "throughput": through + first[0] + first[1],
     }
 
 

@@ -28,9 +28,8 @@ def simulate(
         every: keep each every-th sample, and the last.
         progress: called now and then with (simulated time [s], handle x [m]); True ends the run, as
             "interrupted".
-        engine: "python"; "native", compiled (needs hapticclay[fast]); or "auto", compiled where
-            numba is installed and the machine code is loaded already or the run is long enough to
-            repay loading it. All give the same record, bit for bit.
+        engine: "python"; "native", by the compiled kernel; or "auto", compiled where that kernel
+            is installed. All give the same record, bit for bit.
         error: largest allowed error: seconds at the border crossings (1e-6, "1e-6 s"), or metres
             of position ("1e-7 m"), 1e-11 or more. Integrator and dt are then chosen, and refined
             until runs at other steps confirm the error. record.error holds the error reached;
@@ -40,9 +39,9 @@ def simulate(
         The record. Instability and similar ends are outcomes (record.status), not exceptions.
 
     Raises:
-        ParameterError: an argument is of the wrong kind, numba is not installed, the scene is too
-            stiff for its integrator, the record may not fit into memory, the law of its controller
-            is not found, or an error in seconds is requested without a border to cross.
+        ParameterError: an argument is of the wrong kind, there is no compiled kernel, the scene
+            is too stiff for its integrator, the record may not fit into memory, the law of its
+            controller is not found, or an error in seconds is requested without a border to cross.
         RuntimeError: the law of its controller raised an exception (`LawFailed`). Interruptions
             such as Ctrl-C are raised unchanged.
     """

@@ -10,13 +10,14 @@ from typing import Annotated, TypeVar
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, number
-from ..model import arm
+from ..formulas import arm as arm_law
+from ..formulas.constants import B_MAX
 from ..model.arm import Arm
 from ..model.cells import Profile
 from ..model.clay import Clay
-from ..model.constants import AXES, B_MAX, TORQUE_LIMIT, TS
+from ..model.constants import AXES, TORQUE_LIMIT, TS
 from ..model.controller import SERVO
 from ..model.hardware import Hardware
 from ..model.spring import Spring
@@ -48,7 +49,7 @@ class PushedLoop(Loop):
     Attributes:
         b: clay on both axes [N.s/m].
         k: stiffness of the clay on both axes, at rest at the initial position of the handle [N/m].
-        K: compensator gain, > 0, at most 1e6.
+        K: compensator gain, > 0, at most 1e6 [1/kg] for the printed compensator.
         inertia_shaping: as in Scenario; without it the arm's mobility replaces the gain of Sh.
         pose: position of the handle relative to its nominal position [m].
         push: velocity of the handle at the start [m/s]. If C has no integrator, no state of C
@@ -59,7 +60,7 @@ class PushedLoop(Loop):
     """
 
     b: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 90.0
-    K: Annotated[float, Bound(0.0, 1e6, above=True)] = 1.0
+    K: Annotated[float, Bound(0.0, 1e6, "1/kg", above=True)] = 1.0
     inertia_shaping: bool = True
     pose: Position = (0.0, 0.0)
     push: Annotated[float, Bound(-10.0, 10.0, "m/s")] = SMALL_PUSH
@@ -71,6 +72,7 @@ class PushedLoop(Loop):
         number("delay", self.delay, 0.0, 1.0 if self.Ts else 0.0, unit="s")
 
     @classmethod
+    @checked
     def of(cls, scenario: Scenario, axis: str = "x", b: float | None = None) -> PushedLoop:
         """A runnable loop of one axis of a scenario, in uniform clay.
 
@@ -327,8 +329,8 @@ def pose_matrix(loop: PushedLoop) -> np.ndarray:
     )
     loops = (loop, other) if i == 0 else (other, loop)
     x, y = loop._nominal
-    q1, q2 = arm.inverse_kinematics(x + loop.pose[0], y + loop.pose[1], links)
-    xx, xy, yy = arm.mobility(arm.jacobian(q1, q2, links), links)
+    q1, q2 = arm_law.inverse_kinematics(x + loop.pose[0], y + loop.pose[1], links)
+    xx, xy, yy = arm_law.mobility(arm_law.jacobian(q1, q2, links), links)
     W = np.array([[xx, xy], [xy, yy]])
     if loop.Ts is None:
         return linear_loop.state_space(*loops, mobility=None if loop.inertia_shaping else W)[0]

@@ -238,13 +238,13 @@ def test_what_is_no_signal_is_refused_by_name(make, field, told):
     [
         ("t,f_x,fy\n0,1,2\n", {}, "columns", "did you mean 'f_x'"),
         ("t,fx,fy\n0,1,2\n0.1,abc,2\n", {}, "column fx", "line 3 of f.csv"),
-        ("t,fx,fy\n0,1\n", {}, "column fy", "line 2 of f.csv"),
+        ("t,fx,fy\n0,1\n", {}, "path", "line 2: must have 3 cells"),
         ("t,fx,fy\n0,1,inf\n", {}, "column fy", "line 2 of f.csv"),
-        ("", {}, "path", "column names"),
+        ("", {}, "path", "name its columns"),
         ("t,fx,fy\n", {}, "path", "line of numbers"),
         ("t,fx,fy\n1,0,0\n0,0,0\n", {}, "samples.t[1]", "ascend"),
         ("t,fx,fy\n0,1,2\n", dict(columns=("t", "fx")), "columns", "three"),
-        ("0,1,2\n", {}, "columns", "must be one of 0, 1, 2"),
+        ("0,1,2\n", {}, "path", "must name its columns"),
     ],
 )
 def test_bad_files_are_refused_with_place_and_name(tmp_path, text, kw, field, told):

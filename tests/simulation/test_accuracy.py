@@ -170,7 +170,7 @@ def test_an_error_is_a_number_and_a_unit(error, read):
 
 @pytest.mark.parametrize(
     "error",
-    [0.0, -1e-6, math.nan, math.inf, 1e-12, 2.0, True, [1e-6], "", "s", "1e-6 kg", "1e-6 ms",
+    [0.0, -1e-6, math.nan, math.inf, 1e-12, 2.0, True, [1e-6], "", "s", "1e-6 kg", "1e-6 Hz",
      "1e-6 m s", "1 e-6", "0", "-1 m", "nan m", "inf", "1e-12 m", "--", "1..2"],
 )  # fmt: skip
 def test_anything_else_is_refused(error):

@@ -18,7 +18,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay import stepping
 from hapticclay.model.cells import Profile
 from hapticclay.model.clay import Clay
 from hapticclay.model.signals import Multisine
@@ -207,19 +206,6 @@ def test_without_numba_python_runs_and_says_so_once(monkeypatch, capsys):
     assert "hapticclay[fast]" in said and said.count("\n") == 1
     for s, r in zip(scenes, records, strict=True):
         same(r, hc.simulate(s, engine="python"))
-
-
-@fast
-def test_where_the_compiler_fails_python_runs_and_says_so(monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "hapticclay.stepping.compiled", None)
-    monkeypatch.delattr(stepping, "compiled", raising=False)
-    r = hc.simulate(CASES["plain"], engine="native")
-    assert capsys.readouterr().err.count("\n") == 1
-    monkeypatch.setattr(batch, "pays", lambda scenario, steps: True)
-    (b,) = hc.simulate_batch([CASES["plain"]])
-    assert capsys.readouterr().err.count("\n") == 1
-    same(r, hc.simulate(CASES["plain"], engine="python"))
-    same(r, b)
 
 
 @fast

@@ -22,6 +22,7 @@ from hapticclay.model.operator import Operator
 from hapticclay.stepping import scene
 from hapticclay.stepping.run import Run
 from hapticclay.theory import linear_loop
+from tests.hunt import examples
 
 EVERYWHERE = Profile((), (90.0,))
 EPS = np.finfo(float).eps
@@ -194,6 +195,47 @@ def test_quantisation_error_has_the_variance_of_a_uniform_one(bits):
     # mean of n uniform errors: level/sqrt(12 n); variance of the squares: level^4/180; five sigma
     assert abs(error.mean()) < 5.0 * level / math.sqrt(12 * len(x))
     assert abs((error**2).mean() - level**2 / 12) < 5.0 * level**2 / math.sqrt(180 * len(x))
+
+
+@given(st.floats() | st.sampled_from([2.0**52, -(2.0**52), 2.0**63, 1e308]), st.integers(2, 32))
+def test_no_number_makes_a_converter_or_an_encoder_raise(x, bits):
+    y = hardware.quantize(x, bits, 5.0)
+    assert -5.0 <= y < 5.0 or (math.isnan(x) and math.isnan(y))
+    for step in (1.0, 1e-3, math.tau / 2**40):
+        z = hardware.round_to_even(x, step)
+        if math.isfinite(x / step):  # half a step, and roundings of x
+            assert abs(z - x) <= 0.5 * step * (1.0 + 1e-15) + 4e-16 * abs(x)
+        else:
+            assert math.isnan(z) == math.isnan(x)
+
+
+SHAKEN = Profile((0.0, 0.05), (0.0, 0.0, 1.0), Fy=(1.0, 0.1, 0.1))
+
+
+@pytest.mark.parametrize("render", ["held", "physical"])
+@given(st.integers(0, 2**32 - 1))
+@examples(12)
+def test_a_run_that_overflows_has_an_outcome(render, seed):
+    """Thrown by 1e4 to 1e6 N against motors of 1e6 N.m, a light hand, read by coarse converters.
+
+    Half of these runs leave the numbers.
+    """
+    r = np.random.default_rng(seed)
+    coarse = hc.Hardware(
+        adc_bits=int(r.integers(2, 20)), adc_range=float(10 ** r.uniform(-2, 3)),
+        dac_bits=9 if r.random() < 0.5 else None, velocity="difference",
+        encoder=int(r.choice([4, 1000])) if r.random() < 0.5 else None,
+    )  # fmt: skip
+    s = replace(
+        hc.free(), clay=Clay(SHAKEN, SHAKEN, isotropic=True), control="sampled", render=render,
+        force=tuple(10 ** r.uniform(4, 6, 2) * r.choice([-1.0, 1.0], 2)), hardware=coarse,
+        velocity=tuple(r.uniform(-10.0, 10.0, 2)), dt=0.02, t_max=1.5, length=None,
+        operator=hc.Operator(float(10 ** r.uniform(-3, 1)), 0.0, 0.0), torque_limit=(1e6, 1e6),
+        gain=tuple(10 ** r.uniform(-2, 5, 2)), stop_when_unstable=False,
+    )  # fmt: skip
+    found = hc.simulate(s, engine="python")
+    assert found.outcome.code in {"out of reach", "diverged", "singular", "saturated", "time limit"}
+    assert np.isfinite(found.p).all() and np.isfinite(found.tau).all()
 
 
 def test_halves_go_to_the_even_level():

@@ -1,5 +1,6 @@
 """What a compilation says: how long it takes, that it lives, how long it took; no thread stays."""
 
+import dataclasses
 import io
 import re
 import sys
@@ -8,7 +9,10 @@ import time
 
 import pytest
 
-from hapticclay.stepping import notice
+import hapticclay as hc
+from hapticclay.model.cells import Profile
+from hapticclay.model.clay import Clay
+from hapticclay.stepping import machine_code, notice, scene
 
 
 class Stream(io.StringIO):
@@ -83,6 +87,36 @@ def test_a_terminal_counts_the_seconds_in_one_line(quick, monkeypatch, columns, 
     line = "hapticclay: compiling fast runs, this once: about 40 s"
     assert empty == "" and shown[:2] == [line[:width], f"{line}, 7 s gone"[:width]]
     assert erased == " " * width and re.fullmatch(r"hapticclay: compiled in \d+ s\n", last)
+
+
+def test_a_time_that_is_not_known_is_not_told(quick, monkeypatch):
+    monkeypatch.setattr(sys, "stderr", stream := Stream())
+    with notice.Notice("fast runs", None) as n:
+        n.begin()
+        assert stream.gate.wait(60.0)
+    first, second, *_ = stream.getvalue().splitlines()
+    assert first == "hapticclay: compiling fast runs, this once"
+    assert second == "hapticclay: compiling, 7 s gone"
+
+
+def kind(**more):
+    x = Profile((0.01,), (1.0, 2.0), Fy=(0.0, 0.5))
+    scenario = dataclasses.replace(hc.free(), clay=Clay(x, x), control="sampled", **more)
+    return machine_code.kind_of(scene.parts_of(scenario))
+
+
+@pytest.mark.parametrize("what", [None, machine_code.COMPLETE, machine_code.CARRY])
+def test_friction_in_physical_clay_that_yields_has_no_known_time(what):
+    """Seconds were told for minutes; held clay, or no friction, adds up as it should."""
+    slips = dict(hardware=hc.Hardware(friction=(0.02, 0.0)))
+    for more, known in (
+        (slips | dict(render="physical"), False),
+        (slips, True),
+        (dict(render="physical"), True),
+    ):
+        k = kind(**more) if what is None else (what, kind(**more))
+        assert (machine_code.known_time(k) is not None) == known
+        assert machine_code.known_time(k) in (None, machine_code.compile_time(k))
 
 
 def test_without_a_compilation_nothing_is_said_or_started(monkeypatch):

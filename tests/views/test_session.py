@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import math
 import time
 
 import numpy as np
@@ -12,6 +13,7 @@ from hapticclay.simulation.engines import has_numba
 from hapticclay.stepping.run import CHUNK, PLAIN
 from hapticclay.views.clock import FRAME_TIME, LONGEST_SLICE, Clock
 from hapticclay.views.live_run import played
+from hapticclay.views.live_verdict import live_verdict
 from hapticclay.views.player import Player
 from hapticclay.views.replay import Replay
 from hapticclay.views.session import Session
@@ -265,7 +267,7 @@ def test_replay_follows_the_record():
 def test_verdict_follows_the_monitor_and_the_gain():
     """K_y below its limit, above it, and below again: the verdict names each."""
     session = Session(hc.constant_cut(dt=1e-3), stiffness=10.0)
-    assert session.verdict().text == "stable; limit of K here: none"
+    assert session.verdict().text == "stable; no limit of K here"
     session.push((0.0, 0.2))
     drag(session, 3.0, lambda t: (0.1, 0.0))
     assert session.b == (90.0, 90.0)
@@ -318,3 +320,23 @@ def test_steps_too_short_for_python_are_compiled_to_the_same_bits(monkeypatch):
             ends.append(live.record())
     np.testing.assert_array_equal(ends[0].p, ends[1].p)
     assert Session(hc.constant_cut()).run.kernel is PLAIN
+
+
+@pytest.mark.parametrize(
+    "limit,told",
+    [
+        ((math.inf, math.inf), "stable; no limit of K here"),
+        ((3.0, 0.8), "stable; limit of K here: 3, 0.8"),
+        ((math.inf, 0.8), "stable; limit of Ky here: 0.8"),
+        ((3.0, math.inf), "stable; limit of Kx here: 3"),
+        (None, "stable"),
+    ],
+)
+def test_a_verdict_names_the_limits_that_there_are(limit, told):
+    assert live_verdict((0.5, 0.5), limit, None, False).text == told
+
+
+def test_an_oscillation_has_no_word_of_a_limit_that_is_not_there():
+    onset = hc.Outcome("diverged", 1.0, 1, "y", "growing oscillation")
+    text = live_verdict((0.5, 0.5), (math.inf, math.inf), onset, True).text
+    assert text == "UNSTABLE since 1.0 s: growing oscillation of y"
