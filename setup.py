@@ -163,12 +163,13 @@ class BuildNative(build_ext):
             folder.unlink()
         shutil.rmtree(folder, ignore_errors=True)
         lacks = lacked()
+        known = {x: native.checksum(PACKAGE / x) for x in native.sources()}  # before they are read
         made = [] if lacks else self.compile()
         if not lacks and not made:
             lacks = "the C compiler failed"
         if lacks:
             print(f"hapticclay: no compiled kernel ({lacks}): runs will be slow", file=sys.stderr)
-        lay_out(folder, made, lacks)
+        lay_out(folder, made, lacks, known)
 
     def compile(self):
         """Compiles; the files of the modules, none if one of them fails."""
@@ -213,8 +214,15 @@ class BuildNative(build_ext):
         return files
 
 
-def lay_out(folder, files, lacks):
-    """Makes the package of compiled modules; built.py comes last."""
+def lay_out(folder, files, lacks, known):
+    """Makes the package of compiled modules; built.py comes last.
+
+    Args:
+        folder: of the package.
+        files: the modules; empty if there are none.
+        lacks: why there are none.
+        known: checksums of the sources.
+    """
     rooms = (folder / x for x in native.ROOMS)
     for place in (folder, *rooms):
         write(place / "__init__.py", "")
@@ -225,7 +233,6 @@ def lay_out(folder, files, lacks):
         name = f"{file.parent.name}/{file.name}"
         shutil.copyfile(file, folder / name)
         modules[name] = native.checksum(file)
-    known = {x: native.checksum(PACKAGE / x) for x in native.sources()} if files else {}
     text = f"LACKED = {lacks!r}\nSOURCES = {known!r}\nMODULES = {modules!r}\n"
     write(folder / "built.py", "# Written by setup.py: see hapticclay/kernel/native.py\n" + text)
 
