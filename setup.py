@@ -159,14 +159,14 @@ class BuildNative(build_ext):
     def run(self):
         folder = PACKAGE if self.inplace else Path(self.build_lib).resolve() / "hapticclay"
         folder /= "native"
-        if folder.is_symlink():
-            folder.unlink()
-        shutil.rmtree(folder, ignore_errors=True)
         lacks = lacked()
         known = {x: native.checksum(PACKAGE / x) for x in native.sources()}  # before they are read
-        made = [] if lacks else self.compile()
-        if not lacks and not made:
-            lacks = "the C compiler failed"
+        made = []
+        try:
+            made = [] if lacks else self.compile()
+            lacks = lacks or ("" if made else "the C compiler failed")
+        except Exception as error:  # whatever is wrong with the tools, Python makes the steps
+            lacks = f"the build failed: {' '.join(str(error).split())[:200]}"
         if lacks:
             print(f"hapticclay: no compiled kernel ({lacks}): runs will be slow", file=sys.stderr)
         lay_out(folder, made, lacks, known)
@@ -223,18 +223,23 @@ def lay_out(folder, files, lacks, known):
         lacks: why there are none.
         known: checksums of the sources.
     """
-    rooms = (folder / x for x in native.ROOMS)
-    for place in (folder, *rooms):
+    modules = {f"{x.parent.name}/{x.name}": x for x in files}
+    sums = {name: native.checksum(file) for name, file in modules.items()}
+    text = "# Written by setup.py: see hapticclay/kernel/native.py\n"
+    text += f"LACKED = {lacks!r}\nSOURCES = {known if files else {}!r}\nMODULES = {sums!r}\n"
+    mark = folder / "built.py"
+    if mark.is_file() and mark.read_text() == text and all((folder / x).is_file() for x in modules):
+        return  # a run may be using it
+    if folder.is_symlink():
+        folder.unlink()
+    shutil.rmtree(folder, ignore_errors=True)
+    for place in (folder, *(folder / x for x in native.ROOMS)):
         write(place / "__init__.py", "")
     for name in native.IN_C:
         write(folder / f"{name}.py", "# its functions are C: see the .pxd file of the same name\n")
-    modules = {}
-    for file in files:
-        name = f"{file.parent.name}/{file.name}"
+    for name, file in modules.items():
         shutil.copyfile(file, folder / name)
-        modules[name] = native.checksum(file)
-    text = f"LACKED = {lacks!r}\nSOURCES = {known!r}\nMODULES = {modules!r}\n"
-    write(folder / "built.py", "# Written by setup.py: see hapticclay/kernel/native.py\n" + text)
+    write(mark, text)
 
 
 class BuildPackage(build_py):
