@@ -63,8 +63,8 @@ def kernel_modules():
     package = types.ModuleType("kernel_at_build")
     package.__path__ = [str(PACKAGE / "kernel")]
     sys.modules[package.__name__] = package
-    names = "native", "layout", "records"
-    return [importlib.import_module(f"kernel_at_build.{x}") for x in names]
+    names = ("native", "layout", "records")
+    return [importlib.import_module(f"{package.__name__}.{x}") for x in names]
 
 
 native, layout, records = kernel_modules()
@@ -161,16 +161,17 @@ class BuildNative(build_ext):
     def run(self):
         folder = PACKAGE if self.inplace else Path(self.build_lib).resolve() / "hapticclay"
         folder /= "native"
-        if folder.is_symlink():
-            folder.unlink()
-        shutil.rmtree(folder, ignore_errors=True)
         lacks = lacked()
-        made = [] if lacks else self.compile()
-        if not lacks and not made:
-            lacks = "the C compiler failed"
+        known = {x: native.checksum(PACKAGE / x) for x in native.sources()}  # before they are read
+        made = []
+        try:
+            made = [] if lacks else self.compile()
+            lacks = lacks or ("" if made else "the C compiler failed")
+        except Exception as error:  # whatever is wrong with the tools, Python makes the steps
+            lacks = f"the build failed: {' '.join(str(error).split())[:200]}"
         if lacks:
             print(f"hapticclay: no compiled kernel ({lacks}): runs will be slow", file=sys.stderr)
-        lay_out(folder, made, lacks)
+        lay_out(folder, made, lacks, known)
 
     def compile(self):
         """Compiles; the files of the modules, none if one of them fails."""
@@ -215,21 +216,32 @@ class BuildNative(build_ext):
         return files
 
 
-def lay_out(folder, files, lacks):
-    """Makes the package of compiled modules; built.py comes last."""
-    rooms = (folder / x for x in native.ROOMS)
-    for place in (folder, *rooms):
+def lay_out(folder, files, lacks, known):
+    """Makes the package of compiled modules; built.py comes last.
+
+    Args:
+        folder: of the package.
+        files: the modules; empty if there are none.
+        lacks: why there are none.
+        known: checksums of the sources.
+    """
+    modules = {f"{x.parent.name}/{x.name}": x for x in files}
+    sums = {name: native.checksum(file) for name, file in modules.items()}
+    text = "# Written by setup.py: see hapticclay/kernel/native.py\n"
+    text += f"LACKED = {lacks!r}\nSOURCES = {known if files else {}!r}\nMODULES = {sums!r}\n"
+    mark = folder / "built.py"
+    if mark.is_file() and mark.read_text() == text and all((folder / x).is_file() for x in modules):
+        return  # a run may be using it
+    if folder.is_symlink():
+        folder.unlink()
+    shutil.rmtree(folder, ignore_errors=True)
+    for place in (folder, *(folder / x for x in native.ROOMS)):
         write(place / "__init__.py", "")
     for name in native.IN_C:
         write(folder / f"{name}.py", "# its functions are C: see the .pxd file of the same name\n")
-    modules = {}
-    for file in files:
-        name = f"{file.parent.name}/{file.name}"
+    for name, file in modules.items():
         shutil.copyfile(file, folder / name)
-        modules[name] = native.checksum(file)
-    known = {x: native.checksum(PACKAGE / x) for x in native.sources()} if files else {}
-    text = f"LACKED = {lacks!r}\nSOURCES = {known!r}\nMODULES = {modules!r}\n"
-    write(folder / "built.py", "# Written by setup.py: see hapticclay/kernel/native.py\n" + text)
+    write(mark, text)
 
 
 class BuildPackage(build_py):

@@ -106,7 +106,9 @@ def check_modules(known: dict[str, int]) -> None:
             raise ImportError(f"damaged: native/{name} is not as it was built")
         for other in EXTENSION_SUFFIXES[: EXTENSION_SUFFIXES.index(f".{suffix}")]:
             if (file.parent / (stem + other)).exists():
-                raise ImportError(f"mixed: native/{file.parent.name}/{stem + other} is of another")
+                raise ImportError(
+                    f"mixed: native/{file.parent.name}/{stem + other} is of another build"
+                )
 
 
 def check_numbers(made: Any) -> None:

@@ -59,7 +59,7 @@ def tell(why: str) -> None:
     if not _told:
         _told = True
         print(
-            "hapticclay: Python makes the steps, some 15 times slower: no compiled kernel "
-            f"({why}); {remedy(why)}",
+            "hapticclay: Python makes the steps, some 15 times slower: "
+            f"no compiled kernel ({why}); {remedy(why)}",
             file=sys.stderr,
         )
