@@ -19,6 +19,7 @@ from hapticclay.stepping.engine import warnings_caught
 from tabulate import tabulate
 
 import hapticclay as hc
+from hapticclay.kernel.engine import warnings_caught
 from hapticclay.model.constants import S
 
 from . import common, hits
