@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from hapticclay.stepping.engine import build, mujoco, warnings_caught
 
 from hapticclay.formulas.arm import inverse_kinematics
 from hapticclay.kernel.engine import build, mujoco, warnings_caught

@@ -18,7 +18,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from hapticclay.stepping import engine
 from tabulate import tabulate
 
 import hapticclay as hc

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from hapticclay.stepping.engine import warnings_caught
 from tabulate import tabulate
 
 import hapticclay as hc
