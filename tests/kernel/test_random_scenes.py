@@ -124,7 +124,8 @@ def some_hardware(draw, held, guarded):
         encoder=st.integers(1000, 100_000), adc_bits=st.integers(8, 16),
         force_noise=between(1e-3, 0.1), force_filter=between(50.0, 1000.0),
         filter_order=st.integers(1, 2), dac_bits=st.integers(8, 16),
-        dac_range=st.just((30.0, 20.0)), delay=between(1e-4, 2e-3), friction=pair(between(1e-3, 0.05)), seed=st.integers(0, 99),
+        dac_range=st.just((30.0, 20.0)), delay=between(1e-4, 2e-3),
+        friction=pair(between(1e-3, 0.05)), seed=st.integers(0, 99),
     )  # fmt: skip
     if held and guarded:
         parts |= dict(
