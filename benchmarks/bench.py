@@ -62,8 +62,8 @@ LIMITATIONS = (
 )
 PARTLY_IN_PYTHON = (  # said of figures of a release that left some steps to Python
     "The release measured here made the first steps of a process that cross a border or stop in "
-    "Python. The tables of cuts, hits and sampled loops contain such steps; those of throughput are "
-    "compiled throughout; that of yielding clay has both."
+    "Python. The tables of cuts, hits and sampled loops contain such steps; those of throughput "
+    "are compiled throughout; that of yielding clay has both."
 )
 BEGIN, END = "<!-- recommend: benchmarks/bench.py --readme -->", "<!-- end -->"
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import named
-from ..kernel import arm, energy, mover, path, rows, scene, viscous
+from ..kernel import arm, energy, modes, mover, path, rows, scene, viscous
 from ..kernel.row import CHUNK, Buffers, NativeRow, PlainRow, Row, Saved
 from ..kernel.scene import NOISE_AHEAD
 from ..model import hardware
@@ -22,7 +22,6 @@ from ..model.sampled_controller import Controller
 from ..scene.scenario import Scenario
 from . import monitor
 
-SUBSTEPS = 1000  # see kernel.modes
 RECORDED = (  # of a run
     "steps", "watch", "looked", "kept", "rendered_kept", "last_rendered", "crossings", "stops",
     "outcome", "end_time", "calm", "first",
@@ -361,6 +360,7 @@ class Run:
         filled = s.row
         if not filled or filled + n >= CHUNK - 1 or self._prepares:
             return False
+        self.draw(n)
         row.advance(filled + n)
         self._shown = None
         self._count()
@@ -372,8 +372,8 @@ class Run:
 
     @property
     def _prepares(self) -> bool:
-        """Whether something is to be prepared before steps, or looked at after them."""
-        return self.drives is not None or self.row.caller is not None or bool(self.row.m.chance)
+        """Whether something but chance is to be prepared before steps, or looked at after them."""
+        return self.drives is not None or self.row.caller is not None
 
     def interrupt(self) -> None:
         """Ends the run at its last sample."""
@@ -432,7 +432,7 @@ class Run:
     def give_up(self) -> None:
         """Ends the run at its last sample, because the steps after it become too short."""
         cut_short = self.row.s.careful >= path.MOST_STEPS  # else divided by too many
-        most = path.MOST_STEPS if cut_short else SUBSTEPS
+        most = path.MOST_STEPS if cut_short else modes.SUBSTEPS
         cause = f"more than {most} steps in one sample"
         other = "fast" if self.scenario.integrator == "accurate" else "accurate"
         advice = f"change dt, or choose integrator {other!r}"

@@ -11,6 +11,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.cli import app
+from hapticclay.cli.words import check_words, ordered, with_units
 from hapticclay.kernel import engine
 from hapticclay.model import constants
 from hapticclay.simulation import record
@@ -336,3 +337,39 @@ def test_links_within_the_documents_lead_somewhere(page):
         if heading:
             titles = re.findall(r"^#+ (.*)$", file.read_text(), re.M)
             assert heading in {re.sub(r"[^\w\- ]", "", t.lower()).replace(" ", "-") for t in titles}
+
+
+TEXTS = [*(x for x in PAGES if x.suffix == ".md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+
+
+def commands_in(text):
+    """Commands that a reader copies: lines of blocks, and words in backquotes."""
+    text = re.sub(r"\\\n\s*", "", text)  # a line that goes on
+    blocks = re.findall(r"^ {4}hapticclay (.+)$", text, re.M)
+    fences = re.findall(r"^```\w*\n(.*?)^```", text, re.M | re.S)
+    return blocks + [x for f in fences for x in re.findall(r"^hapticclay (.+)$", f, re.M)]
+
+
+@pytest.mark.parametrize("page", TEXTS, ids=[page.stem for page in TEXTS])
+def test_a_command_can_be_copied_as_it_stands(page):
+    """A shell ends it at its remark; the command line takes its words, and ignores none."""
+    for line in commands_in(page.read_text()):
+        assert line.isascii(), line
+        words = with_units(ordered(shlex.split(line, comments=True)))
+        check_words(words)
+
+
+@pytest.mark.parametrize("page", TEXTS, ids=[page.stem for page in TEXTS])
+def test_an_option_in_the_text_is_set_as_code(page):
+    """Elsewhere a page may turn its two hyphens into a dash."""
+    text = re.sub(r"^(```|~~~).*?^\1|<!--.*?-->", "", page.read_text(), flags=re.S | re.M)
+    text = re.sub(r"^ {4}.*$", "", text, flags=re.M)
+    text = re.sub(r"(`+)(?!`).+?(?<!`)\1(?!`)", "", text, flags=re.S)
+    assert re.findall(r"(?<![-\w|:])--[A-Za-z][\w-]*", text) == []
+
+
+@pytest.mark.parametrize("page", TEXTS, ids=[page.stem for page in TEXTS])
+def test_a_file_of_the_checkout_that_a_page_names_is_there(page):
+    for name in re.findall(r"\b(?:tests|benchmarks|examples)/[\w/.-]+\.\w+", page.read_text()):
+        if "NAME" not in name and "FOLDER" not in name:
+            assert (ROOT / name).is_file(), name
