@@ -243,8 +243,7 @@ class Run:
 
     def _make(self, room: int) -> None:
         self.row.advance(self._prepared(room))
-        if self.row.caller is not None:
-            self.row.caller.check()
+        self.row.check()
         self._count()
 
     def _prepared(self, room: int) -> int:
@@ -372,7 +371,7 @@ class Run:
     @property
     def _prepares(self) -> bool:
         """Whether something is to be prepared before steps, or looked at after them."""
-        return self.drives is not None or self.row.caller is not None or bool(self.row.m.chance)
+        return self.drives is not None or self.row.is_called or bool(self.row.m.chance)
 
     def interrupt(self) -> None:
         """Ends the run at its last sample."""
@@ -444,8 +443,7 @@ class Run:
         """The row that a step would write now, and the force of the clay in it [N]."""
         self._prepared(self.filled + 1)
         found = self.row.peek()
-        if self.row.caller is not None:
-            self.row.caller.check()
+        self.row.check()
         return self._with_force(found)
 
     def numbers_ahead(self) -> list[float]:
