@@ -1,30 +1,42 @@
 # Needs python3 (3.11 or newer) and make; everything else goes into .venv here.
+# With a C compiler and Python's headers, runs are compiled; without, they are slow.
 PYTHON ?= python3
 BIN := .venv/bin
 unexport PYTHONDONTWRITEBYTECODE  # the tests start hundreds of processes, which would compile each module anew
 
-.PHONY: demo test coverage check docs pages linkcheck bench build release clean
+SOURCES := setup.py $(wildcard hapticclay/formulas/*.p* hapticclay/kernel/*.p*)
+KERNEL := hapticclay/native/built.py
+
+.PHONY: demo test sanitize coverage check docs pages linkcheck bench build release clean
 .DELETE_ON_ERROR:
 
 .venv/run.done: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "hapticclay needs Python 3.11 or newer, this is %s" % sys.version.split()[0])'
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[fast]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@touch $@
+
+# what the installation compiled, again if its sources are newer
+$(KERNEL): $(SOURCES) | .venv/run.done
+	@[ -z "$$(find $(SOURCES) -newer $@ 2>&1)" ] || $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
 	@touch $@
 
 .venv/dev.done: .venv/run.done
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
 	@touch $@
 
-demo: .venv/run.done  ## set up, run the constant cut, reproduce the paper, say where plots and report are
+demo: $(KERNEL)  ## set up, run the constant cut, reproduce the paper, say where plots and report are
 	$(BIN)/hapticclay run constant
 	$(BIN)/hapticclay reproduce --quick
 	@echo "plots: $(CURDIR)/out/run/constant/velocity.png $(CURDIR)/out/run/constant/force.png"
 
-test: .venv/dev.done  ## set up and run all tests, on all cores
+test: .venv/dev.done $(KERNEL)  ## set up and run all tests, on all cores
 	$(BIN)/python -m pytest --durations=20
 
-coverage: .venv/dev.done  ## the same but what tracing disturbs, and which lines they reach: out/coverage/index.html
+sanitize: .venv/dev.done  ## the kernel's tests of bits, compiled to find wrong addresses and undefined behaviour
+	.ci/sanitize $(BIN)/python
+
+coverage: .venv/dev.done $(KERNEL)  ## the same but what tracing disturbs, and which lines they reach: out/coverage/index.html
 	$(BIN)/python -m pytest -m "not perf and not untraced" --cov --cov-report=term --cov-report=html:out/coverage --cov-report=xml:out/coverage/coverage.xml
 
 check: .venv/dev.done  ## lint, types, layers
@@ -37,24 +49,24 @@ check: .venv/dev.done  ## lint, types, layers
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
 	@touch $@
 
-docs: .venv/docs.done  ## the site, examples run, warnings are errors: out/docs/index.html
+docs: .venv/docs.done $(KERNEL)  ## the site, examples run, warnings are errors: out/docs/index.html
 	$(BIN)/python -m sphinx -E -W --keep-going -q docs out/docs
 
-pages: .venv/docs.done  ## the same without the pictures of the examples, which the tests run
+pages: .venv/docs.done $(KERNEL)  ## the same without the pictures of the examples, which the tests run
 	$(BIN)/python -m sphinx -E -W --keep-going -q -D plot_gallery=0 docs out/pages
 
 linkcheck: .venv/docs.done  ## follow the links of the site to other sites
 	$(BIN)/python -m sphinx -W --keep-going -q -b linkcheck docs out/linkcheck
 
-bench: .venv/dev.done  ## error against run time, stiff and extreme scenes, throughput: one page in out/bench
+bench: .venv/dev.done $(KERNEL)  ## error against run time, stiff and extreme scenes, throughput: one page in out/bench
 	$(BIN)/hapticclay bench --quick
 
 build: .venv/dev.done  ## wheel and sdist into dist/
 	$(BIN)/python -m build --quiet
 
-release: .venv/dev.done  ## the same, if the published benchmarks were measured on this code
+release: .venv/dev.done $(KERNEL)  ## the same, if the published benchmarks were measured on this code
 	$(BIN)/hapticclay bench --check --out docs/bench
 	$(MAKE) build
 
 clean:
-	rm -rf .venv out dist docs/gallery
+	rm -rf .venv out dist build hapticclay/native docs/gallery

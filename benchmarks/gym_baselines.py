@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from hapticclay import files
-from hapticclay.gym import baselines
+from hapticclay.gym import baselines, scores
 from hapticclay.gym.quantities import table_of
 
 from . import common
@@ -29,7 +29,6 @@ SHOWN = {  # beside the return
     "AdaptiveGain-v0": ("K", "lost"),
     "ProbeClay-v0": ("error_b", "error_Fy", "lost"),
 }
-FLOORS = {"AdaptiveGain-v0": ("robust gain", "oracle")}  # whose returns score 0 and 1
 
 
 def page_of(id: str) -> Path:
@@ -46,16 +45,15 @@ def measured(id: str, seeds: int, engine: str) -> dict[str, Any]:
         told = {k: float(np.mean(found.info[k])) for k in SHOWN[id]}
         rows[name] = {"return": mean, "half": half, "length": float(found.length.mean()), **told}
         print(f"{id}, {name}: {mean:.2f} +- {half:.2f}", flush=True)
-    if id in FLOORS:
-        low, high = (rows[name]["return"] for name in FLOORS[id])
-        for row in rows.values():
-            row["score"] = (row["return"] - low) / (high - low)
+    means = {name: row["return"] for name, row in rows.items()}
+    for name, score in scores.scores_of(id, means).items():
+        rows[name]["score"] = score
     return rows
 
 
 def table(id: str, rows: dict[str, Any], seeds: int, told: str) -> str:
     """Return the table of an environment."""
-    columns = ["length", *SHOWN[id], *(["score"] if id in FLOORS else [])]
+    columns = ["length", *SHOWN[id], *(["score"] if id in scores.ANCHORS else [])]
     lines = [
         "| policy | return | " + " | ".join(x.replace("_", " ") for x in columns) + " |",
         "|---|---|" + "---|" * len(columns),

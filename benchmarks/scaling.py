@@ -64,12 +64,12 @@ def measure(quick: bool, rounds: int) -> dict[str, Any]:
         for k in range(rounds + 1):
             for n in times:
                 out = Path(folder) / f"{k}-{n}"
-                sweep_store.begin_sweep(todo, out)
+                chunks = sweep_store.begin_sweep(todo, out)
                 begin = time.perf_counter()
                 jobs = client.map(
-                    sweep.run_chunk,
+                    sweep.run_part,
                     [todo] * todo.chunks,
-                    range(todo.chunks),
+                    chunks,
                     [str(out)] * todo.chunks,
                     workers=crew[:n],
                     pure=False,

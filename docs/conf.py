@@ -70,6 +70,8 @@ nitpick_ignore_regex = [
 ]
 linkcheck_timeout = 20
 
+smartquotes_action = "qe"  # no dashes: an option, --quick, remains what it is
+
 html_theme = "furo"
 html_title = f"hapticclay {release}"
 html_static_path = ["static"]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
 import functools
 import inspect
+import itertools
 import os
 import pkgutil
 import re
@@ -16,7 +16,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from .errors import ParameterError
+from .errors import ParameterError, nearest
 
 F = TypeVar("F", bound=Callable[..., Any])
 IN_WORDS: dict[Any, str] = {
@@ -48,7 +48,7 @@ def known_names(name: str, given: Mapping[str, Any], known: Collection[str]) -> 
     """
     for word, value in given.items():
         if word not in known:
-            near = difflib.get_close_matches(word, known, n=1)
+            near = nearest(word, known)
             told = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
             raise UnknownArgument(word, value, f"unexpected argument of {name}; {told}") from None
 
@@ -166,16 +166,18 @@ def checked(made: F) -> F:
         ParameterError: an argument is of another class, or unknown; by what is returned.
     """
     inner: Any = made.__init__ if isinstance(made, type) else made
-    names = list(_parameters(inner))
+    parameters = list(_parameters(inner).values())
+    kinds_of = [p.kind for p in parameters]
+    many = inspect.Parameter.VAR_POSITIONAL  # as *changes, to which all further values belong
+    end = kinds_of.index(many) if many in kinds_of else len(parameters)
+    names, rest = [p.name for p in parameters[:end]], [p.name for p in parameters[end : end + 1]]
 
     @functools.wraps(inner)
     def entry(*args: Any, **given: Any) -> Any:
         kinds = argument_kinds(inner)
-        for name, value in (*zip(names, args, strict=False), *given.items()):
-            if name in kinds and (
-                not isinstance(value, kinds[name])
-                or (isinstance(value, str | bytes) and str not in kinds[name])
-            ):
+        ordered = itertools.chain(names, itertools.cycle(rest))
+        for name, value in (*zip(ordered, args, strict=False), *given.items()):
+            if name in kinds and not _is_of(value, kinds[name]):
                 told = " or ".join(dict.fromkeys(map(_in_words, kinds[name])))
                 raise ParameterError(name, value, f"must be {told}")
         return inner(*args, **given)
@@ -184,6 +186,15 @@ def checked(made: F) -> F:
         made.__init__ = entry
         return named(made)  # type: ignore[return-value]
     return named(entry)  # type: ignore[arg-type]
+
+
+def _is_of(value: Any, kinds: tuple[Any, ...]) -> bool:
+    """Whether an argument is of one of the classes; a text is no list of characters."""
+    if isinstance(value, str | bytes) and str not in kinds:
+        return False
+    if getattr(value, "ndim", 1) == 0 and Iterable in kinds:  # NumPy's scalars say they iterate
+        return False
+    return isinstance(value, kinds)
 
 
 def _parameters(made: Any) -> Mapping[str, inspect.Parameter]:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import html
 from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
 
 TABLE_STYLE = "border-collapse:collapse;margin:0.3em 0;color:inherit;background:transparent"
+FEW = 4  # numbers of a tuple that are all shown
 CELL_STYLE = (  # this grey is visible on white and on black
     "padding:0.15em 0.8em 0.15em 0;border:0;border-top:1px solid rgba(128,128,128,0.4);"
     "text-align:left;vertical-align:top;color:inherit;background:transparent"
@@ -46,3 +51,32 @@ def html_table(title: str, rows: Iterable[tuple[str, str]]) -> str:
     ]
     caption = f'<caption style="text-align:left;color:inherit">{html.escape(title)}</caption>'
     return f'<table style="{TABLE_STYLE}">{caption}{"".join(lines)}</table>'
+
+
+def brief(value: Any, /) -> str:
+    """A dataclass or named tuple on one line: numbers, and of arrays their shape and range.
+
+    Args:
+        value: the object.
+    """
+    names = getattr(value, "_fields", None) or [f.name for f in dataclasses.fields(value)]
+    parts = (f"{name} {_brief_value(getattr(value, name))}" for name in names)
+    return f"<{type(value).__name__}: {', '.join(parts)}>"
+
+
+def _brief_value(x: Any) -> str:
+    if isinstance(x, bool | str) or x is None:
+        return one_line(repr(x))
+    if isinstance(x, int | float | np.number):
+        return f"{x:.5g}"
+    if isinstance(x, np.ndarray):
+        shape = " x ".join(map(str, x.shape))
+        finite = x[np.isfinite(x)] if x.dtype.kind in "fiu" else x[:0]
+        if not finite.size:
+            return f"({shape})"
+        return f"({shape}) {finite.min():.5g} to {finite.max():.5g}"
+    if isinstance(x, tuple | list | dict):
+        if isinstance(x, tuple) and len(x) <= FEW and all(isinstance(y, int | float) for y in x):
+            return f"({', '.join(map(_brief_value, x))})"
+        return f"({len(x)})"
+    return type(x).__name__

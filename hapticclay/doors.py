@@ -29,7 +29,7 @@ def attach(
     def __getattr__(wanted: str) -> Any:
         if wanted not in names:
             near = "" if wanted.startswith("_") else _nearest(module, wanted, names, doors)
-            raise AttributeError(f"no name {wanted!r} in {module}{near}")
+            raise AttributeError(f"no name {wanted[:100]!r} in {module}{near}")
         own, start = vars(sys.modules[module]), vars(sys.modules[package])
         before = start.get(wanted, start)
         value = own[wanted] = found(wanted)
@@ -59,5 +59,5 @@ def _nearest(module: str, wanted: str, names: Sequence[str], doors: Sequence[str
         for x in importlib.import_module(f"{module}.{door}").__all__
     }
     paths |= {x: f"{module}.{x}" for x in names}
-    near = difflib.get_close_matches(wanted, paths, 1)
+    near = difflib.get_close_matches(wanted[:100], paths, 1)
     return f"; did you mean {paths[near[0]]}?" if near else ""

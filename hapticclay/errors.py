@@ -6,10 +6,12 @@ import contextlib
 import dataclasses
 import difflib
 import functools
+import itertools
 import math
 import numbers
+import reprlib
 import types
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import (
     TYPE_CHECKING,
@@ -22,10 +24,15 @@ from typing import (
     get_type_hints,
 )
 
+from .display import one_line
 from .units import from_unit, is_quantity
 
 if TYPE_CHECKING:
     import numpy as np
+
+
+MOST_OF_VALUE, MOST_OF_NAME, MOST_OF_BOUND = 60, 120, 600  # characters in a message
+MOST_COMPARED = 100  # characters of a word that is compared with known names
 
 
 class ParameterError(ValueError):
@@ -38,8 +45,10 @@ class ParameterError(ValueError):
     """
 
     def __init__(self, field: str, value: object, bound: str):
-        self.field, self.value, self.bound = field, value, bound
-        super().__init__(f"{field} = {_short(value)}: {bound}")
+        text = bound if isinstance(bound, str) else _short(bound)
+        self.field, self.value, self.bound = field, value, _middle_cut(text)
+        name = one_line(field, MOST_OF_NAME) if isinstance(field, str) else _short(field)
+        super().__init__(f"{name} = {_short(value)}: {self.bound}")
 
     def __reduce__(self):
         return type(self), (self.field, self.value, self.bound), self.__dict__
@@ -49,9 +58,63 @@ class Warning(UserWarning):  # as in `hc.Warning`
     """A scenario has implausible values, such as clay out of reach."""
 
 
+class _Bounded(reprlib.Repr):
+    """Text of a value in bounded time and length, however large or deep it is."""
+
+    def __init__(self):
+        super().__init__()
+        self.maxlevel = 8
+        self.maxstring = self.maxlong = 4 * MOST_OF_VALUE
+        self.maxlist = self.maxtuple = self.maxdict = self.maxset = MOST_OF_VALUE // 2
+        self.maxfrozenset = self.maxdeque = self.maxarray = MOST_OF_VALUE // 2
+        self.maxother = 10**6
+
+    def repr_int(self, x: int, level: int) -> str:
+        if x.bit_length() > 4 * self.maxlong:  # Python refuses to write thousands of digits
+            return f"<whole number of {x.bit_length()} bits>"
+        return repr(x)
+
+    def repr_dict(self, x: dict[Any, Any], level: int) -> str:
+        """As by repr, in the order of the dictionary."""
+        if x and level <= 0:
+            return "{...}"
+        items = itertools.islice(x.items(), self.maxdict)
+        told = [f"{self.repr1(k, level - 1)}: {self.repr1(v, level - 1)}" for k, v in items]
+        return "{" + ", ".join(told + ["..."] * (len(x) > self.maxdict)) + "}"
+
+    def repr_bytes(self, x: bytes, level: int) -> str:
+        return repr(x[: self.maxstring])
+
+    def repr_instance(self, x: Any, level: int) -> str:
+        try:
+            return repr(x)
+        except Exception:  # of a class that is not ours
+            return f"<{type(x).__name__}>"
+
+
+_bounded = _Bounded()
+
+
 def _short(value: object) -> str:
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 60 else text[:57] + "..."
+    return one_line(_bounded.repr(value), MOST_OF_VALUE)
+
+
+def _middle_cut(text: str) -> str:
+    """A text without its middle if it is long: the nearest name stands at the end."""
+    if len(text) <= MOST_OF_BOUND:
+        return text
+    half = MOST_OF_BOUND // 2 - 3
+    return f"{text[:half]} ... {text[-half:]}"
+
+
+def nearest(word: str, names: Collection[str]) -> list[str]:
+    """The name most like a word, in a list; an empty list if none is.
+
+    Args:
+        word: the word; of a long one the beginning counts.
+        names: the names.
+    """
+    return difflib.get_close_matches(word[:MOST_COMPARED], names, n=1)
 
 
 def quantity(field: str, text: str, unit: str = "") -> float | None:
@@ -69,6 +132,23 @@ def quantity(field: str, text: str, unit: str = "") -> float | None:
         return from_unit(text, unit)
     except ValueError as error:
         raise ParameterError(field, text, str(error)) from None
+
+
+def number_in(field: str, text: object, unit: str = "") -> float:
+    """The number that a text stands for, "5" or "5 cm", in the unit of a field.
+
+    Args:
+        field: name for the error.
+        text: the number, with or without a unit; or a number.
+        unit: unit of the field, "" for none.
+
+    Raises:
+        ParameterError: the unit is unknown, or has another dimension than the field's.
+        ValueError: it is no number.
+        TypeError: likewise.
+    """
+    given = quantity(field, text, unit) if isinstance(text, str) else None
+    return float(text) if given is None else given  # type: ignore[arg-type]
 
 
 def number(
@@ -155,6 +235,16 @@ def flag(field: str, value: object) -> bool:
     return value
 
 
+def is_series(value: object) -> bool:
+    """Whether a value can be iterated over and is no text; a NumPy scalar only seems so.
+
+    Args:
+        value: the value.
+    """
+    plain = isinstance(value, Iterable) and not isinstance(value, str | bytes)
+    return plain and getattr(value, "ndim", 1) != 0
+
+
 def numbers_of(
     field: str,
     value: object,
@@ -185,10 +275,10 @@ def numbers_of(
                 break
         else:
             return value
-    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+    if not is_series(value):
         bound = f"must be {len(names)} numbers ({', '.join(names)})"
         raise ParameterError(field, value, bound)
-    items = tuple(value)
+    items = tuple(value)  # type: ignore[arg-type]
     if len(items) != len(names):
         bound = f"must be {len(names)} numbers ({', '.join(names)})"
         raise ParameterError(field, value, f"{bound}, got {len(items)}")
@@ -304,7 +394,7 @@ def choice(field: str, value: object, valid: Sequence[str]) -> str:
     """
     if isinstance(value, str) and value in valid:
         return value
-    near = difflib.get_close_matches(str(value), valid, n=1)
+    near = nearest(value, valid) if isinstance(value, str) else []
     hint = f"; did you mean {near[0]!r}?" if near else ""
     raise ParameterError(field, value, f"must be one of {', '.join(valid)}{hint}")
 
@@ -503,7 +593,7 @@ def _check_tuple(kinds: tuple[Any, ...], bound: Bound) -> Check:
     def check(field: str, value: Any, part: Any) -> Any:
         names: Sequence[str] = bound.names
         if kinds[1:] == (...,):
-            if isinstance(value, str | bytes) or not hasattr(value, "__len__"):
+            if not is_series(value) or not hasattr(value, "__len__"):
                 raise ParameterError(field, value, "must be a sequence of numbers")
             names = _place_names(len(value))
         return numbers_of(field, value, names, **_bound_limits(bound, part))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import importlib
 import json
@@ -14,10 +15,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from .arguments import function_name
+from .arguments import checked, function_name
 from .display import html_table, one_line
 from .errors import ParameterError, choice, needing
-from .files import atomic, versions
+from .files import DAMAGED, atomic, parse_json, read_text, versions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,6 +39,7 @@ MOVED = {  # modules of earlier releases, and where their classes are
     "hapticclay.stepping.run": "hapticclay.simulation.run",
 }
 SHOWN_ROWS = 10  # rows of a table shown in a notebook
+LONGEST_ITEM = 2**16  # bytes of one item of an array: a text
 Tables = Mapping[str, Mapping[str, Sequence[Any]]]
 
 
@@ -110,6 +112,7 @@ class Result:
         return file
 
     @classmethod
+    @checked
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """Reads a file of `save`. No code is run, and only modules of this package are imported.
 
@@ -120,13 +123,14 @@ class Result:
             ParameterError: the file cannot be read, or holds another result.
         """
         try:
-            data = json.loads(Path(path).read_text())
+            data = parse_json(read_text(path))
             choice("schema", data["schema"], (RESULT_SCHEMA,))
             found = of_plain(data["result"])
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        except DAMAGED as error:
             if isinstance(error, ParameterError):
                 raise
-            what = " ".join(str(error).split()) or type(error).__name__
+            told = getattr(error, "strerror", None) or " ".join(str(error).split())
+            what = one_line(told, 200) or type(error).__name__
             raise ParameterError("path", str(path), f"must be a saved result ({what})") from None
         if not isinstance(found, cls):
             bound = f"must hold a {cls.__name__}, has a {type(found).__name__}"
@@ -209,15 +213,20 @@ def of_plain(data: Any) -> Any:
         return float(data["float"])
     if "real" in data:
         return of_plain(data["real"]) + 1j * of_plain(data["imaginary"])
-    values = np.array(list(map(of_plain, data["values"])), data["array"])
-    return values.reshape(data["shape"])
+    values, kind = list(map(of_plain, data["values"])), np.dtype(data["array"])
+    if kind.kind not in "biufcU" or kind.itemsize > LONGEST_ITEM:
+        raise ValueError(f"arrays of {one_line(kind)} are not read")
+    return np.array(values, kind).reshape(data["shape"])
 
 
 def _made(name: str, fields: Mapping[str, Any]) -> Any:
     """Makes a part of the package from its fields."""
     module, _, kind = name.partition(":")
     module = MOVED.get(module, module)
-    found = getattr(importlib.import_module(module), kind) if _is_own(module) else None
+    found = None
+    if _is_own(module):
+        with contextlib.suppress(ImportError):
+            found = getattr(importlib.import_module(module), kind)
     if found is None or not _is_part(found):
         raise ValueError(f"{one_line(name)} is not a part of this package")
     return found(**fields)

@@ -10,6 +10,9 @@ from functools import cache
 QUANTITY = re.compile(
     r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?![eE][-+]?\d)(\s*[^\W\d].*|\s+\S.*)"
 )
+RECIPROCAL = re.compile(  # "2/kg" for a field in 1/kg
+    r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(/\s*[^\W\d].*)"
+)
 FACTOR = re.compile(r"1|([^\W\d]+)(?:\^(-?\d))?")
 PREFIXES = {"n": "1e-9", "u": "1e-6", "m": "1e-3", "c": "1e-2", "k": "1e3", "M": "1e6", "G": "1e9"}
 SIZES: dict[str, tuple[Decimal, tuple[int, ...]]] = {  # in SI; powers of m, kg, s and rad
@@ -30,12 +33,15 @@ def parse_unit(text: str) -> tuple[Decimal, tuple[int, ...]] | None:
     """Size of a unit in SI units and its powers of m, kg, s and rad; None if it is unknown.
 
     Args:
-        text: the unit, as in "N.s/m" or "kg.m^2"; a slash divides by the next factor only.
+        text: the unit, as in "N.s/m" or "kg.m^2"; a slash divides by the next factor only. A space
+            multiplies as a dot does, and Ns and Nm are N.s and N.m.
     """
     for sign, plain in (("µ", "u"), ("μ", "u"), ("²", "^2"), ("³", "^3"), ("·", "."), ("*", ".")):
         text = text.replace(sign, plain)
+    text = re.sub(r"\s*([./])\s*", r"\1", text.replace(" per ", "/").strip())
+    text = re.sub(r"\bN(?=[sm]\b)", "N.", re.sub(r"\s+", ".", text))
     size, powers = Decimal(1), (0, 0, 0, 0)
-    for stroke, factor in re.findall(r"(^|[./])([^./]*)", text.replace(" per ", "/").strip()):
+    for stroke, factor in re.findall(r"(^|[./])([^./]*)", text):
         found = FACTOR.fullmatch(factor.strip())
         if not found:
             return None
@@ -70,16 +76,19 @@ def from_unit(text: str, unit: str) -> float | None:
     """The number of a text like "5 cm", in the unit of a field; None for other texts.
 
     Args:
-        text: number and unit.
+        text: number and unit; "2/kg" is "2 1/kg".
         unit: unit of the field, "" for none.
 
     Raises:
         ValueError: the unit is unknown, or has another dimension than the field's.
     """
     found = QUANTITY.fullmatch(text)
+    if not found and unit.startswith("1/"):
+        found = RECIPROCAL.fullmatch(text)
     if not found:
         return None
     given = found[2].strip()
+    given = f"1{given}" if given.startswith("/") else given
     told = f"must be a number{f' in {unit}' if unit else ' without a unit'}"
     own, other = parse_unit(unit), parse_unit(given)
     if other is None:

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.results import Result, of_plain, plain
+from hapticclay.theory.client_loop import Handle
 
 HAND = hc.Operator()
 WALL = hc.VirtualWall(300.0, 2.0, device=hc.Device(0.1, 0.5), Ts=1e-3)
@@ -133,3 +134,18 @@ def test_a_file_names_no_class_but_those_of_data_and_runs_nothing(tmp_path):
         result("Design").to_frame("desing")
     with pytest.raises(ParameterError, match="must be data"):
         plain(lambda: 0)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: hc.studies.Measurement(*(np.arange(500.0) * x for x in (1e-3, 1.0, 2.0))),
+        lambda: Handle.of(hc.Scenario(operator=hc.Operator())),
+        lambda: hc.theory.nyquist(hc.Scenario(), axis="x", b=50.0),
+    ],
+)
+def test_arrays_are_printed_by_shape_and_range(make):
+    """On one line, without a row of numbers."""
+    text = str(make())
+    assert "\n" not in text and "array(" not in text and len(text) < 500
+    assert text.startswith(f"<{type(make()).__name__}")

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import tyro
 
 from ..files import atomic, writable
 from . import console
+from .unused import Unused
 
 if TYPE_CHECKING:
     from ..studies.accuracy_ladder import Ladder
 
 ERROR_NAMES = {"s": "times of the border crossings", "m": "position"}
+VARIED = "is varied by this command: leave it out"
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,12 @@ class AccuracyCommand:
     ] = None
     quick: bool = False
     figures: console.FigureOptions = console.FigureOptions()
+
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("integrator",), VARIED),
+        Unused(("dt",), VARIED, (), ("control=sampled",)),
+        Unused(("dt",), VARIED, ("Ts",)),
+    )
 
     def __call__(self) -> int:
         from ..studies.accuracy_ladder import accuracy_ladder

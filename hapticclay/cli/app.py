@@ -16,6 +16,7 @@ from typing import Annotated, Any, Union
 
 import tyro
 
+from ..display import one_line
 from ..errors import ParameterError, Warning
 from ..files import sources_kept
 from .commands import COMMANDS, load_command
@@ -87,7 +88,7 @@ def _exit_status(argv: Sequence[str] | None, received: list[int]) -> int:
         _tell(f"out of memory: {error or 'none is left'}")
         return 1
     except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
+        where = f"{one_line(error.filename, 200)}: " if error.filename else ""
         _tell(f"{where}{error.strerror or error}")
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1

@@ -5,9 +5,11 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from ..errors import ParameterError
 from ..files import writable
+from .unused import Unused
 
 
 @dataclass(frozen=True)
@@ -22,14 +24,18 @@ class BenchCommand:
         out: Folder for bench.md, the data and the diagrams.
         quick: Run fewer jobs, settings and scenes: about two minutes.
         anew: Measure again what was measured before.
-        check: Measure nothing; name the parts in the folder that are older than kernel, formulas or model,
-            and exit with status 1 if there are any.
+        check: Measure nothing; name the parts in the folder that are older than kernel, formulas
+            or model, and exit with status 1 if there are any.
     """
 
     out: Path = Path("out/bench")
     quick: bool = False
     anew: bool = False
     check: bool = False
+
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("quick", "anew"), "is for measuring: leave it out with --check", ("check",)),
+    )
 
     def __call__(self) -> int:
         checkout = Path(__file__).resolve().parents[2]

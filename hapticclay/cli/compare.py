@@ -8,7 +8,9 @@ from typing import Annotated, Literal
 
 import tyro
 
+from ..errors import ParameterError
 from ..files import atomic, versions, writable
+from ..model.constants import AXES
 from . import console
 
 COMPARE_SCHEMA = "hapticclay-compare-1"
@@ -20,24 +22,28 @@ class CompareCommand:
 
     Attributes:
         source: Two to five scenario files, or files of walls.
-        axis: Axis of the arm.
+        axis: Axis of the arm, by default x.
         out: Folder for compare.html (self-contained), compare.json and the figures.
         figures: Formats and style of the figure files; those on the page are for a screen.
     """
 
     source: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
-    axis: Literal["x", "y"] = "x"
+    axis: Literal["x", "y"] | None = None
     out: Path = Path("out/compare")
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
         from ..paper.comparison import comparison_page, number_rows
-        from ..studies.comparison import compare_files, differing_fields
+        from ..studies.comparison import compare_files, differing_fields, is_wall_file
         from ..views.compare_plots import compare_figures
 
         writable(self.out)
+        if self.axis and all(is_wall_file(x) for x in self.source):
+            raise ParameterError("axis", self.axis, "is for the arm: leave it out with walls")
         found = compare_files(
-            self.source, self.axis, lambda files: console.progress_bar(files, desc="files")
+            self.source,
+            self.axis or AXES[0],
+            lambda files: console.progress_bar(files, desc="files"),
         )
         rows = [[name, *cells] for name, cells in number_rows(found).items()]
         try:

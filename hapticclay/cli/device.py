@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from ..errors import ParameterError
+from ..errors import ParameterError, number, number_in
 from ..files import writable
 from . import console
 from .device_options import deliver_loops, write_report
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from ..scene.scenario import Scenario
 
 WAIT = 0.1  # [s] between two looks at whether the session is to end
+LONGEST = 1e9  # [s] longest session
+PERIOD = 0.005  # [s] of a message, by default
 
 
 @dataclass(frozen=True)
@@ -44,9 +46,11 @@ class DeviceCommand:
             drivers, as JSON for ROS programs.
         port: Port to listen on, 0 for a free one; by default that of the protocol, 10001 or 9090.
         host: Address to listen on. Any address but that of this machine needs a token.
+        origin: Web pages that may drive the device, as http://localhost:8000; by default none.
         clock: wall moves the arm in real time; tick moves it by --period at each message, so the
             same messages give the same run.
-        period: Simulated time that one message advances the arm, with --clock tick [s].
+        period: Simulated time that one message advances the arm, with --clock tick [s]; by default
+            5 ms.
         hand: Target of the hand: x y [m]; or x0 y0 x1 y1 and a speed [m/s] for a line; or a CSV
             file with the columns t, x, y. By default the hand rests at the start.
         plane: Plane of the device in which the arm moves.
@@ -66,8 +70,9 @@ class DeviceCommand:
     protocol: Literal["inverse", "rosbridge"] = "inverse"
     port: int | None = None
     host: str = "127.0.0.1"
+    origin: tuple[str, ...] = ()
     clock: Literal["wall", "tick"] = "wall"
-    period: float = 0.005
+    period: float | None = None
     hand: tuple[str, ...] = ()
     plane: Literal["xy", "xz"] = "xy"
     buttons: Path | None = None
@@ -86,17 +91,21 @@ class DeviceCommand:
         out = self.out or Path("out", "loop" if self.action == "report" else "device")
         if self.action == "report":
             return self._report(out)
+        duration = math.inf
+        if self.duration is not None:
+            duration = number("duration", self.duration, 0.0, LONGEST, unit="s")
         writable(out)
         with self._server() as server, console.ctrl_c() as stop:
             shown = "an Inverse3" if self.protocol == "inverse" else "a device of ROS"
             print(f"{shown} listens at {server.url}; Ctrl-C ends the session", flush=True)
-            end = math.inf if self.duration is None else time.monotonic() + self.duration
+            end = time.monotonic() + duration
             while not stop.wait(WAIT) and time.monotonic() < end:
                 if ended := server.service.device.ended:
                     print(f"hapticclay: the arm stopped: {ended}", file=sys.stderr)
                     break
+            planned = not stop.is_set()
             server.close()
-            return self._deliver(server, out)
+            return self._deliver(server, out, planned)
 
     def _server(self) -> Any:
         from ..ports.buttons import ButtonScript
@@ -104,6 +113,9 @@ class DeviceCommand:
         from ..ports.sessions import PORTS, Inverse3
 
         logging.basicConfig(format="hapticclay: %(message)s", level=logging.WARNING)
+        if self.period is not None and self.clock != "tick":
+            bound = "is for --clock tick: leave it out with --clock wall"
+            raise ParameterError("period", self.period, bound)
         shown = Inverse3(
             self.device_id,
             self.grip_id,
@@ -111,30 +123,36 @@ class DeviceCommand:
             ButtonScript.of_file(self.buttons) if self.buttons else ButtonScript(),
             self.largest_force,
             self.protocol,
+            self.origin,
         )
         return serve(
             served_scenario(self.source),
             host=self.host,
             port=PORTS[self.protocol] if self.port is None else self.port,
             clock=self.clock,
-            period=self.period if self.clock == "tick" else None,
+            period=(PERIOD if self.period is None else self.period)
+            if self.clock == "tick"
+            else None,
             hand=trajectory_of(self.hand),
             clay=self.clay,
             inverse3=shown,
         )
 
-    def _deliver(self, server: DeviceServer, out: Path) -> int:
-        """Writes and prints what happened."""
+    def _deliver(self, server: DeviceServer, out: Path, planned: bool) -> int:
+        """Writes and prints what happened; `planned` where the session lasted its duration."""
+        from ..ports.device import ended_as_planned
+
         service = server.service
         if not service.device.t:
             print("nothing was recorded")
             return 0
-        record = server.record()
-        deliver(record, out, self.figures if self.plots else None)
+        record = ended_as_planned(server.record()) if planned else server.record()
+        deliver(record, out, self.figures if self.plots else None, paced=True)
         if service.skipped:
             share = service.skipped / (service.skipped + service.samples)
             text = f"{service.skipped} control samples ({share:.1%}) were skipped"
-            print(f"hapticclay: {text}: the computer was late", file=sys.stderr)
+            why = "the computer was late; --clock tick skips none"
+            print(f"hapticclay: {text}: {why}", file=sys.stderr)
         figures = self.figures if self.plots else None
         deliver_loops(server.exchanges, record.scenario, out, figures)
         return 0
@@ -175,19 +193,24 @@ def trajectory_of(words: tuple[str, ...]) -> Trajectory | None:
     Raises:
         ParameterError: they are none of these.
     """
-    from ..ports.device import Trajectory
+    from ..ports.device import FASTEST, Trajectory
 
     if not words:
         return None
     if len(words) == 1 and Path(words[0]).suffix.lower() == ".csv":
         return Trajectory.of_file(words[0])
+    units = ("m", "m", "m", "m", "m/s")
     try:
-        x = [float(word) for word in words]
+        x = [number_in("hand", w, unit) for w, unit in zip(words, units, strict=False)]
+    except ParameterError:  # of a unit
+        raise
     except ValueError:
         x = []
+    x = x if len(x) == len(words) else []
     if len(x) == 2:
         return Trajectory.to((x[0], x[1]))
-    if len(x) == 5 and x[4] > 0.0 and x[:2] != x[2:4]:
+    if len(x) == 5 and x[:2] != x[2:4]:
+        number("hand speed", x[4], 1e-6, FASTEST, unit="m/s")
         way = math.dist(x[:2], x[2:4])
         return Trajectory((0.0, way / x[4]), ((x[0], x[1]), (x[2], x[3])))
     bound = "must be x y, or x0 y0 x1 y1 and a speed above 0, or a CSV file"

@@ -90,8 +90,9 @@ class DeviceOptions:
 
     @contextlib.contextmanager
     def _hand(self, scenario: Scenario) -> Iterator[Any]:
-        from ..ports.client import DeviceClient, Limits
+        from ..ports.client import DeviceClient
         from ..ports.coupled import Coupled, DeviceHand
+        from ..ports.limits import Limits
 
         K, B = self.coupling
         coupling, limits = Coupled(K, B, self.device_plane), Limits(rate=self.device_rate)
@@ -148,11 +149,13 @@ def timing_line(timing: dict[str, Any]) -> str:
         timing: from `Timing.summary`.
     """
     late, later = (1e3 * x for x in timing["latency_p50_p99_s"])
-    return (
+    line = (
         f"{timing['exchanges']} exchanges at {timing['rate_hz']:.4g} Hz, {timing['missed']} lost; "
         f"latency {late:.3g} ms, 99 % within {later:.3g} ms; jitter {1e3 * timing['jitter_s']:.3g} "
         "ms"
     )
+    counts = {"skipped": "frames skipped", "withheld": "forces withheld at a frozen position"}
+    return "; ".join([line, *(f"{timing[key]} {x}" for key, x in counts.items() if timing[key])])
 
 
 def deliver_loops(

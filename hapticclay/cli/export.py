@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -35,7 +36,7 @@ class ExportCommand:
             bound = "must be given, as in --format csv or --out cut.csv"
             raise ParameterError("format", "", bound)
         record = console.load_record(self.record)
-        folder = self.record if self.record.is_dir() else self.record.parent
+        folder = self.record if os.path.isdir(self.record) else self.record.parent
         out = self.out or folder / f"record.{self.format}"
         print(f"written to {record.export(out, self.format)}")
         return 0

@@ -71,7 +71,7 @@ def _value_in_words(value: Any) -> str:
     if value is UNSET:
         return "(to be given)"
     if isinstance(value, tuple):
-        return ",".join(map(_value_in_words, value))
+        return ",".join(map(_value_in_words, value)) or "none"
     return f"{value:g}" if isinstance(value, float) else str(value).lower()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -57,7 +58,7 @@ class FitCommand:
         from ..views.fit_plots import fit_plot
 
         writable(self.out)
-        recorded = self.source.is_dir() or self.source.suffix == ".npz"
+        recorded = os.path.isdir(self.source) or self.source.suffix == ".npz"
         if self.source.suffix == ".toml":
             bound = "must be a CSV file or a record, not a scenario: run it first"
             raise ParameterError("source", str(self.source), bound)

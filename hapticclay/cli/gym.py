@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import tyro
 
-from ..errors import ParameterError, integer, number
-from .console import text_table
+from ..errors import integer
+from .console import progress_bar, text_table
+from .unused import Unused
+
+SEEDS, EPISODES, NOISE = 100, 100, 0.1  # where none is given
 
 
 @dataclass(frozen=True)
@@ -17,14 +20,14 @@ class GymCommand:
 
     `gym baselines` prints the mean return of each policy that does not learn. `gym dataset` records
     episodes of the best policy among them that uses only what an agent observes, with noise on its
-    actions.
+    actions. After an interruption the same command continues with the episodes that are missing.
 
     Attributes:
         action: baselines or dataset.
         env: CutLine-v0, PareEdge-v0, AdaptiveGain-v0 or ProbeClay-v0.
-        seeds: Episodes of each baseline, 2 to 100000.
-        episodes: Episodes of a data set, 1 to 100000.
-        noise: Standard deviation added to the actions of a data set, 0 to 1.
+        seeds: Episodes of each baseline, 2 to 100000; 100 by default.
+        episodes: Episodes of a data set, 1 to 100000; 100 by default.
+        noise: Standard deviation added to the actions of a data set, 0 to 1; 0.1 by default.
         name: Name of the data set; by default hapticclay/ENV/baseline-v0.
         engine: auto, python or native.
     """
@@ -34,37 +37,62 @@ class GymCommand:
         Literal["CutLine-v0", "PareEdge-v0", "AdaptiveGain-v0", "ProbeClay-v0"],
         tyro.conf.Positional,
     ] = "CutLine-v0"
-    seeds: int = 100
-    episodes: int = 100
-    noise: float = 0.1
+    seeds: int | None = None
+    episodes: int | None = None
+    noise: float | None = None
     name: str | None = None
     engine: Literal["auto", "python", "native"] = "auto"
 
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("seeds",), "is for baselines: say gym baselines", ("action=dataset",)),
+        Unused(
+            ("episodes", "noise", "name"),
+            "is for a data set: say gym dataset",
+            ("action=baselines",),
+        ),
+    )
+
     def __call__(self) -> int:
-        integer("seeds", self.seeds, 2, 100_000)
-        integer("episodes", self.episodes, 1, 100_000)
-        number("noise", self.noise, 0.0, 1.0)
         return self._dataset() if self.action == "dataset" else self._baselines()
 
     def _baselines(self) -> int:
-        from ..gym import baselines
+        from ..gym import baselines, scores
 
-        if self.name is not None:
-            raise ParameterError("name", self.name, "is for a data set: say gym dataset")
-        rows = []
+        seeds = integer("seeds", SEEDS if self.seeds is None else self.seeds, 2, 100_000)
+        rows, means = [], {}
         for name, maker in baselines.BASELINES[self.env].items():
-            found = baselines.returns(self.env, maker, range(self.seeds), engine=self.engine)
-            mean, half = baselines.mean_of(found.total)
-            rows.append([name, f"{mean:.2f}", f"{half:.2f}", f"{found.length.mean():.0f}"])
-        columns = ("policy", "return", "95 % interval +-", "periods")
-        print(text_table(rows, columns, "lrrr"))
+            found = baselines.returns(self.env, maker, range(seeds), engine=self.engine)
+            means[name], half = baselines.mean_of(found.total)
+            rows.append([name, f"{means[name]:.2f}", f"{half:.2f}", f"{found.length.mean():.0f}"])
+        columns = ["policy", "return", "95 % interval +-", "periods"]
+        if score := scores.scores_of(self.env, means):
+            columns.append("score")
+            rows = [[*row, f"{score[row[0]]:.2f}"] for row in rows]
+        print(text_table(rows, columns, "lrrrr"[: len(columns)]))
         return 0
 
     def _dataset(self) -> int:
         from ..gym import dataset
 
+        episodes = EPISODES if self.episodes is None else self.episodes
+        noise = NOISE if self.noise is None else self.noise
         stem = self.env.partition("-")[0].lower()
-        name = self.name or f"hapticclay/{stem}/baseline-v0"
-        made = dataset.record(self.env, name, self.episodes, self.noise, engine=self.engine)
+        name = f"hapticclay/{stem}/baseline-v0" if self.name is None else self.name
+        kept = [0]
+        with progress_bar(total=episodes, desc="episodes") as bar:
+
+            def show(count: int) -> None:
+                kept[0] = count
+                bar.update(count - bar.n)
+
+            try:
+                made = dataset.record(
+                    self.env, name, episodes, noise, engine=self.engine, progress=show
+                )
+            except KeyboardInterrupt:
+                if kept[0]:
+                    told = f"{kept[0]} of {episodes} episodes are kept"
+                    print(f"{told}; the same command continues the recording")
+                raise
         print(f"{name}: {made.total_episodes} episodes, {made.total_steps} steps")
         return 0

@@ -22,6 +22,7 @@ QUICK_SIGNALS: dict[str, dict[str, Any]] = {  # period [s], band [Hz]
     "S": {"periods": 1, "lines": 20, "period": 2.5, "band": (0.3, 20.0)},
     "Th": {"periods": 1, "lines": 20, "period": 5.0, "band": (0.15, 3.0)},
 }
+NUMBERS = ("printed", "fitted", "95 % interval", "error")  # columns of the table
 SPACING, QUICK_SPACING = 0.08, 0.2  # of the map's poses [m]
 SIMULATED_ONLY = ("noise", "map", "quick", "seed", "control")
 MEASURED_ONLY = ("what", "columns", "band", "held", "paper")
@@ -29,12 +30,13 @@ MEASURED_ONLY = ("what", "columns", "band", "held", "paper")
 
 @dataclass(frozen=True)
 class IdentifyCommand:
-    """Identify G, Sh and Th on the simulated arm (Figs. 4, 5, 6); takes half a minute.
+    """Identify G, Sh and Th on the simulated arm (Figs. 4, 5, 6); takes a minute.
 
     With --csv, identify one of them from measured columns in SI units.
 
     Attributes:
-        out: Folder for identify.json, fig4.png, fig5.png, fig6.png and map.png.
+        out: Folder for identify.json, fig4.png, fig5.png, fig6.png and map.png; with --csv for
+            identify.json and identify.png.
         axis: Axis to identify. With --csv, the axis of the printed equation to compare with, by
             default x.
         noise: Add sensor noise: encoders with 65536 counts per turn, a force sensor with 0.02 N
@@ -153,7 +155,7 @@ class IdentifyCommand:
         console.save_json(data, self.out / "identify.json")
         beside = self.paper or not self.csv
         figures = {
-            block.figure: Figure(
+            "identify" if self.csv else block.figure: Figure(
                 partial(identification_plots.identification_plot, same, beside),
                 partial(response_tables, same, beside),
             )
@@ -213,13 +215,22 @@ def coefficient_table(results: Sequence[Identified], paper: bool = True) -> str:
     ]
     head = ["", "axis", "coefficient", "printed", "fitted", "95 % interval", "error"]
     if not paper:
-        kept = [i for i, name in enumerate(head) if name not in ("printed", "error")]
+        kept = [i for i, name in enumerate(head) if name not in ("axis", "printed", "error")]
         rows, head = [[row[i] for i in kept] for row in rows], [head[i] for i in kept]
     low = min(float(r.coherence.min()) for r in results)
-    counts = ", ".join(f"{r.what}{r.axis} {len(r.frequency)}" for r in results)
-    table = console.text_table(rows, head, "lllrrrr"[: len(head)])
+    counts = ", ".join(f"{r.what}{r.axis if paper else ''} {len(r.frequency)}" for r in results)
+    table = console.text_table(rows, head, "".join("r" if x in NUMBERS else "l" for x in head))
     way = "".join(f"; {r.source}: {r.estimate}" for r in results if r.scenario is None)
-    return f"{table}\nlines: {counts}; lowest coherence {low:.6f}{way}"
+    lines = [table, f"lines: {counts}; lowest coherence {low:.6f}{way}"]
+    for r in results:
+        if r.scenario is None and r.what == "S":
+            mass, damper, spring = r.device
+            lines.append(
+                f"as a device: mass {mass:.5g} kg, damper {damper:.5g} N.s/m, "
+                f"spring {spring:.5g} N/m"
+            )
+        lines += [f"warning: {x}" for x in r.warnings]
+    return "\n".join(lines)
 
 
 def drift_table(found: Drift) -> str:

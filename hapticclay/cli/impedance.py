@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -105,6 +106,9 @@ class ImpedanceCommand:
         name = self.source or "constant"
         if file:
             scenario = Scenario.load(file)
+        elif Path(name).exists() or os.sep in name:
+            bound = "must be a file of a wall or a scenario, .toml or .json, or an experiment"
+            raise ParameterError("file", name, bound)
         else:
             scenario = SCENARIOS[choice("experiment", name, tuple(EXPERIMENTS))]()
         loop = PushedLoop.of(scenario, self.axis or AXES[0], self.b)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,7 +29,7 @@ class InfoCommand:
 
     def __call__(self) -> int:
         record = console.load_record(self.record)
-        file = self.record / "record.npz" if self.record.is_dir() else self.record
+        file = self.record / "record.npz" if os.path.isdir(self.record) else self.record
         print(record_text(record, file.stat().st_size))
         return 0
 
@@ -43,6 +44,7 @@ def record_text(record: Record, size: int) -> str:
     import numpy as np
 
     from ..scene.text import scenario_rows
+    from ..simulation.engines import made_by
     from ..simulation.record import RECORD_SCHEMA
 
     r, n = record, len(record.t)
@@ -62,6 +64,7 @@ def record_text(record: Record, size: int) -> str:
     now = versions()["hapticclay"]
     if r.versions.get("hapticclay") != now:
         rows.append(("read by", f"hapticclay {now}"))
+    rows.append(("runs here", f"made by {made_by()}"))
     width = max(len(name) for name, _ in rows)
     lines += [f"{name:{width}}  {value}" for name, value in rows]
     return printable("\n".join([*lines, "", array_table(r)]))

@@ -31,10 +31,11 @@ class MBKCommand:
         source: File of a wall, .toml or .json; options override it.
         arm: Axis of the arm, instead of a bare device. --Ts none is continuous time; the default
             hand is Th (Eq. 19).
-        box: Hands at the arm: least and largest mass, damper, spring; by default 0.1 1 1 10 0 300.
+        box: Hands at the arm: least and largest mass [kg, kg], damper [N.s/m, N.s/m], spring
+            [N/m, N/m]; by default 0.1 1 1 10 0 300.
         columns: Number of columns of a plane, or of dampers of the arm, at which runs search for
-            the border, 1 to 100.
-        quick: Draw lines with fewer points, and runs at two columns only.
+            the border, 1 to 100; by default 5, or 2 with --quick.
+        quick: Draw lines with fewer points.
         out: Folder for mbk.json and the figures.
         wall: The device and its sampling, and the K, B and M that are constant in a plane: by
             default 1000 N/m, 2 N.s/m and 0, on a device with a damper of 0.5 N.s/m.
@@ -44,7 +45,7 @@ class MBKCommand:
     source: Annotated[Path | None, tyro.conf.Positional] = None
     arm: Literal["x", "y"] | None = None
     box: walls.HandEnds | None = None
-    columns: int = 5
+    columns: int | None = None
     quick: bool = False
     out: Path = Path("out/mbk")
     wall: walls.WallOptions = walls.WallOptions()
@@ -52,8 +53,8 @@ class MBKCommand:
 
     def __call__(self) -> int:
         writable(self.out)
-        integer("columns", self.columns, 1, 100)
-        columns = min(self.columns, 2) if self.quick else self.columns
+        columns = (2 if self.quick else 5) if self.columns is None else self.columns
+        integer("columns", columns, 1, 100)
         if self.arm:
             return self._arm(columns)
         if self.box:

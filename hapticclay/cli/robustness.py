@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from ..errors import integer
+from ..errors import ParameterError, integer
 from ..files import versions, writable
 from . import console
 
@@ -32,15 +32,15 @@ class RobustnessCommand:
 
     Attributes:
         axis: Axis of the loop.
-        b: Damping of the clay [N.s/m], if the grid does not vary it.
-        gain: K of the compensator, if nothing varies it.
+        b: Damping of the clay [N.s/m], by default 90; refused where something varies it.
+        gain: K of the compensator [1/kg], by default 1 on x and 0.5 on y; refused likewise.
         Ts: Control sample [s]; None for continuous time.
         delay: Latency from a measurement to the torque computed from it [s], with --Ts.
         inertia_shaping: Let the servo shape the inertia, so that Sh is the same at every pose.
         hands: Name of a population; hapticclay robustness --list prints them.
         variation: Draw log-normal hands around the median hand of the population, with this ratio
             of standard deviation to mean. The spread is then an assumption.
-        vary: What else varies, as in "delay=uniform:0:1e-3 pose.x=normal:0:0.02"; the laws are
+        vary: What else varies, as in "delay=uniform:0:1ms pose.x=normal:0:2cm"; the laws are
             normal and log-normal (mean, standard deviation), uniform and log-uniform (low, high).
         grid: One or two parameters with their values, as in "K=1:8:15 b=10:1000:11log"; "" for
             none.
@@ -55,7 +55,7 @@ class RobustnessCommand:
     """
 
     axis: Literal["x", "y"] = "x"
-    b: float = 90.0
+    b: float | None = None
     gain: float | None = None
     Ts: float | None = None
     delay: float = 0.0
@@ -120,16 +120,21 @@ class RobustnessCommand:
         return 0
 
     def _trials(self) -> Trials:
-        from ..model.constants import AXES, GAIN
+        from ..model.constants import AXES, B_CONSTANT, GAIN
+        from ..scene.fields import field_unit
+        from ..scene.scenario import Scenario
         from ..studies.boundary import PushedLoop
         from ..studies.distribution import parse_laws
         from ..studies.population import Hands, hands_of
-        from ..studies.sampling import parse_grid
+        from ..studies.sampling import grid_in_units
         from ..studies.trials import Trials
+
+        def unit_of(name: str) -> str:
+            return field_unit(name, PushedLoop, Scenario)
 
         base: PushedLoop = PushedLoop(
             self.axis,
-            b=self.b,
+            b=B_CONSTANT if self.b is None else self.b,
             K=GAIN[AXES.index(self.axis)] if self.gain is None else self.gain,
             operator=None,
             Ts=self.Ts,
@@ -141,11 +146,17 @@ class RobustnessCommand:
             source = f"{hands.source}: the mean alone" if hands.source else ""
             hands = Hands.around(hands.median, self.variation, source=source)
         grid = GRIDS[self.axis] if self.grid is None else self.grid
+        laws, cells = parse_laws(self.vary, unit_of), grid_in_units(grid, unit_of) if grid else {}
+        options = {"b": self.b, "gain": self.gain, "Ts": self.Ts, "delay": self.delay or None}
+        for name, value in options.items():
+            if value is not None and {**laws, **cells}.get({"gain": "K"}.get(name, name)):
+                how = "--vary" if self.vary and name in laws else "--grid"
+                raise ParameterError(name, value, f"is varied by {how}: leave it out of one")
         return Trials(
             base,
-            parse_laws(self.vary),
+            laws,
             hands,
-            parse_grid(grid) if grid else {},
+            cells,
             self.runs,
             seed=self.seed,
             chunk=self.chunk,

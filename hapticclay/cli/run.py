@@ -7,13 +7,14 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import tyro
 
 from ..files import writable
 from ..model.constants import AXES
 from . import console
+from .unused import Unused, undrawn
 
 if TYPE_CHECKING:
     from ..model.clay import Clay
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 EVERYWHERE = (-math.inf, -math.inf), (math.inf, math.inf)  # corners of all clay [m]
 MOST_CLAYS = 33  # dampings whose gain limits are computed
 MOST_ROWS = 6  # of a kind that the table shows
+CHOSEN = "is chosen by --error: leave it out"
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,13 @@ class RunCommand:
     error: str | None = None
     plots: bool = True
     figures: console.FigureOptions = console.FigureOptions()
+
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("integrator",), CHOSEN, ("error",)),
+        Unused(("dt",), CHOSEN, ("error",), ("control=sampled",)),
+        Unused(("dt",), CHOSEN, ("error", "Ts")),
+        *undrawn("no-plots"),
+    )
 
     def __call__(self) -> int:
         out = self.out or console.default_folder("run", self.scenario)
@@ -114,13 +123,16 @@ def simulate_with_progress(
         return simulate(scenario, every=every, progress=progress, error=error)
 
 
-def deliver(record: Record, folder: Path, figures: console.FigureOptions | None) -> None:
+def deliver(
+    record: Record, folder: Path, figures: console.FigureOptions | None, paced: bool = False
+) -> None:
     """Writes a record and its plots, prints its table, and removes plots of an earlier record.
 
     Args:
         record: the run.
         folder: where to write.
         figures: how to write the plots; None for no plots.
+        paced: whether a clock or another program set the pace of the run.
 
     Raises:
         ParameterError: a file cannot be written.
@@ -137,15 +149,16 @@ def deliver(record: Record, folder: Path, figures: console.FigureOptions | None)
             for path in run_figures.figure_files(folder) - kept if earlier else ():
                 path.unlink(missing_ok=True)
     finally:  # a full disk must not hide the results
-        print(run_table(record))
+        print(run_table(record, paced))
     print(f"written to {folder}")
 
 
-def run_table(record: Record) -> str:
+def run_table(record: Record, paced: bool = False) -> str:
     """What happened in a run, for a terminal.
 
     Args:
         record: the run.
+        paced: whether a clock or another program set the pace of the run.
     """
     from ..model.signals import Multisine
 
@@ -173,9 +186,19 @@ def run_table(record: Record) -> str:
         lines.append(f"error: {record.error}")
         if record.error.note:
             lines.append(f"why: {record.error.note}")
-    speed = record.t[-1] / record.wall_time if len(record.t) and record.wall_time else 0.0
-    lines.append(f"{record.steps} steps in {record.wall_time:.2f} s, {speed:.0f} times real time")
+    lines += _energy_lines(record)
+    lines.append(_pace_line(record, paced))
     return "\n".join(lines)
+
+
+def _pace_line(record: Record, paced: bool) -> str:
+    """How long the steps took; a run that waits for a clock has no speed of its own."""
+    end = float(record.t[-1]) if len(record.t) else 0.0
+    if paced:
+        share = f" of {end:.4g} s simulated" if end else ""
+        return f"{record.steps} steps; computing took {record.wall_time:.2f} s{share}"
+    speed = end / record.wall_time if record.wall_time else 0.0
+    return f"{record.steps} steps in {record.wall_time:.2f} s, {speed:.0f} times real time"
 
 
 def _crossing_lines(record: Record) -> list[str]:
@@ -186,6 +209,14 @@ def _crossing_lines(record: Record) -> list[str]:
     if len(record.crossings) > MOST_ROWS:
         lines.append(f"... and {len(record.crossings) - MOST_ROWS} more crossings")
     return lines
+
+
+def _energy_lines(record: Record) -> list[str]:
+    through = record.energy.get("throughput", 0.0)
+    if not through:
+        return []
+    share = abs(record.energy["residual"]) / through
+    return [f"energy: balanced within {share:.1e} of {through:.4g} J"]
 
 
 def _stop_lines(record: Record) -> list[str]:

@@ -6,12 +6,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-from ..errors import ParameterError, choice
+from ..errors import ParameterError, choice, number_in
 from ..files import versions, writable
 from ..model.constants import AXES, B_CONSTANT, C_DEN, C_NUM, GAIN, TS, SecondOrder
 from . import console
+from .unused import FIGURE_WORDS, Unused
 
 if TYPE_CHECKING:
     from ..model.controller import Servo
@@ -43,14 +44,15 @@ class StabilityCommand:
     Attributes:
         axis: Axis of the loop.
         b: Damping of the clay [N.s/m]; by default 90, or 0 with --clay Fy=5.
-        gain: K of the compensator; by default 1 on x and 0.5 on y.
+        gain: K of the compensator [1/kg]; by default 1 on x and 0.5 on y.
         Ts: Control sample [s]; None for runs in continuous time.
         delay: Latency from a measurement to the torque computed from it [s].
         num: Numerator of the compensator, descending powers of s.
         den: Denominator of the compensator, descending powers of s.
-        G: Gain, damping and stiffness of the position loop G; by default as printed.
-        S: Gain, damping and stiffness of Sh; by default as printed. Without --inertia-shaping the
-            gain is that of the arm.
+        G: Gain [1/s^2], damping [1/s] and stiffness [1/s^2] of the position loop G; by default as
+            printed.
+        S: Gain [1/kg], damping [1/s] and stiffness [1/s^2] of Sh; by default as printed. Without
+            --inertia-shaping the gain is that of the arm.
         operator: Put the operator's arm Th (Eq. 19) in the loop.
         inertia_shaping: Let the servo of the runs shape the inertia, so that Sh is the same at
             every pose.
@@ -79,6 +81,11 @@ class StabilityCommand:
     out: Path = Path("out/stability")
     quick: bool = False
     figures: console.FigureOptions = console.FigureOptions()
+
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("quick", *FIGURE_WORDS), "is for a map: give --map too", (), ("map",)),
+        Unused(("quick", *FIGURE_WORDS), "is for a map: give another --map", ("map=none",)),
+    )
 
     def __call__(self) -> int:
         from ..model.compensator import Compensator
@@ -175,6 +182,7 @@ def clay_of(words: Sequence[str], b: float | None = None) -> Flow:
     """
     from ..model.flow import Flow
     from ..model.materials import material
+    from ..scene.fields import field_unit
 
     text = " ".join(words)
     if not text.strip():
@@ -192,7 +200,9 @@ def clay_of(words: Sequence[str], b: float | None = None) -> Flow:
         if choice("clay", name, ("Fy", "K", "n", "b")) in found:
             raise ParameterError(f"clay {name}", value, "must be given once, here or as --b")
         try:
-            found[name] = float(value)
+            found[name] = number_in(f"clay {name}", value, field_unit(name, Flow))
+        except ParameterError:  # of a unit
+            raise
         except ValueError:
             raise ParameterError(f"clay {name}", value, "must be a number") from None
     if "n" in found and not found.get("K"):
@@ -351,11 +361,10 @@ def verdicts(loop: PushedLoop, delay: float = 0.0) -> list[dict[str, Any]]:
         small = stability_margins.small_gain(linear, equation=equation)
         judge(f"small gain, Eq. {equation}", small, "right over left side")
     judge("passive: stable with every hand", loop_passivity.passivity(linear), "least Re Z [N.s/m]")
-    judge(
-        "held clay passive with this hand",
-        loop_passivity.clay_passivity(loop.b, Ts, loop.hand.damper),
-        "N.s/m to spare",
-    )
+    for late in (0.0, delay) if delay else (0.0,):
+        clay = loop_passivity.clay_passivity(loop.b, Ts, loop.hand.damper, delay=late)
+        question = f"... {1e3 * late:g} ms late" if late else "held clay passive with this hand"
+        judge(question, clay, "N.s/m to spare")
     transparency = stability_margins.transparency(linear, np.array([ONE_HZ]))[0]
     response("transparency |fe/fh| at 1 Hz", float(abs(transparency)), "1 at best", ONE_HZ)
     return rows

@@ -10,12 +10,13 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import tyro
 
 from ..errors import ParameterError, integer
 from . import console
+from .unused import Unused, undrawn
 
 if TYPE_CHECKING:
     from ..studies.sampling import Sweep
@@ -26,6 +27,7 @@ STATUS_LINE = (
 )
 STATUS_EVERY = 0.1, 60.0  # share of the runs, and time [s], between two of these lines
 MAPPED = ("status", "fe_over_v_x", "speed_x", "end_time")  # columns that are drawn
+SAMPLED = "design=lhs", "design=sobol"
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class SweepCommand:
         runs: Number of runs of a Latin hypercube or Sobol sequence.
         seed: Seed of the sample.
         chunk: Runs per file, which is the most that a killed process loses; by default as many as
-            take 1.5 s.
+            take 1.5 s, or 5 % of the time spent so far.
         out: Folder for sweep.json, data/ and the maps.
         workers: Processes on this machine; by default one per core.
         scheduler: Address of a dask scheduler to run on instead, as in tcp://10.0.0.1:8786.
@@ -70,6 +72,17 @@ class SweepCommand:
     maps: bool = True
     figures: console.FigureOptions = console.FigureOptions()
 
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(
+            ("grid", "fixed", "experiment", "design", "runs", "seed", "chunk"),
+            "must stand in the SPEC.toml, where one is given",
+            ("spec",),
+        ),
+        Unused(("seed",), "is of a sample: give --design lhs or sobol", (), ("spec", *SAMPLED)),
+        Unused(("workers",), "is for this machine: leave it out with --scheduler", ("scheduler",)),
+        *undrawn("no-maps"),
+    )
+
     def __call__(self) -> int:
         from ..studies import sweep_store
 
@@ -81,7 +94,7 @@ class SweepCommand:
                 self._make(plan, todo)
             except KeyboardInterrupt:
                 missing = sweep_store.missing_parts(plan, self.out)
-                here = len(plan) - sum(len(plan.chunk_runs(n)) for n in missing)
+                here = len(plan) - sum(map(len, missing))
                 print(
                     f"{here} of {len(plan)} runs are in {self.out / 'data'}; "
                     "the same command resumes the sweep"
@@ -95,10 +108,10 @@ class SweepCommand:
             self._draw(table)
         return 0
 
-    def _make(self, plan: Sweep, todo: list[int]) -> None:
+    def _make(self, plan: Sweep, todo: list[range]) -> None:
         from ..studies import sweep
 
-        left = sum(len(plan.chunk_runs(n)) for n in todo)
+        left = sum(map(len, todo))
         if left >= LARGE_SWEEP:
             self._estimate(plan, left, todo)
         chunks = sweep.run_chunks(plan, self.out, todo, self.workers, self.scheduler)
@@ -126,7 +139,7 @@ class SweepCommand:
             read_settings(self.experiment) if file else {},
         )
 
-    def _estimate(self, plan: Sweep, left: int, todo: list[int]) -> None:
+    def _estimate(self, plan: Sweep, left: int, todo: list[range]) -> None:
         """Prints the time and room on disk that the runs left will take."""
         import shutil
 
@@ -135,7 +148,7 @@ class SweepCommand:
         from ..studies import sweep
 
         seconds, size = sweep.estimate_time(plan)
-        crew = 1 if self.scheduler else sweep.processes(todo, self.workers)
+        crew = 1 if self.scheduler else sweep.processes(plan, todo, self.workers)
         span = tqdm.format_interval(seconds * left / crew)
         free, room = shutil.disk_usage(self.out).free, size * left
         print(

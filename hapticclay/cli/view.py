@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import tyro
 
@@ -16,6 +16,7 @@ from ..files import writable
 from . import console
 from .device_options import DeviceOptions
 from .run import deliver
+from .unused import FIGURE_WORDS, Unused, undrawn
 
 if TYPE_CHECKING:
     from ..simulation.record import Record
@@ -37,6 +38,9 @@ def tool_size(name: str) -> Callable[[], float]:
         return getattr(TOOL, name)
 
     return size
+
+
+HAND, SERVER = ("device",), ("device-server",)
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,21 @@ class ViewCommand:
     devices: DeviceOptions = DeviceOptions()
     stream: str | None = None
 
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("force", "muscle", "length", "t-max"), "does not apply to a session: leave it out"),
+        Unused(
+            ("stiffness", "every", "out", "plots", "no-plots", "host", "port", *FIGURE_WORDS),
+            "is for sessions: leave it out with a record",
+            ("scenario=record",),
+        ),
+        Unused(("host", "port"), "is of the page: give --web too", (), ("web",)),
+        Unused(("device-port",), "is of the server: give --device-server too", (), SERVER),
+        Unused(("device-rate", "coupling"), "is of your device: give --device too", (), HAND),
+        Unused(("device-plane", "device-force"), "is of a device: give one too", (), HAND + SERVER),
+        Unused(("stiffness",), "is of the hand at the mouse: your device is the hand", HAND),
+        *undrawn("no-plots"),
+    )
+
     def __call__(self) -> int:
         from ..simulation.record import Record
         from ..studies.removal import Tool
@@ -98,7 +117,7 @@ class ViewCommand:
         record = session.record()
         out = self.out or console.default_folder("view", record.scenario)
         figures = self.figures if self.plots else None
-        deliver(record, out, figures)
+        deliver(record, out, figures, paced=True)
         self.devices.deliver(session, out, figures)
         return 0
 
@@ -166,7 +185,8 @@ def replay(record: Record, tool: Tool, stream: str | None = None) -> None:
 
 
 def _serve_page(session: Session, host: str, port: int, until: Callable[[], bool]) -> None:
-    from ..views.page import LOCAL, Page
+    from ..ports.guard import LOCAL
+    from ..views.page import Page
 
     page = Page(session, host, port)
     if host not in LOCAL:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import difflib
 import functools
 import itertools
 import math
 import os
 import re
+import sys
 import types
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -17,13 +17,21 @@ from typing import Any, Literal, NamedTuple, Union, get_args, get_origin, get_ty
 
 import tyro
 
-from ..errors import ParameterError, choice, quantity
+from ..errors import ParameterError, choice, nearest, quantity
 from ..units import is_quantity
 from .commands import COMMANDS, load_command
 from .console import scenario_words
+from .unused import Unused, refuse_unused
 
 PATHS = ("file", "record")  # words behind a command before the path of a scenario or a record
 HELP = ("-h", "--help")
+OF_SAMPLING = (
+    Unused(
+        ("render",),
+        "is of sampled control: give --control sampled too",
+        without=("control=sampled", "scenario=file"),
+    ),
+)
 KINDS: dict[Any, str] = {float: "number", int: "whole number"}
 
 
@@ -68,14 +76,23 @@ def ordered(words: Sequence[str]) -> list[str]:
         return [command, word, *rest]
     if is_scenario_file(word):
         return [command, "file", word, *rest]
-    if recorded and (os.sep in word or Path(word).exists()) and word not in EXPERIMENTS:
+    if recorded and _is_record(word) and word not in EXPERIMENTS:
         return [command, "record", word, *rest]
     try:
         return [command, choice("experiment", word, tuple(EXPERIMENTS)), *rest]
     except ParameterError as error:
-        more = " (or give a scenario file, .toml or .json"
-        more += ", or the folder of a record)" if recorded else ")"
-        raise ParameterError(error.field, error.value, error.bound + more) from None
+        kinds = "a scenario file, .toml or .json"
+        kinds += ", or the folder of a record" if recorded else ""
+        if os.sep in word or Path(word).exists():  # a file of another kind, no misspelt name
+            name = "file" if Path(word).is_file() else "path"
+            raise ParameterError(name, word, f"must be {kinds}, or an experiment") from None
+        raise ParameterError(error.field, error.value, f"{error.bound} (or give {kinds})") from None
+
+
+def _is_record(word: str) -> bool:
+    """Whether a word is the path of a record: a folder, or an .npz file, there or not."""
+    suffix = Path(word).suffix.lower()
+    return os.path.isdir(word) or suffix == ".npz" or (os.sep in word and not suffix)
 
 
 def _positional(
@@ -99,7 +116,10 @@ def _positional(
 
 
 def with_units(words: Sequence[str]) -> list[str]:
-    """The words of a command line, those with a unit as numbers in the unit of their option.
+    """The words of a command line, values as the options' types take them.
+
+    A number with a unit becomes a number in the unit of its option, "none" the None of an option
+    that may have no value, and one number for a pair of an experiment, as for --set, two.
 
     Args:
         words: the command line, ordered.
@@ -107,23 +127,66 @@ def with_units(words: Sequence[str]) -> list[str]:
     Raises:
         ParameterError: a unit is unknown, or of another kind than the option's.
     """
-    numbers = any(is_quantity(word.rpartition("=")[2]) for word in words)
-    if not numbers or words[0] not in COMMANDS:
+    helping = not {*HELP}.isdisjoint(words)  # needs no values, nor what reads them
+    if helping or len(words) < 2 or words[0] not in COMMANDS:
         return list(words)
-    kinds, told, out = options(words), _option_units(words), []
-    name, place = "", 0  # the option, and that of its values which comes next
-    for word in words:
-        head, equals, value = "", "", word
-        if _is_option(word):
-            head, equals, value = word.partition("=")
-            name, place = _plain(head), 0
-        if is_quantity(value) and float in _members(kinds.get(name)):
-            own = told.get(name, "").split(", ")
-            number = quantity(f"--{name}", value, own[min(place, len(own) - 1)])
-            word = f"{head}{equals}{number!r}"
-        place += not head or bool(equals)
-        out.append(word)
+    slots, told, pairs = _slots(words), _option_units(words), _experiment_options(words)
+    out, left = [words[0]], list(words[1:])
+    while left:
+        word = left.pop(0)
+        head, equals, value = word.partition("=")
+        if not _is_option(word) or _plain(head) not in slots:
+            out.append(word)
+            continue
+        name, kind = _plain(head), slots[_plain(head)].kind
+        given = [value] if equals else []
+        given += _values_of(left, _most(kind) - len(given))
+        taken = [
+            _value_in_unit(name, x, kind, _unit_at(told.get(name, ""), i))
+            for i, x in enumerate(given)
+        ]
+        if name in pairs and len(taken) == 1 and _is_pair(kind) and _is_number(taken[0], float):
+            taken *= 2
+        first = [f"{head}={taken[0]}", *taken[1:]] if equals else [head, *taken]
+        out += [head, *taken] if equals and len(taken) > 1 else first
     return out
+
+
+def _values_of(left: list[str], most: float) -> list[str]:
+    """Takes the values of an option off the words that are left."""
+    out: list[str] = []
+    while left and not _is_option(left[0]) and len(out) < most:
+        out.append(left.pop(0))
+    return out
+
+
+def _value_in_unit(name: str, value: str, kind: Any, unit: str) -> str:
+    members = _members(kind)
+    if type(None) in members and value.lower() == "none":
+        return "None" if str not in members and Path not in members else value
+    number = quantity(f"--{name}", value, unit) if float in members else None
+    return value if number is None else repr(number)
+
+
+def _unit_at(told: str, place: int) -> str:
+    """Unit of the value at a place, of those of an option; the last is that of all behind it."""
+    own = told.split(", ")
+    return own[min(place, len(own) - 1)]
+
+
+def _is_pair(kind: Any) -> bool:
+    """Whether a type is a pair of numbers."""
+    return any(get_args(k) == (float, float) for k in _members(kind))
+
+
+def _experiment_options(words: Sequence[str]) -> set[str]:
+    """Names of the options that are parameters of the experiment of a command line."""
+    from ..scene.experiments import EXPERIMENTS, parameters
+
+    known = "scenario" in _own_slots(load_command(words[0])) and words[1:2]
+    if not known or words[1] not in EXPERIMENTS:
+        return set()
+    return {_plain(name) for name in parameters(EXPERIMENTS[words[1]])}
 
 
 def _option_units(words: Sequence[str]) -> dict[str, str]:
@@ -136,8 +199,7 @@ def _option_units(words: Sequence[str]) -> dict[str, str]:
     out: dict[str, str] = {}
     for part in (*nested, kind):
         for name, about in field_descriptions(part).items():
-            found = re.search(r"\[([^]]*)\]", about)
-            out[name] = found[1] if found else ""
+            out[name] = ", ".join(re.findall(r"\[([^]]*)\]", about))
     if len(words) > 1 and words[1] in EXPERIMENTS:
         out |= {name: p.unit for name, p in parameters(EXPERIMENTS[words[1]]).items()}
     return {_plain(name): unit for name, unit in out.items()}
@@ -156,7 +218,7 @@ def sources(words: Sequence[str]) -> list[Path]:
     """
     pairs = itertools.pairwise(["", *words])
     named = [Path(word) for before, word in pairs if before not in ("--out", "--page")]
-    return [p for p in named if p.is_file() or (p / "record.npz").is_file()]
+    return [p for p in named if any(map(os.path.isfile, (p, p / "record.npz")))]
 
 
 class Slot(NamedTuple):
@@ -233,8 +295,10 @@ def check_words(words: Sequence[str]) -> None:
     slots, (path, *left) = _slots(words), words
     if path not in COMMANDS:
         raise _refused(f"{path}: no option of hapticclay; see hapticclay --help")
+    given: dict[str, list[str]] = {}
     if "scenario" in slots:
         path, left = _scenario_of(path, left)
+        given["scenario"] = list(words[1:2])
     loose: list[str] = []
     while left:
         word = left.pop(0)
@@ -242,14 +306,36 @@ def check_words(words: Sequence[str]) -> None:
             loose.append(word)
             continue
         head, equals, value = word.partition("=")
-        if _plain(head) not in _option_names(slots):
+        name = _plain(head)
+        if name not in _option_names(slots) or not head.startswith("--"):
             raise _unknown(head, path, slots)
-        slot = slots.get(_plain(head), Slot(bool))  # as --no-plots
-        given = [value] if equals else []
-        while left and not _is_option(left[0]) and len(given) < _most(slot.kind):
-            given.append(left.pop(0))
-        _check_option(f"--{_plain(head)}", given, slot.kind)
-    _check_loose(loose, path, slots)
+        slot = slots.get(name, Slot(bool))  # as --no-plots
+        values = [value] if equals else []
+        values += _values_of(left, _most(slot.kind) - len(values))
+        _check_option(f"--{name}", values, slot.kind)
+        _note(name, values, given)
+    given |= _check_loose(loose, path, slots)
+    rules = getattr(load_command(words[0]), "unused", ())
+    refuse_unused((*rules, *OF_SAMPLING), _with_fields(given))
+
+
+def _note(name: str, values: list[str], given: dict[str, list[str]]) -> None:
+    """Notes what is given of an option, and says so where one given before no longer counts."""
+    for before in {name, name.removeprefix("no-"), f"no-{name}"} if name != "set" else ():
+        if given.pop(before, None) is not None:
+            both = "twice" if before == name else f"beside --{before}"
+            print(f"hapticclay: --{name} is given {both}: the last counts", file=sys.stderr)
+    given[name] = given.get(name, []) + values
+
+
+def _with_fields(given: dict[str, list[str]]) -> dict[str, list[str]]:
+    """What is given, with the fields behind --set; refuses a field that an option gives too."""
+    words = (word.partition("=") for word in given.get("set", ()))
+    fields = {_plain(name.strip()): [value] for name, _, value in words}
+    for name in fields:
+        if name in given:
+            raise _refused(f"--{name}, --set {name}: give one once")
+    return fields | given
 
 
 def _scenario_of(command: str, left: list[str]) -> tuple[str, list[str]]:
@@ -276,13 +362,14 @@ def _check_option(name: str, given: list[str], kind: Any) -> None:
         kind = get_args(kind)[0]
         value = next((word for word in given if word not in get_args(kind)), "")
     names = [x for k in _members(kind) if get_origin(k) is Literal for x in get_args(k)]
-    near = difflib.get_close_matches(value, names, n=1)
+    near = nearest(value, names)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     raise ParameterError(name, value, f"must be {_meaning(kind)}{hint}")
 
 
-def _check_loose(loose: list[str], path: str, slots: dict[str, Slot]) -> None:
-    """Refuses words without a name that a command does not take, or lacks."""
+def _check_loose(loose: list[str], path: str, slots: dict[str, Slot]) -> dict[str, list[str]]:
+    """Words without a name, by that of what they are; refuses what a command does not take."""
+    out: dict[str, list[str]] = {}
     for name, (kind, named, needed) in slots.items():
         if named or name == "scenario":
             continue
@@ -292,8 +379,13 @@ def _check_loose(loose: list[str], path: str, slots: dict[str, Slot]) -> None:
             raise _refused(f"{path} needs {name}: {_meaning(kind)}")
         if given:
             _check_option(name, given, kind)
+            out[name] = given
     if loose:
-        raise _refused(f"unexpected argument {loose[0]!r} of {path}")
+        name, equals, value = loose[0].partition("=")
+        option = f"; did you mean --{_plain(name)} {value}?"
+        hint = option if equals and _plain(name) in _option_names(slots) else ""
+        raise _refused(f"unexpected argument {loose[0]!r} of {path}{hint}")
+    return out
 
 
 def _refused(text: str) -> ParameterError:
@@ -307,7 +399,7 @@ def _option_names(slots: dict[str, Slot]) -> list[str]:
 
 def _unknown(word: str, path: str, slots: dict[str, Slot]) -> ParameterError:
     """The error for an option that a command lacks."""
-    near = difflib.get_close_matches(_plain(word), _option_names(slots), n=1)
+    near = nearest(_plain(word), _option_names(slots))
     hint = f"; did you mean --{near[0]}?" if near else f"; see hapticclay {path} --help"
     return _refused(f"{word}: no option of {path}{hint}")
 
@@ -355,7 +447,7 @@ def _accepts(kind: Any, given: Sequence[str]) -> bool:
     if len(given) != 1:
         return False
     if kind is type(None):
-        return given[0] == "None"
+        return given[0].lower() == "none"
     if get_origin(kind) is Literal:
         return given[0] in get_args(kind)
     return kind not in KINDS or _is_number(given[0], kind)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import tyro
 
@@ -13,6 +14,7 @@ from ..errors import ParameterError
 from ..files import versions, writable
 from ..model.constants import GAIN, TS
 from . import console, walls
+from .unused import Unused
 
 if TYPE_CHECKING:
     from ..studies.wall_lines import Wall
@@ -33,14 +35,14 @@ class ZWidthCommand:
         B: Virtual dampings to try [N.s/m]; by default 0 and others up to the largest stable one.
         vary: A family: Ts, delay, quantum, damper, friction, mass, filter or window, then its
             values, as in --vary damper 0.2 0.5 1; on the arm Ts, delay or gain.
-        box: Hands for a second set of runs: least and largest mass, damper, spring, as in
-            --box 0 1 0 5 0 300.
+        box: Hands for a second set of runs: least and largest mass [kg, kg], damper [N.s/m, N.s/m],
+            spring [N/m, N/m], as in --box 0 1 0 5 0 300.
         force: Of the push that tries a loop which is not linear [N].
         speed: Of that push [m/s].
         still: Largest motion back and forth that counts as rest [m].
         arm: Axis of the arm with servo and compensator, in the place of a bare device: the plane is
             that of the clay's k and b.
-        gain: Of the compensator, with --arm; by default 1 on x and 0.5 on y.
+        gain: Of the compensator [1/kg], with --arm; by default 1 on x and 0.5 on y.
         out: Folder for zwidth.json and the figure.
         quick: Try fewer dampings.
         device: The device, its sampling and the hand.
@@ -60,6 +62,10 @@ class ZWidthCommand:
     quick: bool = False
     device: walls.DeviceOptions = walls.DeviceOptions()
     figures: console.FigureOptions = console.FigureOptions()
+
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("quick",), "tries fewer dampings: leave it out where --B gives them", ("B",)),
+    )
 
     def __call__(self) -> int:
         from ..scene.changes import with_fields
@@ -92,6 +98,9 @@ class ZWidthCommand:
             console.save_figures({"zwidth": figure}, self.out, self.figures)
         finally:  # a full disk must not hide the result
             print(zwidth_table(found))
+        if tried and all(r.linear for r in found.regions):
+            told = f"{', '.join(f'--{name}' for name in tried)} did not count: no push tries a loop"
+            print(f"hapticclay: {told} that is linear, its growth rate does", file=sys.stderr)
         print(f"written to {self.out}")
         return 0
 

@@ -22,6 +22,8 @@ from .registry import ENTRIES, NAMESPACE
 from .task import FORCE, Task
 
 MARGIN = 0.9  # theoretical gains are this share of the gain limit
+# Shares with the largest mean return, as `scores.search` found them; see docs/gym_scores.json.
+FIXED_SHARE, ORACLE_SHARE = 1.08, 0.84
 PD, PD_IN_GROOVE = (1.0, 0.1), (0.5, 0.3)  # [N/mm], [N/(cm/s)]
 PROBED = 150  # control periods after which the hand is identified
 Policy = Callable[[np.ndarray], np.ndarray]  # observations (n, m) -> actions (n, k)
@@ -91,48 +93,78 @@ def _towards(gains: np.ndarray) -> Policy:
     return act
 
 
-def oracle_gain(b: float, hand: Operator) -> float:
-    """MARGIN times the gain limit along x with this hand, at most the task's largest [1/kg].
+def oracle_gain(b: float, hand: Operator, share: float = MARGIN) -> float:
+    """A share of the gain limit along x with this hand, at most the task's largest gain [1/kg].
 
     Args:
         b: damping of the clay [N.s/m].
         hand: the hand.
+        share: the share.
     """
-    return min(MARGIN * gain_limit("x", b, hand), adaptive_gain.MOST)
+    return min(share * gain_limit("x", b, hand), adaptive_gain.MOST)
 
 
 @functools.cache
-def robust_gain(b: float) -> float:
-    """MARGIN times the least gain limit over the corners of the published hands [1/kg].
+def least_limit(b: float) -> float:
+    """The least gain limit along x over the corners of the published hands [1/kg].
 
     Args:
-        b: clay [N.s/m].
+        b: damping of the clay [N.s/m].
     """
     ends = ((HAND[name].low, HAND[name].high) for name in ("mass", "damper", "spring"))
-    return min(oracle_gain(b, Operator(*hand)) for hand in itertools.product(*ends))
+    return min(gain_limit("x", b, Operator(*hand)) for hand in itertools.product(*ends))
 
 
-def oracle(task: Task, truths: list[Truth], seed: int) -> Policy:
-    """The gain for the hand of the episode, which an agent does not observe.
-
-    Args:
-        task: the task.
-        truths: numbers drawn for each copy.
-        seed: not used.
-    """
-    hands = (Operator(t["mass"], t["damper"], t["spring"]) for t in truths)
-    return _towards(np.array([oracle_gain(t["b"], h) for t, h in zip(truths, hands, strict=True)]))
-
-
-def robust(task: Task, truths: list[Truth], seed: int) -> Policy:
-    """The best fixed gain for all hands: the gain for the worst one.
+def robust_gain(b: float, share: float = MARGIN) -> float:
+    """A share of `least_limit`, at most the task's largest gain [1/kg].
 
     Args:
-        task: the task.
-        truths: numbers drawn; only the clay is used.
-        seed: not used.
+        b: damping of the clay [N.s/m].
+        share: the share; up to 1 no published hand is unstable.
     """
-    return _towards(np.array([robust_gain(t["b"]) for t in truths]))
+    return min(share * least_limit(b), adaptive_gain.MOST)
+
+
+class Oracle(NamedTuple):
+    """Policy: a share of the gain limit of the hand of the episode, which an agent does not see.
+
+    Attributes:
+        share: the share.
+    """
+
+    share: float = MARGIN
+
+    def __call__(self, task: Task, truths: list[Truth], seed: int) -> Policy:
+        """The policy of these episodes.
+
+        Args:
+            task: the task.
+            truths: numbers drawn for each copy.
+            seed: not used.
+        """
+        hands = (Operator(t["mass"], t["damper"], t["spring"]) for t in truths)
+        drawn = zip(truths, hands, strict=True)
+        return _towards(np.array([oracle_gain(t["b"], hand, self.share) for t, hand in drawn]))
+
+
+class Fixed(NamedTuple):
+    """Policy: a fixed gain, the same for all hands: a share of the limit of the worst one.
+
+    Attributes:
+        share: the share.
+    """
+
+    share: float = MARGIN
+
+    def __call__(self, task: Task, truths: list[Truth], seed: int) -> Policy:
+        """The policy of these episodes.
+
+        Args:
+            task: the task.
+            truths: numbers drawn; only the clay is used.
+            seed: not used.
+        """
+        return _towards(np.array([robust_gain(t["b"], self.share) for t in truths]))
 
 
 def passivity_observer(task: Task, truths: list[Truth], seed: int) -> Policy:
@@ -258,8 +290,9 @@ BASELINES: dict[str, dict[str, Maker]] = {
     "CutLine-v0": {"random": at_random, "PD along the line": pd_along_line},
     "PareEdge-v0": {"random": at_random, "PD along the line": pd_along_line},
     "AdaptiveGain-v0": {
-        "random": at_random, "passivity observer": passivity_observer, "robust gain": robust,
-        "identify, then set": identify_then_set, "oracle": oracle,
+        "random": at_random, "passivity observer": passivity_observer, "robust gain": Fixed(),
+        "best fixed gain": Fixed(FIXED_SHARE), "identify, then set": identify_then_set,
+        "oracle": Oracle(), "best oracle": Oracle(ORACLE_SHARE),
     },
     "ProbeClay-v0": {"random": at_random, "least squares": least_squares},
 }  # fmt: skip

@@ -53,39 +53,50 @@ def with_ranges(ranges: Mapping[str, Range], given: Mapping[str, Any] | None) ->
     Raises:
         ParameterError: there is no such range, or its ends are refused.
     """
+    if given is not None and not isinstance(given, Mapping):
+        bound = (
+            "must be a dictionary of pairs [low, high] by name, as {'mass': [0.3, 0.4]}, or None"
+        )
+        raise ParameterError("ranges", given, bound)
     found = dict(ranges)
     for name, ends in (given or {}).items():
         r = found[choice("ranges", name, tuple(found))]
-        least = r.least
-        low, high = numbers_of(f"ranges.{name}", ends, ("low", "high"), least, r.most)
+        names = ("low", "high")
+        low, high = numbers_of(f"ranges.{name}", ends, names, r.least, r.most, unit=r.unit)
         if high < low:
             raise ParameterError(f"ranges.{name}", ends, "must not end below where it begins")
         found[name] = r._replace(low=low, high=high)
     return found
 
 
-def draw(
-    ranges: Mapping[str, Range], rng: np.random.Generator, given: Mapping[str, Any] | None
-) -> Truth:
-    """Draws the numbers of an episode.
-
-    All numbers are drawn, so that a given value does not change the others.
+def fixed_by(ranges: Mapping[str, Range], given: Mapping[str, Any]) -> Truth:
+    """The numbers of an episode that are given, not drawn.
 
     Args:
         ranges: by name.
-        rng: generator.
-        given: values to use instead of drawn ones, by name; None for none.
+        given: values by name; also texts with a unit, as "300 g".
 
     Raises:
         ParameterError: a name is unknown, or a value out of its bounds.
     """
     found = {}
-    for name, r in ranges.items():
-        found[name] = _spread(r, float(rng.random()))
-    for name, value in (given or {}).items():
+    for name, value in given.items():
         r = ranges[choice("options", name, tuple(ranges))]
         found[name] = number(f"options.{name}", value, r.least, r.most, unit=r.unit)
     return found
+
+
+def draw(ranges: Mapping[str, Range], rng: np.random.Generator, fixed: Truth) -> Truth:
+    """Draws the numbers of an episode.
+
+    All numbers are drawn, so that a fixed value does not change the others.
+
+    Args:
+        ranges: by name.
+        rng: generator.
+        fixed: values to use instead of drawn ones, as by `fixed_by`.
+    """
+    return {name: _spread(r, float(rng.random())) for name, r in ranges.items()} | fixed
 
 
 def _spread(r: Range, u: float) -> float:

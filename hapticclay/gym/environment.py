@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ParameterError, choice
+from ..errors import choice
 from ..simulation.engines import ENGINES
+from .draws import fixed_by
 from .episodes import Episode
+from .inputs import action_of, options_of, seed_of, task_of
 from .quantities import box_of
 from .task import DT, Task
+
+if TYPE_CHECKING:
+    from .picture import Picture
 
 FPS = 50
 MODES = ["human", "rgb_array"]
@@ -45,12 +50,13 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if render_mode is not None:
             choice("render_mode", render_mode, MODES)
         self.render_mode = render_mode
-        self.task = self.task_type(ranges, **options)
+        self.task = task_of(self.task_type, ranges, options, self)
         self._episode = Episode(self.task, choice("engine", engine, ENGINES))
         self.action_space = box_of(self.task.actions)
         self.observation_space = box_of(self.task.observations)
-        self._shape = self.action_space.shape
-        self._picture: Any = None
+        self._shape = (len(self.task.actions),)
+        self._picture: Picture | None = None
+        self._warned = False
         self._live = False
 
     def reset(
@@ -63,12 +69,17 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             options: values to use instead of drawn ones, by name.
 
         Raises:
-            ParameterError: a name is unknown, or a value out of its bounds.
+            ParameterError: the seed is refused, a name is unknown, or a value out of its bounds;
+                or the values make no scene, and there is no episode until the next reset.
         """
-        super().reset(seed=seed)
-        self._episode.reset(self.np_random, options)
+        fixed = fixed_by(self.task.ranges, options_of(options))
+        super().reset(seed=seed_of("seed", seed))
+        self._live = False
+        self._episode.reset(self.np_random, fixed)
         self._live = True
-        self._begin_picture()
+        if self.render_mode is not None:
+            self._shown_by().begin()
+            self._show()
         return self._episode.observe(), dict(self._episode.truth)
 
     def step(
@@ -77,20 +88,17 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Advances by one control period.
 
         Args:
-            action: action, clipped to the action space.
+            action: finite numbers, shape (k,), clipped to the action space.
 
         Raises:
-            ParameterError: the action has the wrong shape.
+            ParameterError: the action has another shape, or is not of finite real numbers.
             RuntimeError: the environment was not reset.
         """
         if not self._live:
             raise RuntimeError("reset the environment before its first step")
-        action = np.asarray(action)
-        if action.shape != self._shape:
-            bound = f"must have shape {self._shape}, has {action.shape}"
-            raise ParameterError("action", action, bound)
-        observation, reward, ended, info = self._episode.step(action.tolist())
-        if self._picture is not None:
+        numbers = action_of("action", action, self._shape)
+        observation, reward, ended, info = self._episode.step(numbers.tolist())
+        if self.render_mode is not None:
             self._show()
         return observation, reward, ended, False, self._episode.truth | info
 
@@ -103,21 +111,32 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise RuntimeError("reset the environment before it is drawn")
         return self._drawn() if self.render_mode == "rgb_array" else None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy or a pickle keeps: all but the picture, whose path starts anew in it."""
+        return self.__dict__ | {"_picture": None}
+
     def _drawn(self) -> Any:
         now = self._episode
-        return self._picture.drawn(now.truth, now.memory, now.handle)
+        return self._shown_by().drawn(now.truth, now.memory, now.handle)
 
-    def _begin_picture(self) -> None:
-        if self.render_mode is not None:
+    def _shown_by(self) -> Picture:
+        """The picture; a new one at the first reset, after `close` and in a copy."""
+        if self._picture is None:
             from .picture import Picture
 
-            self._picture = self._picture or Picture(self.task, self.render_mode == "human")
-            self._picture.begin()
-            self._show()
+            self._picture = Picture(self.task, self.render_mode == "human")
+            if self._picture.unseen and not self._warned:
+                shown = "render_mode='human' shows nothing here"
+                gymnasium.logger.warn(
+                    f"{shown}: {self._picture.unseen}; 'rgb_array' needs no display"
+                )
+                self._warned = True
+        return self._picture
 
     def _show(self) -> None:
-        self._picture.note(self._episode.handle.p)
-        if self.render_mode == "human":
+        picture = self._shown_by()
+        picture.note(self._episode.handle.p)
+        if self.render_mode == "human" and not picture.unseen:
             self._drawn()
 
     def close(self) -> None:

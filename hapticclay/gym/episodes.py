@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..simulation.simulation_batch import SimulationBatch
 from ..simulation.stepwise import COLUMNS, Simulation
-from .columns import columns_of, replaced, shown, value_of
+from .columns import bounded, columns_of, replaced, shown, value_of
 from .draws import Truth, draw
 from .task import Handle, Memory, Task
 
@@ -55,14 +55,14 @@ class Episode:
         self._run: Simulation | None = None
         self._gain: Any = None
 
-    def reset(self, rng: np.random.Generator, options: Mapping[str, Any] | None) -> None:
+    def reset(self, rng: np.random.Generator, fixed: Truth) -> None:
         """Starts an episode.
 
         Args:
             rng: generator.
-            options: values to use instead of drawn ones; None for none.
+            fixed: values to use instead of drawn ones, as by `draws.fixed_by`.
         """
-        self.truth = draw(self.task.ranges, rng, options)
+        self.truth = draw(self.task.ranges, rng, fixed)
         scenario = self.task.scenario(self.truth)
         if self._run is None:
             self._run = Simulation(scenario, engine=self.engine, recorded=False, monitored=False)
@@ -85,11 +85,11 @@ class Episode:
         """Advances by one control period.
 
         Args:
-            action: numbers of the action, clipped to -1 to 1.
+            action: finite numbers of the action, clipped to -1 to 1.
         """
         run, task = self._run, self.task
         assert run is not None
-        clipped = tuple([shown(x, -1.0, 1.0) for x in action])
+        clipped = tuple([bounded(x, -1.0, 1.0) for x in action])
         force, gain = task.command(self.memory, clipped)
         if gain != self._gain:
             run.set(gain=gain)
@@ -129,20 +129,26 @@ class Episodes:
         self._low, self._high = np.array([(q.low, q.high) for q in task.observations]).T
         self._runs: SimulationBatch | None = None
 
+    @property
+    def begun(self) -> bool:
+        """Whether there are runs: a reset was made, and no `close` since."""
+        return self._runs is not None
+
     def reset(
         self,
         which: Sequence[int],
         generators: Sequence[np.random.Generator],
-        options: Mapping[str, Any] | None,
+        fixed: Sequence[Truth],
     ) -> None:
         """Starts episodes; the first call must start all of them.
 
         Args:
             which: numbers of the copies.
             generators: random generator of each of these copies.
-            options: values to use instead of drawn ones; None for none.
+            fixed: values to use instead of drawn ones, for each of these copies.
         """
-        drawn = [draw(self.task.ranges, rng, options) for rng in generators]
+        ranges = self.task.ranges
+        drawn = [draw(ranges, rng, x) for rng, x in zip(generators, fixed, strict=True)]
         scenarios = [self.task.scenario(truth) for truth in drawn]
         begun = [self.task.begin(x, rng) for x, rng in zip(drawn, generators, strict=True)]
         if self._runs is None:
@@ -169,12 +175,12 @@ class Episodes:
         """Advances by one control period.
 
         Args:
-            actions: actions, shape (n, k), clipped to -1 to 1.
+            actions: finite numbers of the actions, shape (n, k), clipped to -1 to 1.
             live: which copies advance, shape (n,); results of the others are meaningless.
         """
         runs, task = self._runs, self.task
         assert runs is not None
-        action = tuple(shown(np.asarray(actions, np.float64), -1.0, 1.0).T)
+        action = tuple(bounded(actions, -1.0, 1.0).T)
         force, gain = task.command(self.memory, action)
         if live.any():
             if gain is not None:

@@ -22,10 +22,14 @@ class Picture:
     Args:
         task: the task.
         window: whether to show it in a window.
+
+    Attributes:
+        unseen: why there is no window although one was asked for; "" otherwise.
     """
 
     def __init__(self, task: Task, window: bool):
         self._task, self._plan = task, PlanPicture(window)
+        self.unseen = self._plan.unseen
         self._path: list[tuple[float, float]] = []
 
     def begin(self) -> None:

@@ -8,9 +8,9 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from ..errors import ParameterError, needing
-from .registry import NAMESPACE
-from .vector import TaskVectorEnv
+from ..errors import ParameterError, choice, integer, needing
+from .registry import ENTRIES, NAMESPACE
+from .vector import MOST_COPIES, TaskVectorEnv
 
 with needing("hapticclay.gym.stable_baselines", "stable_baselines3", "sb3"):
     from stable_baselines3.common.vec_env import VecEnv  # pyright: ignore[reportMissingImports]
@@ -22,22 +22,32 @@ class StableBaselinesVecEnv(VecEnv):
     When an episode ends, the next one starts in the same step. The infos then contain the last
     observation as `terminal_observation` and truncation as `TimeLimit.truncated`.
 
+    `seed(s)` gives copy i the seed s + i, and `set_options` takes options of a reset for all
+    copies or one dictionary for each; both count for the next `reset`.
+
     Args:
         env: the vector environment, or its name, as "CutLine-v0".
-        num_envs: number of copies, if env is a name.
+        num_envs: number of copies, if env is a name; None for 1.
         **options: options of the environment, if env is a name.
 
     Raises:
-        ParameterError: env does not restart episodes in the same step.
+        ParameterError: env is wrapped or of another class, does not restart episodes in the same
+            step, or comes with options of one that is to be made.
     """
 
-    def __init__(self, env: TaskVectorEnv | str, num_envs: int = 1, **options: Any):
+    def __init__(self, env: TaskVectorEnv | str, num_envs: int | None = None, **options: Any):
         if isinstance(env, str):
-            made = gymnasium.make_vec(
-                f"{NAMESPACE}/{env}", num_envs, autoreset_mode="SAME_STEP", **options
-            )
-            env = made.unwrapped  # type: ignore[assignment]
-        assert isinstance(env, TaskVectorEnv)
+            env = _made(env, 1 if num_envs is None else num_envs, options)
+        elif isinstance(env, gymnasium.vector.VectorWrapper):
+            bound = "must be the vector environment itself, env.unwrapped"
+            remedy = "wrap the adapter instead, with wrappers of Stable-Baselines3"
+            raise ParameterError("env", env, f"{bound}; {remedy}")
+        elif not isinstance(env, TaskVectorEnv):
+            bound = f"must be a TaskVectorEnv, or a name, one of {', '.join(ENTRIES)}"
+            raise ParameterError("env", env, bound)
+        elif num_envs is not None or options:
+            given = {"num_envs": num_envs, **options} if num_envs is not None else options
+            raise ParameterError("options", given, "must not be given with an environment")
         if env.autoreset_mode is not gymnasium.vector.AutoresetMode.SAME_STEP:
             bound = "must be 'SAME_STEP' for Stable-Baselines3"
             raise ParameterError("autoreset_mode", env.autoreset_mode.name, bound)
@@ -48,8 +58,7 @@ class StableBaselinesVecEnv(VecEnv):
     def reset(self) -> np.ndarray:
         """Starts episodes with the seeds and options that were set."""
         seeds = self._seeds if any(x is not None for x in self._seeds) else None
-        options = self._options[0] if self._options else None
-        observations, infos = self.env.reset(seed=seeds, options=options or None)
+        observations, infos = self.env.reset(seed=seeds, options=self._options)
         self.reset_infos = [_of_copy(infos, i) for i in range(self.num_envs)]
         self._reset_seeds()
         self._reset_options()
@@ -72,6 +81,7 @@ class StableBaselinesVecEnv(VecEnv):
             if over[i]:
                 info = _of_copy(infos["final_info"], i)
                 info["terminal_observation"] = infos["final_obs"][i]
+                self.reset_infos[i] = _of_copy(infos, i)
             else:
                 info = _of_copy(infos, i)
             info["TimeLimit.truncated"] = bool(cut_off[i] and not ended[i])
@@ -134,6 +144,14 @@ class StableBaselinesVecEnv(VecEnv):
             indices: of the copies; None for all.
         """
         return [False for _ in self._indices(indices)]
+
+
+def _made(name: str, num_envs: int, options: dict[str, Any]) -> TaskVectorEnv:
+    """A vector environment by its name."""
+    id = f"{NAMESPACE}/{choice('env', name, tuple(ENTRIES))}"
+    given = {"autoreset_mode": "SAME_STEP", **options}
+    made: Any = gymnasium.make_vec(id, integer("num_envs", num_envs, 1, MOST_COPIES), **given)
+    return made.unwrapped
 
 
 def _of_copy(infos: dict[str, Any], i: int) -> dict[str, Any]:

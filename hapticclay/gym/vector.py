@@ -13,8 +13,10 @@ from gymnasium.vector.utils import batch_space
 
 from ..errors import ParameterError, choice, integer
 from ..simulation.engines import ENGINES
+from .draws import Truth, fixed_by
 from .environment import FPS, MODES
 from .episodes import Episodes
+from .inputs import action_of, options_of, seeds_of, task_of
 from .quantities import box_of
 from .task import Memory, Task
 
@@ -58,18 +60,18 @@ class TaskVectorEnv(VectorEnv):
         if render_mode is not None:
             choice("render_mode", render_mode, MODES[1:])
         self.render_mode = render_mode
-        self.task = self.task_type(ranges, **options)
+        self.task = task_of(self.task_type, ranges, options, self)
         most = self.task.limit if max_episode_steps is None else max_episode_steps
         self._most = integer("max_episode_steps", most, 1, 1_000_000_000)
         self.single_action_space = box_of(self.task.actions)
         self.single_observation_space = box_of(self.task.observations)
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self._episodes = Episodes(self.task, num_envs, choice("engine", engine, ENGINES))
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self._episodes = Episodes(self.task, self.num_envs, choice("engine", engine, ENGINES))
         self._generators: list[np.random.Generator] = []
         self._seeds: list[int] = []
-        self._count = np.zeros(num_envs, np.int64)
-        self._over = np.ones(num_envs, bool)
+        self._count = np.zeros(self.num_envs, np.int64)
+        self._over = np.ones(self.num_envs, bool)
         self._pictures: list[Any] = []
 
     @property
@@ -90,55 +92,69 @@ class TaskVectorEnv(VectorEnv):
         self,
         *,
         seed: int | Sequence[int | None] | None = None,
-        options: dict[str, Any] | None = None,
+        options: Mapping[str, Any] | Sequence[Mapping[str, Any] | None] | None = None,
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Starts episodes.
 
         Args:
             seed: seed of the first copy, counted up for the others; or one seed per copy; None to
                 keep the present generators.
-            options: values to use instead of drawn ones, by name; and "reset_mask", which copies to
+            options: values to use instead of drawn ones, by name, for all copies; or such a
+                dictionary for each copy. In the first form also "reset_mask", which copies to
                 reset, shape (n,), bool.
 
         Raises:
-            ParameterError: a name is unknown, a value out of its bounds, or the mask is refused.
+            ParameterError: a seed or the mask is refused, a name is unknown, or a value out of its
+                bounds; or the values make no scene, and the copies have no episode until the next
+                reset.
         """
-        given = dict(options or {})
-        mask = self._mask(given.pop("reset_mask", None))
-        self._seed(seed, mask)
-        self._begin(mask, given)
+        fixed, mask = self._options(options)
+        seeds = seeds_of(seed, self.num_envs)
+        self.closed = False
+        self._seed(seeds, mask)
+        self._begin(mask, fixed)
         return self._episodes.observe(), _masked(self._episodes.truth, mask)
+
+    def _options(self, given: Any) -> tuple[list[Truth], np.ndarray]:
+        """Values to use instead of drawn ones, of each copy; and which copies to reset."""
+        n = self.num_envs
+        if isinstance(given, list | tuple):
+            if len(given) != n:
+                raise ParameterError("options", given, f"must be a dictionary, or {n} of them")
+            fixed = [fixed_by(self.task.ranges, options_of(x)) for x in given]
+            return fixed, self._mask(None)
+        common = options_of(given)
+        mask = self._mask(common.pop("reset_mask", None))
+        return [fixed_by(self.task.ranges, common)] * n, mask
 
     def _mask(self, given: Any) -> np.ndarray:
         n = self.num_envs
         if given is None:
             return np.ones(n, bool)
-        mask = np.asarray(given)
+        bound = f"must be {n} bools, one of them True"
+        try:
+            mask = np.array(given)
+        except ValueError:  # rows of unequal length
+            raise ParameterError("reset_mask", given, bound) from None
         if mask.shape != (n,) or mask.dtype != bool or not mask.any():
-            raise ParameterError("reset_mask", given, f"must be {n} bools, one of them True")
-        if not self._generators and not mask.all():
+            raise ParameterError("reset_mask", given, bound)
+        if not self._episodes.begun and not mask.all():
             raise ParameterError("reset_mask", given, "must be True for all at the first reset")
         return mask
 
-    def _seed(self, seed: int | Sequence[int | None] | None, mask: np.ndarray) -> None:
-        n = self.num_envs
-        seeds: list[int | None] = [None] * n
-        if isinstance(seed, int | np.integer):
-            seeds = [int(seed) + i for i in range(n)]
-        elif seed is not None:
-            seeds = list(seed)
-        if len(seeds) != n:
-            raise ParameterError("seed", seed, f"must be a number, or {n} of them")
+    def _seed(self, seeds: Sequence[int | None], mask: np.ndarray) -> None:
         if not self._generators:
-            made = [seeding.np_random() for _ in range(n)]
+            made = [seeding.np_random() for _ in range(self.num_envs)]
             self._generators, self._seeds = [x[0] for x in made], [x[1] for x in made]
         for i in np.flatnonzero(mask).tolist():
             if seeds[i] is not None:
                 self._generators[i], self._seeds[i] = seeding.np_random(seeds[i])
 
-    def _begin(self, mask: np.ndarray, options: Mapping[str, Any] | None) -> None:
+    def _begin(self, mask: np.ndarray, fixed: Sequence[Truth] | None = None) -> None:
         which = np.flatnonzero(mask).tolist()
-        self._episodes.reset(which, [self._generators[i] for i in which], options)
+        self._over[mask] = True  # and stays so where the values drawn are refused
+        given = [{} if fixed is None else fixed[i] for i in which]
+        self._episodes.reset(which, [self._generators[i] for i in which], given)
         self._count[mask] = 0
         self._over[mask] = False
         for i in which if self._pictures else ():
@@ -150,28 +166,25 @@ class TaskVectorEnv(VectorEnv):
         """Advances all copies by one control period.
 
         Args:
-            actions: shape (n, k).
+            actions: finite numbers, shape (n, k), clipped to the action space.
 
         Raises:
-            ParameterError: the actions have the wrong shape.
+            ParameterError: the actions have another shape, or are not of finite real numbers.
             RuntimeError: there was no reset, or an episode is over with autoreset "DISABLED".
         """
-        actions = np.asarray(actions)
-        if actions.shape != self.action_space.shape:
-            bound = f"must have shape {self.action_space.shape}, has {actions.shape}"
-            raise ParameterError("actions", actions, bound)
+        numbers = action_of("actions", actions, (self.num_envs, len(self.task.actions)))
         live = ~self._over
-        if not self._generators or (
-            self.autoreset_mode is AutoresetMode.DISABLED and not live.all()
-        ):
-            raise RuntimeError("an episode is over, or none was begun: reset first")
-        found = self._episodes.step(actions, live)
+        if not self._episodes.begun:
+            raise RuntimeError("reset the environments before their first step")
+        if self.autoreset_mode is AutoresetMode.DISABLED and not live.all():
+            raise RuntimeError("an episode is over: reset its copy before the next step")
+        found = self._episodes.step(numbers, live)
         self._count += live
         ended = found.ended & live
         cut_off = (self._count >= self._most) & live
         rewards = np.where(live, found.reward, 0.0)
         if not live.all():  # with NEXT_STEP: the episode ended before this step
-            self._begin(~live, None)
+            self._begin(~live)
         self._over = ended | cut_off
         infos = self._infos(found.info, live)
         observations = found.observation if live.all() else self._episodes.observe()
@@ -200,7 +213,7 @@ class TaskVectorEnv(VectorEnv):
         for name in [x for x in infos if not x.startswith("_") and x not in self.task.ranges]:
             if not name.startswith("final"):
                 infos[f"_{name}"] = infos[f"_{name}"] & ~over
-        self._begin(over, None)
+        self._begin(over)
         infos |= {name: x.copy() for name, x in self._episodes.truth.items()}
         return self._episodes.observe()
 
@@ -209,7 +222,7 @@ class TaskVectorEnv(VectorEnv):
         if self.render_mode is None:
             gymnasium.logger.warn("give render_mode to gymnasium.make_vec to see pictures")
             return None
-        if not self._generators:
+        if not self._episodes.begun:
             raise RuntimeError("reset the environments before they are drawn")
         from .picture import Picture
 
@@ -226,9 +239,24 @@ class TaskVectorEnv(VectorEnv):
         """The numbers drawn for a copy.
 
         Args:
-            i: number of the copy.
+            i: number of the copy, 0 to n - 1.
+
+        Raises:
+            ParameterError: there is no such copy.
+            RuntimeError: there was no reset.
         """
-        return self._episodes.truth_of(i)
+        if not self._episodes.begun:
+            raise RuntimeError("reset the environments before their first step")
+        return self._episodes.truth_of(integer("i", i, 0, self.num_envs - 1))
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        """Refused: the copies run in threads and machine code.
+
+        Raises:
+            TypeError: always.
+        """
+        told = "cannot be copied or pickled: make another with the same arguments"
+        raise TypeError(f"{type(self).__name__} {told}, or take single environments")
 
     def close_extras(self, **_: Any) -> None:
         """Ends the runs."""

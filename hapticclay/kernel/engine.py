@@ -32,6 +32,7 @@ except (AttributeError, ImportError, OSError, RuntimeError):  # each backend has
 __all__ = ["mujoco"]
 
 LINK2_SHARE = 0.4  # of I1, at most, that the mass of link 2 at the elbow takes; 0.396 in arm.xml
+OPTIONS = 32  # numbers before the gravity of a model, among which its timestep is
 
 
 def mjcf_folder() -> Path:
@@ -159,15 +160,17 @@ def arm_at(q: tuple[float, float], arm: Arm = PAPER) -> tuple[np.ndarray, np.nda
 def timestep_view(model: mujoco.MjModel) -> np.ndarray:
     """A view of model.opt.timestep, shape (1,).
 
-    The address of an option is not exposed; it is found by two values that are written there.
+    The engine shows its gravity as an array, which stands in the same record of options, behind the
+    timestep; where, is found by two values that are written there.
 
     Args:
         model: the model.
     """
-    memory: Any = (ctypes.c_double * 256).from_address(model._address)
+    start = model.opt.gravity.ctypes.data - 8 * OPTIONS
+    memory: Any = (ctypes.c_double * OPTIONS).from_address(start)
     head = np.frombuffer(memory, dtype=float)
     before = model.opt.timestep
-    found = np.ones(256, dtype=bool)
+    found = np.ones(OPTIONS, dtype=bool)
     for mark in (0.0123456789, 0.00987654321):
         model.opt.timestep = mark
         found &= head == mark

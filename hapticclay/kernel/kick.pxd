@@ -11,7 +11,7 @@ from . cimport viscous
 from . cimport yielding
 
 cdef void begin(Kick k, double before, double after) noexcept nogil
-cdef void take_up(State s, Kick k) noexcept nogil
+cdef void take_up(Model m, State s, Kick k) noexcept nogil
 cdef void act(Model m, State s, Kick k) noexcept nogil
 cdef void stop(Model m, Kick k) noexcept nogil
 cdef void move(Model m, State s, Kick k) noexcept nogil

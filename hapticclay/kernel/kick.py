@@ -14,12 +14,13 @@ def begin(k, before, after):
     k.H, k.L, k.R, k.before, k.after = 0.5 * span, before / span, after / span, before, after
 
 
-def take_up(s, k):
+def take_up(m, s, k):
     """What the kick before left behind."""
     k.o1, k.o2 = s.w1, s.w2
-    for i in range(2):
-        z, o = s.axis[i], k.axis[i]
-        o.owed0, o.stuck0, o.anchor0 = z.owed, z.stuck, z.anchor
+    if m.special:
+        for i in range(2):
+            z, o = s.axis[i], k.axis[i]
+            o.owed0, o.stuck0, o.anchor0 = z.owed, z.stuck, z.anchor
 
 
 # ---- what acts on the handle ---------------------------------------------------------------------
@@ -29,15 +30,15 @@ def act(m, s, k):
     """Load of the handle that is linear in its velocity after the kick: f - d u."""
     signals.push(m, s, k)
     k.over = k.dxy = k.clay_dxy = 0.0
-    for i in range(2):
-        o = k.axis[i]
-        o.f, o.d, o.b0, o.b1, o.clay, o.clay_d = o.uh, 0.0, 0.0, 0.0, 0.0, 0.0
-        o.share = o.soft = 0.0
     if m.acts:
         viscous.damp(m, s, k)
         if m.special:
             stop(m, k)
         viscous.load(m, k)
+    else:
+        for i in range(2):
+            o = k.axis[i]
+            o.f, o.d, o.b0, o.b1, o.clay, o.clay_d = o.uh, 0.0, 0.0, 0.0, 0.0, 0.0
     if m.hand:
         hand.load(m, k)
 
@@ -56,10 +57,6 @@ def stop(m, k):
 def move(m, s, k):
     """Motion of the handle in a kick, by the law that drives it."""
     x, y = k.x, k.y
-    for i in range(2):
-        o = k.axis[i]
-        o.back = o.owed = o.pull = o.mean = 0.0
-        o.stuck, o.anchor = o.stuck0, o.anchor0
     k.still = 0.0
     if m.acts and m.special:
         move_in_clay(m, s, k)
@@ -86,6 +83,10 @@ def damped(k):
 def move_in_clay(m, s, k):
     """The same in clay of more laws than plain damping."""
     x, y = k.x, k.y
+    for i in range(2):
+        o = k.axis[i]
+        o.back = o.owed = o.pull = o.mean = 0.0
+        o.stuck, o.anchor = o.stuck0, o.anchor0
     fx, fy, dx, dy, dxy = x.f, y.f, x.d, y.d, k.dxy
     if m.springs:
         springs.load(s, k)
@@ -128,7 +129,7 @@ def move_in_clay(m, s, k):
 def by_servo(m, s, k, after):
     """The kick of the continuous law at a sample, before a step of length `after`."""
     begin(k, s.before, after)
-    take_up(s, k)
+    take_up(m, s, k)
     half, r1, r2 = 0.5 * s.before, s.w1, s.w1 + s.w2
     arm.handle_at(m, k, s.q1, s.q2, r1, r2)
     arm.turning(k, r1 + half * s.g1, r2 + half * s.g2)

@@ -3,13 +3,18 @@
 Records are given by the address of an array of them; `which` is that of the indices of n rows.
 """
 
-from . cimport arm, begin, path, rows, summary, watch
+from . cimport arm, begin, path, probe, rows, summary, watch
 from .records cimport Engine_s, Model_s, State_s, Summary_s
 
 SIZES = {
     "Model": sizeof(Model_s), "State": sizeof(State_s), "Engine": sizeof(Engine_s),
     "Summary": sizeof(Summary_s),
 }
+
+
+def compute_probe(size_t links, size_t out):
+    """Computes the numbers that are compared with CPython's before this is used."""
+    probe.fill(<double *>links, <double *>out)
 
 
 def begin_run(size_t model, size_t state, double px, double py, double vx, double vy):

@@ -77,9 +77,10 @@ def take(m, s, after):
         servo.take(m, s, k)
         if m.command:
             signals.add_command(m, s, k)
-    for i in range(2):
-        z, o = s.axis[i], k.axis[i]
-        z.owed, z.stuck, z.anchor = o.owed, o.stuck, o.anchor
+    if m.special and m.acts:
+        for i in range(2):
+            z, o = s.axis[i], k.axis[i]
+            z.owed, z.stuck, z.anchor = o.owed, o.stuck, o.anchor
     s.g1, s.g2 = k.g1, k.g2
     arm.step_engine(m, s, k, after, even)
     if k.still > 0.0:  # the engine's rounding would let it creep

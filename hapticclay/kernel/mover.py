@@ -101,7 +101,7 @@ class Mover:
             made.bias = bias
             made.model, made.data = self.model, self.data
             for name, array in self.places.items():
-                setattr(made, name, memoryview(array))
+                setattr(made, name, memoryview(array))  # pyright: ignore[reportArgumentType]
             self._plain = made
         return self._plain
 
@@ -109,7 +109,7 @@ class Mover:
     def row(self) -> np.ndarray:
         """The record for compiled code, shape (1,)."""
         if self._row is None:
-            made = np.zeros(1, layout.dtype_of(records.Engine))
+            made: Any = np.zeros(1, layout.dtype_of(records.Engine))
             for name, function in CALLS.items():
                 made[name] = address(function)
             made["model"], made["data"] = addresses_of(self.model, self.data)

@@ -1,12 +1,55 @@
-"""The compiled kernel: whether it is there, and was built from these sources."""
+"""The compiled kernel: whether it is there, whole, and built from these sources.
+
+setup.py builds the package `hapticclay.native` of the modules that have a .pxd file, and writes
+`native/built.py`: a checksum of each source and of each module, or why there are none. Nothing is
+loaded that was built from other sources or is damaged.
+"""
 
 from __future__ import annotations
 
 import functools
 import importlib
+import zlib
+from array import array
+from collections.abc import Iterator
+from importlib.machinery import EXTENSION_SUFFIXES
+from pathlib import Path
 from typing import Any
 
 from . import layout, records
+
+PACKAGE = Path(__file__).parents[1]
+ROOMS = ("formulas", "kernel")
+IN_C = ("formulas/numbers", "kernel/memory")  # their .pxd files are all that is compiled
+DECLARATIONS = ("kernel/layout.py", "kernel/records.py")
+WAY_IN = "kernel/machine"
+
+
+def compiled() -> list[str]:
+    """Names of the modules that are compiled, such as kernel/path."""
+    names = (f"{x.parent.name}/{x.stem}" for room in ROOMS for x in _in(room, "*.pxd"))
+    return [x for x in names if x not in IN_C and (PACKAGE / f"{x}.py").is_file()] + [WAY_IN]
+
+
+def _in(room: str, pattern: str) -> list[Path]:
+    return sorted((PACKAGE / room).glob(pattern))
+
+
+def sources() -> Iterator[str]:
+    """Files that make the compiled kernel what it is, such as kernel/path.py."""
+    for name in compiled()[:-1]:
+        yield f"{name}.py"
+    for room in ROOMS:
+        yield from (
+            f"{room}/{x.name}" for pattern in ("*.pxd", "*.pyx") for x in _in(room, pattern)
+        )
+    yield from DECLARATIONS
+
+
+def checksum(file: Path) -> int:
+    """Checksum of a file, whatever its lines end with."""
+    text = file.read_bytes()
+    return zlib.crc32(text.replace(b"\r\n", b"\n") if file.suffix[:3] == ".py" else text)
 
 
 @functools.cache
@@ -14,13 +57,77 @@ def machine() -> Any:
     """The compiled kernel.
 
     Raises:
-        ImportError: it is lacking, or was built from other sources or for another Python.
+        ImportError: it is lacking or damaged, was built from other sources or for another Python,
+            or computes other numbers than CPython.
     """
-    made = importlib.import_module("hapticclay.native.kernel.machine")
+    try:
+        built = importlib.import_module("hapticclay.native.built")
+    except ModuleNotFoundError:
+        raise ImportError("not built") from None
+    if built.LACKED:
+        raise ImportError(f"not built: {built.LACKED}")
+    check_sources(built.SOURCES)
+    check_modules(built.MODULES)
+    try:
+        made = importlib.import_module("hapticclay.native.kernel.machine")
+    except ImportError as error:
+        raise ImportError(f"cannot be loaded: {error}") from error
+    check_numbers(made)
+    return made
+
+
+def check_sources(known: dict[str, int]) -> None:
+    """Checks that the sources are those of the build.
+
+    Raises:
+        ImportError: one differs, and which.
+    """
+    there = set(sources())
+    for name in sorted(there | set(known)):
+        if name not in there or known.get(name) != checksum(PACKAGE / name):
+            raise ImportError(f"built from other sources: {name} has changed")
+
+
+def check_modules(known: dict[str, int]) -> None:
+    """Checks that the compiled modules are whole, and the ones that Python will find.
+
+    Raises:
+        ImportError: one is lacking, damaged or for another Python, and which.
+    """
+    folder = PACKAGE / "native"
+    for name, value in known.items():
+        file = folder / name
+        stem, _, suffix = file.name.partition(".")
+        if f".{suffix}" not in EXTENSION_SUFFIXES:
+            raise ImportError(f"built for another Python: native/{name}")
+        if not file.is_file():
+            raise ImportError(f"incomplete: native/{name} is lacking")
+        if checksum(file) != value:
+            raise ImportError(f"damaged: native/{name} is not as it was built")
+        for other in EXTENSION_SUFFIXES[: EXTENSION_SUFFIXES.index(f".{suffix}")]:
+            if (file.parent / (stem + other)).exists():
+                raise ImportError(
+                    f"mixed: native/{file.parent.name}/{stem + other} is of another build"
+                )
+
+
+def check_numbers(made: Any) -> None:
+    """Checks the layout of records and some formulas of compiled code against CPython.
+
+    Raises:
+        ImportError: they differ.
+    """
+    from . import probe
+
     for name, size in made.SIZES.items():
         if size != layout.dtype_of(getattr(records, name)).itemsize:
-            raise ImportError(f"the compiled kernel has another {name}: it is stale")
-    return made
+            raise ImportError(f"miscompiled: the record {name} has another size")
+    links = array("d", (0.4, 0.3, 0.05, 0.02, 19.0))
+    ours, theirs = (array("d", bytes(8 * probe.SIZE)) for _ in range(2))
+    probe.fill(links, ours)
+    made.compute_probe(links.buffer_info()[0], theirs.buffer_info()[0])
+    if ours.tobytes() != theirs.tobytes():
+        raise ImportError("miscompiled: formulas give other numbers than in Python")
 
 
 @functools.cache
@@ -29,7 +136,7 @@ def why_not() -> str:
     try:
         machine()
     except (ImportError, OSError, AttributeError) as error:
-        return str(error) or type(error).__name__
+        return " ".join(str(error).split()) or type(error).__name__
     return ""
 
 

@@ -4,6 +4,9 @@ Units stand beside the names. A flag is 1 or 0; a number that only one part of a
 without that part, and no function reads it then.
 """
 
+# the annotations of a declaration are what `layout.record` reads, not types
+# pyright: reportInvalidTypeForm=false, reportGeneralTypeIssues=false
+
 from .layout import Kind, floats, many, real, record, thing, whole, wholes
 
 CONTROLLER_ORDER = 4  # most states of a compensator

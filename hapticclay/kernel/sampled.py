@@ -56,7 +56,7 @@ def by_hold(m, s, k, after):
 def across(m, s, k, after):
     """The same across the sample, whatever begins there."""
     kick.begin(k, s.before, after)
-    kick.take_up(s, k)
+    kick.take_up(m, s, k)
     r1, r2 = s.w1, s.w1 + s.w2
     arm.handle_at(m, k, s.q1, s.q2, r1, r2)
     arm.turning(k, r1, r2)
@@ -123,7 +123,7 @@ def event(m, s, samples, now):
 
 def rest(m, s, e):
     """A kick of no length."""
-    kick.take_up(s, e)
+    kick.take_up(m, s, e)
     arm.handle_at(m, e, s.q1, s.q2, s.w1, s.w1 + s.w2)
     e.w1, e.w2 = s.w1, s.w2
     for i in range(2):

@@ -21,7 +21,7 @@ def damp(m, s, k):
 
 
 def load(m, k):
-    """Adds it to the load of a kick."""
+    """Its load of a kick, beside the muscle force."""
     x, y = k.x, k.y
     if m.rotated:
         c, s = m.cosine, m.sine
@@ -30,11 +30,8 @@ def load(m, k):
     else:
         x.clay, y.clay = x.b0 * x.v, y.b0 * y.v
         x.clay_d, y.clay_d = x.b1, y.b1
-    x.f -= x.clay
-    y.f -= y.clay
-    x.d += x.clay_d
-    y.d += y.clay_d
-    k.dxy += k.clay_dxy
+    x.f, x.d, y.f, y.d = x.uh - x.clay, x.clay_d, y.uh - y.clay, y.clay_d
+    k.dxy = k.clay_dxy
 
 
 # ---- at an instant -------------------------------------------------------------------------------

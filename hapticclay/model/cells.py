@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, number, numbers_of, pair, table_of
 from ..formulas.constants import B_MAX
 from .constants import AXES
@@ -267,6 +267,7 @@ class Grid(CellLaw):
         return "".join(a for a, e in zip(AXES, self.borders, strict=True) if e) or "x"
 
     @classmethod
+    @checked
     def of_function(
         cls,
         b: Callable[[float, float], float],
@@ -299,6 +300,7 @@ class Grid(CellLaw):
         return cls(x, y, _framed(inner, outside))
 
     @classmethod
+    @checked
     def of_image(
         cls,
         image: Any,

@@ -136,6 +136,7 @@ class Clay:
         check_traits(present(self, LAWS), self, "clay.")
 
     @classmethod
+    @checked
     def of_groove(cls, groove: Groove) -> Clay:
         """Clay that stays cut, and no other clay.
 

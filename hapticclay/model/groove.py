@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields
 from ..formulas.constants import B_MAX
 from .constants import AXES
@@ -151,6 +151,7 @@ class Groove:
         )  # fmt: skip
 
     @classmethod
+    @checked
     def of_material(
         cls, name: str, x: tuple[float, float], y: tuple[float, float], tool: Tool = SMALL_TOOL
     ) -> Groove:

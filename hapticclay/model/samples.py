@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import os
 from collections.abc import Callable, Sequence
@@ -13,7 +12,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import checked, named
+from ..columns import BadCell, Sheet
 from ..errors import ParameterError, array_of, choice
 from . import pieces
 from .signals import Signal
@@ -21,6 +21,7 @@ from .signals import Signal
 Between = Literal["linear", "hold"]
 Outside = Literal["hold", "zero"]
 CSV_COLUMNS = ("t", "fx", "fy")
+CSV_UNITS = ("s",), ("N", "m")  # of time, and of x and y
 
 
 @named
@@ -63,6 +64,7 @@ class Samples(Signal):
         object.__setattr__(self, "values", tuple(map(tuple, values.tolist())))
 
     @classmethod
+    @checked
     def csv(
         cls,
         path: str | os.PathLike[str],
@@ -72,43 +74,36 @@ class Samples(Signal):
     ) -> Samples:
         """Reads samples from a CSV file.
 
-        The first line names the columns.
+        The first line names the columns. Comma, semicolon or tab separate cells; with semicolons or
+        tabs, numbers may have decimal commas. A unit in the name of a column, as in "fx [mN]" or
+        "t_ms", or in a row below the names is converted to SI.
 
         Args:
             path: the file.
-            columns: names of the columns with time [s], x and y.
+            columns: names of the columns with time [s], x and y [N, or m for a position].
             between: as the attribute.
             outside: as the attribute.
 
         Raises:
-            ParameterError: a column is missing, a cell is not a number, the samples are refused,
-                or the file is not UTF-8 text.
+            ParameterError: a column is missing, a cell is not a number, a unit is unknown or of
+                another quantity, the samples are refused, or the file is not UTF-8 text.
             OSError: the file cannot be read.
         """
         if isinstance(columns, str) or len(columns) != 3:
             raise ParameterError("columns", columns, "must name three columns: time, x, y")
+        sheet = Sheet.read("path", Path(path))
+        for name in columns:
+            choice("columns", name, sheet.head)
+        places = {str(i): sheet.place(name) for i, name in enumerate(columns)}
         try:
-            rows = csv.reader(Path(path).read_text("utf-8-sig").splitlines(keepends=True))
-            head = [x.strip() for x in next(rows, [])]
-            if not any(head):
-                raise ParameterError("path", str(path), "must begin with a line of column names")
-            where = [head.index(choice("columns", x, head)) for x in columns]
-            numbers = [
-                [
-                    _csv_number(row[i] if i < len(row) else "", head[i], rows.line_num, path)
-                    for i in where
-                ]
-                for row in rows
-                if any(x.strip() for x in row)
-            ]
-        except UnicodeDecodeError:
-            raise ParameterError("path", str(path), "must be text in UTF-8") from None
-        except csv.Error as error:
-            raise ParameterError("path", str(path), f"must be lines of cells ({error})") from None
-        table = np.array(numbers).reshape(-1, 3)
-        if not len(table):
+            cells = sheet.numbers(places, {key: CSV_UNITS[key != "0"] for key in places})
+        except BadCell as error:
+            bound = f"must be a finite number (line {error.line} of {Path(path).name})"
+            raise ParameterError(f"column {error.column}", error.cell, bound) from None
+        t, x, y = (cells[key] for key in places)
+        if not len(t):
             raise ParameterError("path", str(path), "must have a line of numbers")
-        return cls(table[:, 0], table[:, 1:], between, outside)  # type: ignore[arg-type]
+        return cls(t, np.column_stack((x, y)), between, outside)  # type: ignore[arg-type]
 
     @cached_property
     def _rows(self) -> np.ndarray:
@@ -135,18 +130,6 @@ class Samples(Signal):
         """
         first, last = np.searchsorted(self._rows[:, 0], (begin, end), "right")
         return self._rows[max(first - 1, 0) : max(last, 1)]
-
-
-def _csv_number(text: str, column: str, line: int, path: Any) -> float:
-    """The number in a cell of a file."""
-    try:
-        x = float(text)
-    except ValueError:
-        x = math.nan
-    if not math.isfinite(x):
-        bound = f"must be a finite number (line {line} of {Path(path).name})"
-        raise ParameterError(f"column {column}", text, bound)
-    return x
 
 
 @named

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, pair
 from ..formulas.constants import B_MAX
 from ..formulas.smooth import smooth_damping
@@ -145,6 +145,7 @@ class Smooth(CellLaw):
         return self.damping[first[0] : end[0], first[1] : end[1]].ravel().tolist()
 
     @classmethod
+    @checked
     def of_function(
         cls,
         b: Callable[[float, float], float],
@@ -172,6 +173,7 @@ class Smooth(CellLaw):
         return cls(*ends, tuple(tuple(b(at, across) for across in at_y) for at in at_x))
 
     @classmethod
+    @checked
     def of_image(
         cls,
         image: Any,

@@ -3,7 +3,6 @@
 from .buttons import ButtonScript as ButtonScript
 from .client import DeviceClient as DeviceClient
 from .client import DeviceSample as DeviceSample
-from .client import Limits as Limits
 from .client import connect as connect
 from .client_log import ClientLog as ClientLog
 from .client_log import Timing as Timing
@@ -12,6 +11,7 @@ from .coupled import Rendered as Rendered
 from .coupled import render as render
 from .device import Trajectory as Trajectory
 from .exchanges import Exchanges as Exchanges
+from .limits import Limits as Limits
 from .report import LoopReport as LoopReport
 from .report import loop_report as loop_report
 from .server import DeviceServer as DeviceServer

@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass
 from typing import Annotated
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, number
 from .device import read_columns
 
@@ -50,6 +50,7 @@ class ButtonScript:
         return self.pressed[i - 1] if i else frozenset()
 
     @classmethod
+    @checked
     def of_file(cls, path: str | os.PathLike[str]) -> ButtonScript:
         """Reads a script from a CSV file with the columns t [s], a, b, c, home (0 or 1).
 
@@ -57,9 +58,15 @@ class ButtonScript:
             path: the file.
 
         Raises:
-            ParameterError: the file cannot be read, has other columns, or its times do not ascend.
+            ParameterError: the file cannot be read, has other columns or other values, or its times
+                do not ascend.
         """
-        rows = read_columns("buttons", path, ("t", *NAMES))
+        rows = read_columns("buttons", path, {"t": ("s",), **dict.fromkeys(NAMES, ())})
+        for row in rows:
+            for name, x in zip(NAMES, row[1:], strict=True):
+                if x not in (0.0, 1.0):
+                    bound = f"column {name!r} must be 0 or 1, is {x:g} at {row[0]:g} s"
+                    raise ParameterError("buttons", str(path), bound)
         t = tuple(r[0] for r in rows)
         return cls(
             t, tuple(frozenset(n for n, x in zip(NAMES, r[1:], strict=True) if x) for r in rows)

@@ -1,60 +1,31 @@
 """A client of the Inverse service: reads a device, real or simulated, and sends it forces.
 
-Each force is limited in length and rises from zero over a ramp. When a sample is late, the client
-sends zero force, so the device never holds an outdated one.
+Each force is limited in length and rate of change, and rises from zero over a ramp, at the start
+and after each gap. When a sample is late, or positions are frozen, the client sends zero force, so
+the device never holds an outdated one.
 """
 
 from __future__ import annotations
 
-import math
+import os
+import socket
+import struct
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
+from contextlib import ExitStack, contextmanager, suppress
+from typing import Any, NamedTuple
 
 from ..arguments import named
-from ..errors import Bound, ParameterError, check_fields, needing
+from ..errors import ParameterError, needing
 from . import inverse
 from .client_log import ClientLog, Exchanged
 from .commands import NOTHING, Vector
+from .inbox import Inbox
+from .limits import PLAIN, ForceLimiter, Limits
 
 FIRST_FRAME = 5.0  # [s] timeout for the inventory of a service
-PATIENCE = 0.05  # [s] after which a sample counts as lost
+CLOSING = 1.0  # [s] timeout for the closing handshake, and for a message that is not read
 MOST_MISSED = 40  # consecutive lost samples after which the device counts as lost
-
-
-@named
-@dataclass(frozen=True)
-class Limits:
-    """Limits that protect the hand that holds the device.
-
-    Attributes:
-        largest_force: longer forces are shortened to this length [N], > 0, at most 100.
-        ramp: time over which forces rise from zero, at the start and after a lost sample [s],
-            0 to 60.
-        rate: exchanges per second [Hz], 1 to 1e4; a faster device waits.
-        patience: time after which a sample counts as lost [s], 1e-3 to 1.
-        period: time per exchange, for a device whose clock advances with its messages [s],
-            1e-5 to 1; None to use the computer's clock.
-    """
-
-    largest_force: Annotated[float, Bound(0.0, 100.0, "N", above=True)] = 3.0
-    ramp: Annotated[float, Bound(0.0, 60.0, "s")] = 1.0
-    rate: Annotated[float, Bound(1.0, 1e4, "Hz")] = 1000.0
-    patience: Annotated[float, Bound(1e-3, 1.0, "s")] = PATIENCE
-    period: Annotated[float | None, Bound(1e-5, 1.0, "s")] = None
-
-    def __post_init__(self):
-        check_fields(self)
-
-    @property
-    def Ts(self) -> float:
-        """Time between two exchanges [s]."""
-        return 1.0 / self.rate if self.period is None else self.period
-
-
-PLAIN = Limits()
 
 
 class DeviceSample(NamedTuple):
@@ -104,22 +75,32 @@ class DeviceClient:
             from websockets.sync.client import connect
         self.url, self.limits, self.lost = url, limits, ""
         self._broken: Any = (WebSocketException, OSError, EOFError)
-        try:
-            self._socket = connect(url, compression=None, open_timeout=FIRST_FRAME)
-            frame = inverse.read_frame(self._socket.recv(timeout=FIRST_FRAME))
-        except (*self._broken, TimeoutError, ValueError) as error:
-            why = str(error) or type(error).__name__
-            raise ParameterError("device", url, f"must be an Inverse service ({why})") from None
-        if frame is None:
-            self._socket.close()
-            raise ParameterError("device", url, "must have an Inverse3")
+        with ExitStack() as stack:
+            try:
+                self._socket = connect(
+                    url,
+                    compression=None,
+                    open_timeout=FIRST_FRAME,
+                    ping_interval=None,  # not every device answers pings; each exchange is a check
+                    close_timeout=CLOSING,
+                )
+                stack.callback(self._socket.close)
+                frame = inverse.read_frame(self._socket.recv(timeout=FIRST_FRAME))
+            except (*self._broken, TimeoutError, ValueError) as error:
+                why = str(error) or type(error).__name__
+                raise ParameterError("device", url, f"must be an Inverse service ({why})") from None
+            if frame is None:
+                raise ParameterError("device", url, "must have an Inverse3")
+            stack.pop_all()
+        _bound_sending(self._socket.socket)
         self.device_id = frame.device_id
         self._begin = self._due = time.perf_counter()
-        self._waiting = self._count = 0
-        self._full_at = limits.ramp  # [s] when the ramp is complete
+        self._count = 0
         self._missed = 0  # consecutive samples
+        self._force = ForceLimiter(limits)
         self.log = ClientLog()
         self.first = self._sample(frame, 0.0)
+        self._inbox = Inbox(self._socket, self._broken)
 
     def __enter__(self) -> DeviceClient:
         return self
@@ -133,17 +114,21 @@ class DeviceClient:
             if not self.lost:
                 self._send(NOTHING)
             self._socket.close()
+        self._inbox.join(CLOSING)
         self.lost = self.lost or "closed"
 
     def restart_ramp(self) -> None:
         """Restarts the ramp: forces rise from zero again."""
-        self._full_at = self._time(time.perf_counter()) + self.limits.ramp
+        self._force.restart(self._time(time.perf_counter()))
 
     def exchange(self, force: tuple[float, float, float] = NOTHING) -> DeviceSample | None:
         """Sends a force and waits for the answer, at the rate set in the limits.
 
+        Of several frames that came meanwhile, the newest is taken; `log.skipped` counts the others.
+
         Args:
-            force: force on the cursor, x, y, z of the device [N], before limit and ramp.
+            force: force on the cursor, x, y, z of the device [N], before the limits; one that is
+                not finite counts as zero.
 
         Returns:
             The measurement; None if no answer came in time. In that case the next force is
@@ -152,24 +137,30 @@ class DeviceClient:
         if self.lost:
             return None
         self._wait()
-        applied = NOTHING if self._missed else self._allowed(force)
         sent = time.perf_counter()
+        applied = self._force.apply(force, self._time(sent), lost=self._missed > 0)
+        self._inbox.sending()
         try:
             self._send(applied)
-            frame = self._newest()
-        except TimeoutError:
-            return self._miss()
         except self._broken as error:
             self.lost = str(error) or type(error).__name__
             return None
-        received = time.perf_counter()
-        if frame is None:  # the answer does not contain the device
+        answer = self._inbox.answer(self.limits.patience)
+        self.log.skipped, self.log.withheld = self._inbox.skipped, self._force.withheld
+        if self._inbox.ended:
+            self.lost = self._inbox.ended
+            return None
+        if answer is None:
             return self._miss()
         self._count += 1
+        t = self._time(answer.received)
         if self._missed:
-            self._missed, self._full_at = 0, self._time(received) + self.limits.ramp
-        sample = self._sample(frame, self._time(received))
-        self.log.add(Exchanged(sent, received, sample.t, sample.position, sample.velocity, applied))
+            self._missed = 0
+            self._force.restart(t)
+        sample = self._sample(answer.frame, t)
+        self._force.see(sample.position, t)
+        place, rate = sample.position, sample.velocity
+        self.log.add(Exchanged(sent, answer.received, t, place, rate, applied))
         return sample
 
     def _miss(self) -> None:
@@ -194,53 +185,19 @@ class DeviceClient:
         period = self.limits.period
         return now - self._begin if period is None else self._count * period
 
-    def _allowed(self, force: Vector) -> Vector:
-        """The force within the limits; zero if it is not finite."""
-        grown = 1.0
-        if self.limits.ramp and (left := self._full_at - self._time(time.perf_counter())) > 0.0:
-            grown = max(0.0, 1.0 - left / self.limits.ramp)
-        return allowed(force, self.limits.largest_force, grown)
-
     def _send(self, force: Vector) -> None:
         asked = inverse.Message((inverse.Force(self.device_id, force),), (self.device_id,))
         self._socket.send(inverse.message_text(asked))
-        self._waiting += 1
-
-    # ---- receiving
-
-    def _newest(self) -> inverse.Frame | None:
-        """The answer to the last message; answers to earlier messages are skipped.
-
-        Raises:
-            TimeoutError: the answer does not arrive in time.
-        """
-        end, frame = time.perf_counter() + self.limits.patience, None
-        while self._waiting:
-            data = self._socket.recv(timeout=max(0.0, end - time.perf_counter()))
-            self._waiting -= 1
-            frame = inverse.read_frame(data)
-        return frame
 
     def _sample(self, frame: inverse.Frame, t: float) -> DeviceSample:
         return DeviceSample(t, frame.cursor.position, frame.cursor.velocity, frame.buttons)
 
 
-def allowed(force: Vector, largest: float, grown: float) -> Vector:
-    """Applies the limits to a force.
-
-    Args:
-        force: requested force [N].
-        largest: longer forces are shortened to this length [N].
-        grown: share of the ramp that has passed, 0 to 1.
-
-    Returns:
-        The force [N]; zero if the request is not finite.
-    """
-    size = math.hypot(*force)
-    if not math.isfinite(size) or not size:
-        return NOTHING
-    scale = grown * min(1.0, largest / size)
-    return force[0] * scale, force[1] * scale, force[2] * scale
+def _bound_sending(connected: socket.socket) -> None:
+    """Ends the connection to a device that reads no messages, where sending would wait forever."""
+    if os.name == "posix":
+        timeout = struct.pack("@ll", round(CLOSING), 0)
+        connected.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, timeout)
 
 
 @named

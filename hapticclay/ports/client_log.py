@@ -51,6 +51,9 @@ class Timing(NamedTuple):
         interval: median and 99th percentile of the time between two answers [s].
         latency: median and 99th percentile of the time from a force to the answer [s].
         jitter: standard deviation of the interval [s].
+        skipped: number of frames of the device that were not used: a newer one came, they came too
+            late, or they did not hold the device.
+        withheld: number of forces that were not sent because the position was frozen.
     """
 
     exchanges: int
@@ -59,6 +62,8 @@ class Timing(NamedTuple):
     interval: tuple[float, float]
     latency: tuple[float, float]
     jitter: float
+    skipped: int = 0
+    withheld: int = 0
 
     def summary(self) -> dict[str, Any]:
         """The values with their units, for the notes of a record."""
@@ -69,6 +74,8 @@ class Timing(NamedTuple):
             "interval_p50_p99_s": list(self.interval),
             "latency_p50_p99_s": list(self.latency),
             "jitter_s": self.jitter,
+            "skipped": self.skipped,
+            "withheld": self.withheld,
         }
 
 
@@ -78,6 +85,8 @@ class ClientLog:
 
     Attributes:
         missed: exchanges without an answer in time.
+        skipped: frames of the device that were not used.
+        withheld: forces that were not sent because the position was frozen.
     """
 
     def __init__(self, most: int = MOST_ROWS):
@@ -89,7 +98,7 @@ class ClientLog:
         Raises:
             ParameterError: most is out of its bounds.
         """
-        self.missed = 0
+        self.missed = self.skipped = self.withheld = 0
         self._rows = Rows(12, integer("most", most, 1, 10**9))  # numbers of an Exchanged
 
     def __len__(self) -> int:
@@ -117,7 +126,8 @@ class ClientLog:
         rows = self.rows
         if len(rows) < FEWEST:
             none = math.nan, math.nan
-            return Timing(len(rows), self.missed, math.nan, none, none, math.nan)
+            counts = self.skipped, self.withheld
+            return Timing(len(rows), self.missed, math.nan, none, none, math.nan, *counts)
         sent, received = np.array([r[:2] for r in rows]).T
         gaps, late = np.diff(received), received - sent
         return Timing(
@@ -127,6 +137,8 @@ class ClientLog:
             (float(np.median(gaps)), float(np.quantile(gaps, 0.99))),
             (float(np.median(late)), float(np.quantile(late, 0.99))),
             float(gaps.std()),
+            self.skipped,
+            self.withheld,
         )
 
     def columns(self) -> dict[str, np.ndarray]:

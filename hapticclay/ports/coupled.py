@@ -18,9 +18,11 @@ from ..model.operator import Operator
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from ..simulation.stepwise import Simulation
-from .client import PLAIN, DeviceClient, DeviceSample, Limits
+from .client import DeviceClient, DeviceSample
 from .client_log import ClientLog, Timing
 from .commands import NOTHING, Pair
+from .device import ended_as_planned
+from .limits import PLAIN, Limits
 from .planes import PLANES, to_plane, to_space
 
 SETTLING = 50  # exchanges without force to measure the period of the device
@@ -165,12 +167,13 @@ class DeviceHand:
         return self.held
 
     def watch(self) -> bool:
-        """Reads the position of the device, without force.
+        """Reads the position of the device, without force; the next forces rise from zero.
 
         Returns:
             Whether the sample came in time.
         """
         sample = self.client.exchange()
+        self.client.restart_ramp()
         self.held = sample is not None
         if sample is not None:
             self._take(sample)
@@ -255,6 +258,8 @@ def render(
         if not simulation.t:
             raise ParameterError("device", url, "must answer in time")
         record = simulation.record()
+        if not client.lost:
+            record = ended_as_planned(record)
         notes = {**record.notes, "device": hand.notes()}
     return Rendered(replace(record, notes=notes), client.log, client.log.timing())
 

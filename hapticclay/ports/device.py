@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import os
 from dataclasses import dataclass, replace
@@ -11,7 +10,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import checked, named
+from ..columns import Sheet, unreadable
 from ..errors import Bound, ParameterError, check_fields, number
 from ..model.constants import TS
 from ..scene.scenario import Scenario
@@ -21,6 +21,7 @@ from .commands import Pair
 from .driven_arm import LARGEST_FORCE, Drive, DrivenArm, Sensed
 
 LONGEST = 1e5  # [s] longest session
+FASTEST = 100.0  # [m/s] of a hand
 
 
 @named
@@ -29,11 +30,12 @@ class Trajectory:
     """Target of the hand over time: straight from point to point, at rest after the last.
 
     Attributes:
-        t: times [s], ascending, shape (n,).
-        points: positions of the handle [m], shape (n, 2).
+        t: times [s], ascending, -1e9 to 1e9, shape (n,).
+        points: positions of the handle [m], -10 to 10, no further apart than a hand of 100 m/s
+            moves meanwhile, shape (n, 2).
     """
 
-    t: Annotated[tuple[float, ...], Bound(unit="s")]
+    t: Annotated[tuple[float, ...], Bound(-1e9, 1e9, "s")]
     points: Annotated[tuple[tuple[float, ...], ...], Bound(-10.0, 10.0, "m")]
 
     def __post_init__(self):
@@ -44,6 +46,11 @@ class Trajectory:
             raise ParameterError("hand.points", self.points, "must have x and y each")
         if any(b <= a for a, b in zip(self.t[:-1], self.t[1:], strict=True)):
             raise ParameterError("hand.t", self.t, "must ascend")
+        for i in range(1, len(self.t)):
+            span, way = self.t[i] - self.t[i - 1], math.dist(self.points[i], self.points[i - 1])
+            if way > FASTEST * span:
+                bound = f"must be within {FASTEST:g} m/s; the point before is {way:.3g} m away"
+                raise ParameterError(f"hand.points[{i}]", self.points[i], f"{bound}, {span:.3g} s")
 
     def at(self, t: float) -> tuple[Pair, Pair]:
         """Position [m] and velocity [m/s] at a time.
@@ -71,40 +78,45 @@ class Trajectory:
         return cls((0.0,), (target,))
 
     @classmethod
+    @checked
     def of_file(cls, path: str | os.PathLike[str]) -> Trajectory:
         """Reads a trajectory from a CSV file with the columns t [s], x and y [m].
+
+        A unit in the name of a column, as in "x [mm]", or in a row below the names is converted.
 
         Args:
             path: the file.
 
         Raises:
-            ParameterError: the file cannot be read, or has other columns.
+            ParameterError: the file cannot be read, has other columns, a cell that is no number, or
+                a unit that does not fit.
         """
-        rows = read_columns("hand", path, ("t", "x", "y"))
+        rows = read_columns("hand", path, {"t": ("s",), "x": ("m",), "y": ("m",)})
         return cls(tuple(r[0] for r in rows), tuple((r[1], r[2]) for r in rows))
 
 
 def read_columns(
-    field: str, path: str | os.PathLike[str], names: tuple[str, ...]
+    field: str, path: str | os.PathLike[str], units: dict[str, tuple[str, ...]]
 ) -> list[tuple[float, ...]]:
     """Reads some columns of a CSV file.
 
     Args:
         field: name for the error.
         path: the file; its first line names the columns.
-        names: columns to read.
+        units: columns to read, and their SI units; none for a column without a unit.
 
     Raises:
-        ParameterError: the file cannot be read, or lacks a column.
+        ParameterError: the file cannot be read, lacks a column, or has a cell that is no number or
+            a unit that does not fit.
     """
     try:
-        with Path(path).open(newline="") as f:
-            rows = [tuple(float(row[name]) for name in names) for row in csv.DictReader(f)]
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        bound = f"must be a CSV file with the columns {', '.join(names)} ({error!r})"
-        raise ParameterError(field, str(path), bound) from None
+        sheet = Sheet.read(field, Path(path))
+    except OSError as error:
+        raise unreadable(field, Path(path), error) from None
+    columns = sheet.numbers(sheet.named(list(units)), units)
+    rows = list(zip(*(columns[name].tolist() for name in units), strict=True))
     if not rows:
-        raise ParameterError(field, str(path), "must have a row or more")
+        raise sheet.refusal("must have a row or more")
     return rows
 
 
@@ -204,6 +216,17 @@ class SimulatedDevice:
             RuntimeError: the device has not run.
         """
         return replace_scenario(self._simulation.record(), self.scenario)
+
+
+def ended_as_planned(record: Record) -> Record:
+    """A record of a session that lasted as long as it was to last.
+
+    Args:
+        record: the record; one that ended in another way is returned as it is.
+    """
+    if record.outcome.code != "interrupted":
+        return record
+    return replace(record, outcome=replace(record.outcome, code="time limit"))
 
 
 def replace_scenario(record: Record, scenario: Scenario) -> Record:

@@ -9,7 +9,7 @@ from ..errors import number
 from ..formulas.arm import handle_velocity, jacobian, joint_torques
 from ..model.sampled_controller import Controller
 from ..scene.scenario import Scenario
-from .commands import Pair
+from .commands import ANGLE, POSITION, RATE, VELOCITY, Pair, is_bounded, shortening
 
 LARGEST_FORCE = 10.0  # [N] default limit of the length of a force
 TARGET_STIFFNESS, TARGET_DAMPING = 1000.0, 60.0  # [N/m], [N.s/m] to hold a position
@@ -55,9 +55,10 @@ class DrivenArm:
     """Motors that apply a force, hold a position, or apply torques, held for a control sample.
 
     Attributes:
-        largest_force: limit on the sum of the force and the pull to the target [N].
-        sensed: the newest measurement.
-        asked: command to the motors.
+        largest_force: limit on the sum of the force and the pull to the target [N]. Joint torques
+            are limited to those of such a force on the stretched arm.
+        sensed: the newest measurement that is finite and within the bounds of messages.
+        asked: command to the motors, its torques within their limit.
         force: force on the handle from the newest sample on [N].
     """
 
@@ -73,6 +74,7 @@ class DrivenArm:
         """
         self.largest_force = number("largest_force", largest_force, 0.0, 1e3, above=True)
         self._origin, self._links = scenario.origin, scenario.arm.links
+        self._reach = scenario.arm.l1 + scenario.arm.l2, scenario.arm.l2  # of both joints [m]
         (x, y), (vx, vy) = scenario.start, scenario.velocity
         self.sensed = Sensed(0.0, (float(x), float(y)), (float(vx), float(vy)))
         self.asked, self.force = LIMP, NOWHERE
@@ -87,9 +89,16 @@ class DrivenArm:
         Returns:
             The force that will act on the handle if the handle does not move [N].
         """
-        self.asked = drive
+        self.asked = drive._replace(torques=self._limited(drive.torques))
         self.force = self._at(self.sensed)
         return self.force
+
+    def _limited(self, torques: Pair) -> Pair:
+        """Joint torques that the largest force can cause, in the ratio of those given [N.m]."""
+        limits = [self.largest_force * r for r in self._reach]
+        scales = [shortening((t,), most) for t, most in zip(torques, limits, strict=True) if t]
+        scale = min(scales, default=1.0)
+        return torques[0] * scale, torques[1] * scale
 
     def _at(self, seen: Sensed) -> Pair:
         """Force on the handle at a measurement."""
@@ -98,9 +107,8 @@ class DrivenArm:
             (px, py), (vx, vy), (tx, ty) = seen.position, seen.velocity, self.asked.target
             fx += TARGET_STIFFNESS * (tx - px) - TARGET_DAMPING * vx
             fy += TARGET_STIFFNESS * (ty - py) - TARGET_DAMPING * vy
-        size = math.hypot(fx, fy)
-        scale = min(1.0, self.largest_force / size) if size else 0.0
-        return fx * scale, fy * scale
+        scale = shortening((fx, fy), self.largest_force)
+        return (fx * scale, fy * scale) if scale else NOWHERE
 
     def _law(self, t: float, q: Pair, qd: Pair, fh: Pair, state: Any, params: Any) -> Any:
         """Torques of a control sample: the transposed Jacobian at the measured angles."""
@@ -108,8 +116,16 @@ class DrivenArm:
         place = u[1] + u[3] - self._origin[0], -u[0] - u[2] - self._origin[1]
         rate = handle_velocity(qd[0], qd[0] + qd[1], u)
         seen = Sensed(t, place, rate, (float(q[0]), float(q[1])), (float(qd[0]), float(qd[1])))
-        force = self._at(seen)
-        self.sensed, self.force = seen, force
+        if _is_usable(seen):
+            self.sensed = seen
+        self.force = force = self._at(seen)
         first, second = joint_torques(*force, u)
         extra = self.asked.torques
         return (first + extra[0], second + extra[1]), state
+
+
+def _is_usable(seen: Sensed) -> bool:
+    """Whether a measurement can be sent: a run that diverges ends with numbers that cannot."""
+    degrees = (math.degrees(x) for x in seen.angles), (math.degrees(x) for x in seen.rates)
+    parts = (seen.position, POSITION), (seen.velocity, VELOCITY), (degrees[0], ANGLE)
+    return all(is_bounded(x, of) for x, of in (*parts, (degrees[1], RATE)))

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arguments import named
-from ..errors import ParameterError
+from ..arguments import checked, named
+from ..columns import Sheet, unreadable
 from ..files import atomic
 from .rows import MOST_ROWS, Rows
 
@@ -120,6 +120,7 @@ class Exchanges:
         return Path(path)
 
     @classmethod
+    @checked
     def load(cls, path: str | os.PathLike[str]) -> Exchanges:
         """Reads what `save` wrote.
 
@@ -129,17 +130,15 @@ class Exchanges:
         Raises:
             ParameterError: the file cannot be read, or holds something else.
         """
-        file = Path(path) / FILE if Path(path).is_dir() else Path(path)
+        file = Path(path) / FILE if os.path.isdir(path) else Path(path)
         try:
-            with file.open(newline="") as f:
-                head, *rows = list(csv.reader(f)) or [[]]
-            if tuple(head) != COLUMNS:
-                raise ValueError("other columns")
-            return cls.of_table(np.array([[float(x) for x in row] for row in rows]))
-        except (OSError, ValueError) as error:
-            why = getattr(error, "strerror", None) or error
-            bound = f"must be a file of exchanges ({why})"
-            raise ParameterError("record", str(path), bound) from None
+            sheet = Sheet.read("record", file)
+        except OSError as error:
+            raise unreadable("record", file, error) from None
+        if tuple(sheet.head) != COLUMNS:
+            raise sheet.refusal("must be a file of exchanges (other columns)")
+        columns = sheet.numbers({name: i for i, name in enumerate(COLUMNS)}, {})
+        return cls.of_table(np.column_stack([columns[name] for name in COLUMNS]))
 
 
 FILE = "exchanges.csv"  # stored with the record of a session

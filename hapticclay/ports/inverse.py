@@ -1,6 +1,7 @@
 """Messages of the Haply Inverse service, versions 3.1 to 3.5 as one union, without sockets.
 
-Every input is read into a `Message`. Unusable content is dropped and reported in its notices.
+Every input is read into a `Message`. Unusable content is dropped and reported in its notices: among
+it numbers that are not finite or beyond the bounds of `commands`, in messages and in frames.
 Vectors are (x, y, z) in metre, metre per second and newton, z up.
 """
 
@@ -11,7 +12,25 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from .commands import AXES, NOTHING, Command, Pair, Vector, by_axis, finite
+from .commands import (
+    ANGLE,
+    AXES,
+    FORCE,
+    LONGEST_TEXT,
+    NOTHING,
+    POSITION,
+    RATE,
+    TORQUE,
+    VELOCITY,
+    Command,
+    Pair,
+    Quantity,
+    Vector,
+    by_axis,
+    finite,
+    read_numbers,
+    short_text,
+)
 
 LARGEST_MESSAGE = 65_536  # bytes
 JOINTS = ("a0", "a1")  # joints of the planar arm
@@ -20,10 +39,10 @@ KEYS = {  # keys of a command's body, that of version 3.5 first
     "set_cursor_position": ("position", "values"),
     "set_angular_torques": ("torques", "values"),
 }
-NAMES = {  # names of a command's body in notices
-    "set_cursor_force": "force",
-    "set_cursor_position": "position",
-    "set_angular_torques": "torque",
+QUANTITIES = {  # quantity in a command's body
+    "set_cursor_force": FORCE,
+    "set_cursor_position": POSITION,
+    "set_angular_torques": TORQUE,
 }
 PROBES = ("probe_position", "probe_orientation")
 DEVICES = ("inverse3", "minverse", "verse_grip", "wireless_verse_grip", "custom_verse_grip")
@@ -214,7 +233,9 @@ def _session(part: Any, notices: list[str]) -> tuple[bool, str]:
     profile: Any = part.get("configure")
     for name in ("profile", "name"):
         profile = profile.get(name) if isinstance(profile, Mapping) else None
-    return "force_render_full_state" in part, profile if isinstance(profile, str) else ""
+    if isinstance(profile, str) and short_text(profile) is None:
+        notices.append(f"the name of the profile is longer than {LONGEST_TEXT} characters")
+    return "force_render_full_state" in part, short_text(profile) or ""
 
 
 def _entries(part: Any, kind: str, notices: list[str]) -> Iterator[Mapping[str, Any]]:
@@ -260,18 +281,17 @@ def _read_commands(
 def _numbers(
     command: str, body: Any, names: Sequence[str], notices: list[str]
 ) -> tuple[float, ...] | None:
-    """The numbers of a command's body; 0 if missing, None if one is not finite."""
+    """The numbers of a command's body; 0 if missing, None if one is unusable."""
     given = None
     if isinstance(body, Mapping):
         given = next((body[key] for key in KEYS[command] if key in body), None)
     if not isinstance(given, Mapping):
         notices.append(f"{command} without {KEYS[command][0]}")
         return None
-    values = [finite(given.get(name, 0.0)) for name in names]
-    if None in values:
-        notices.append(f"{NAMES[command]} is not finite")
-        return None
-    return tuple(v for v in values if v is not None)
+    values, dropped = read_numbers(given, names, QUANTITIES[command])
+    if dropped:
+        notices.append(dropped)
+    return values
 
 
 def message_text(message: Message) -> str:
@@ -428,43 +448,51 @@ def read_frame(data: str | bytes) -> Frame | None:
         data: a frame, text or binary.
 
     Returns:
-        The frame; None if it has no Inverse3 with a finite position.
+        The frame; None if it has no Inverse3 with a finite position, velocity and force, within
+        the bounds of these quantities.
     """
     try:
         tree = json.loads(data)
         device = tree["inverse3"][0]
         state = device["state"]
-        position = _vector(state["cursor_position"])
         grip = next(iter(tree.get("wireless_verse_grip") or []), {})
         pressed = grip.get("state", {}).get("buttons", {})
+        position = state["cursor_position"]
+        vectors = (
+            _vector(position, POSITION),
+            _vector(state.get("cursor_velocity", {}), VELOCITY),
+            _vector(state.get("current_cursor_force", {}), FORCE),
+        )
+        name = short_text(device["device_id"])
+        if name is None or not position or None in vectors:
+            return None
+        place, rate, force = (v or NOTHING for v in vectors)
         cursor = Cursor(
-            position,
-            _vector(state.get("cursor_velocity", {})),
-            _vector(state.get("current_cursor_force", {})),
-            str(state.get("control_mode", state.get("mode", "idle"))),
-            _pair(state.get("angular_position", {})),
-            _pair(state.get("angular_velocity", {})),
-            _pair(state.get("current_angular_torques", {})),
+            place,
+            rate,
+            force,
+            short_text(state.get("control_mode", state.get("mode"))) or "idle",
+            _pair(state.get("angular_position", {}), ANGLE),
+            _pair(state.get("angular_velocity", {}), RATE),
+            _pair(state.get("current_angular_torques", {}), TORQUE),
         )
         return Frame(
-            str(device["device_id"]),
+            name,
             cursor,
-            str(grip.get("device_id", "")),
-            frozenset(ALIASES.get(str(n), str(n)) for n, on in pressed.items() if on is True),
-            int(tree.get("session_id", 0)),
+            short_text(grip.get("device_id")) or "",
+            frozenset(ALIASES.get(n, n) for n in BUTTONS if pressed.get(n) is True),
+            int(finite(tree.get("session_id")) or 0),
             "config" in device,
         )
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError):
         return None
 
 
-def _vector(given: Mapping[str, Any]) -> Vector:
-    x, y, z = (finite(given.get(axis, 0.0)) for axis in AXES)
-    if x is None or y is None or z is None:
-        raise ValueError("not finite")
-    return x, y, z
+def _vector(given: Mapping[str, Any], quantity: Quantity) -> Vector | None:
+    values, _ = read_numbers(given, AXES, quantity)
+    return None if values is None else (values[0], values[1], values[2])
 
 
-def _pair(given: Mapping[str, Any]) -> Pair:
-    a, b = (finite(given.get(joint, 0.0)) for joint in JOINTS)
-    return a or 0.0, b or 0.0  # no loop depends on it
+def _pair(given: Mapping[str, Any], quantity: Quantity) -> Pair:
+    values, _ = read_numbers(given, JOINTS, quantity)
+    return (values[0], values[1]) if values else (0.0, 0.0)  # no loop depends on it

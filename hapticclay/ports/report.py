@@ -20,12 +20,26 @@ from ..theory.client_loop import (
 )
 from .exchanges import Exchanges
 
-LATEST = 4  # oldest answer, counted back, that a force may have been computed from
+LATEST = 40  # oldest answer, counted back, that a force may have been computed from
+LOOKBACK = 4  # share of the messages, one in so many, to which the search goes back
+ALIKE = 6.0  # log-likelihood times 2: delays that explain the forces so nearly as well are alike
+ROUNDING = 1e-9  # of the force: smaller misfits are alike
+FIRST = 3  # answers back at least, also in a short session
 FEWEST = 8  # fewest messages in contact for a fit
 FORCE_LEAST = 1e-9  # [N] smaller forces count as zero
 EXPLAINED = 0.9  # least share of the squared force that a wall must explain
+KEPT_UP = 0.95  # of the time is simulated where the computer is not late
 DOUBT = 0.2  # largest relative standard error of K
-UNTOLD = ("delay", "K", "B", "K_error", "explained", "limit", "rate_needed")  # without a wall
+UNTOLD = (  # without a wall
+    "delay",
+    "longest_delay",
+    "K",
+    "B",
+    "K_error",
+    "explained",
+    "limit",
+    "rate_needed",
+)
 LINE = 25  # number of values of B on the theoretical limit line
 
 
@@ -39,6 +53,8 @@ class WallFit(NamedTuple):
         explained: share of the squared force that the wall explains.
         back: age, in answers, of the state that a force was computed from, 1 for the
             newest.
+        oldest: the largest age that explains the forces as well.
+        tried: the largest age that was tried.
         normal: direction of the force.
         place: mean position in contact [m].
         contact: number of messages used in the fit.
@@ -49,13 +65,15 @@ class WallFit(NamedTuple):
     K_error: float
     explained: float
     back: int
+    oldest: int
+    tried: int
     normal: tuple[float, float]
     place: tuple[float, float]
     contact: int
 
 
 @named
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class LoopReport(Result):
     """The wall a client's loop rendered, and the limit of that loop.
 
@@ -74,11 +92,15 @@ class LoopReport(Result):
         contact: number of messages used in the fit.
         normal: direction of the wall.
         limit: largest stable stiffness at this period, delay, hand and B [N/m].
-        rate_needed: rate at which K and B are stable with as many samples of delay [Hz]; inf for
-            none up to a thousand times the present rate.
+        rate_needed: lowest rate at which K and B are stable, as at all higher ones, with as many
+            samples of delay [Hz]; inf for none up to a thousand times the present rate, 0 where
+            even a thousandth of it is enough.
         line_B: damping along the theoretical limit line [N.s/m], from 0 on.
         line_K: largest stable stiffness there [N/m]: the Z-width at this period, delay and hand.
         note: why K and B could not be estimated; "" if they were.
+        longest_delay: longest delay that explains the forces as well [s]; inf where older answers
+            than those that were tried may; NaN
+            without a wall.
     """
 
     drawn_by = "hapticclay.views.loop_plots:loop_plot"
@@ -100,6 +122,7 @@ class LoopReport(Result):
     line_B: tuple[float, ...]
     line_K: tuple[float, ...]
     note: str = ""
+    longest_delay: float = math.nan
 
     @property
     def verdict(self) -> str:
@@ -126,19 +149,34 @@ class LoopReport(Result):
 
     def headline(self) -> str:
         """The report in one line."""
-        rate = f"{1.0 / self.period:.4g} Hz" if self.period > 0.0 else "no rate"
+        rate = f"{(1.0 / self.period if self.period > 0.0 else self.rate):.4g} Hz"
         if math.isnan(self.K):
             return f"{self.messages} messages at {rate}; {self.note}"
         damped = f" and {self.B:.3g} N.s/m" if abs(self.B) > 1e-3 else ""
         text = (
-            f"rendered {self.K:.4g} N/m{damped} at {rate}, {self.age:.2g} samples late; "
+            f"rendered {self.K:.4g} N/m{damped} at {rate}, {self._lateness()}; "
             f"limit for this hand {self.limit:.4g} N/m: it {self.verdict}"
         )
         if self.verdict == "holds":
-            return text
+            return text + self._spare_rate()
         if math.isinf(self.rate_needed):
             return text + "; no rate carries it: damp the wall or soften it"
         return text + f"; {self.rate_needed:.4g} Hz would carry it"
+
+    def _lateness(self) -> str:
+        """How old the state is that a force was computed from."""
+        if math.isinf(self.longest_delay):
+            return f"{self.age:.2g} samples late or more"
+        if self.longest_delay > self.delay:
+            longest = self.longest_delay / self.period
+            return f"{self.age:.2g} to {longest:.2g} samples late (the forces do not tell which)"
+        return f"{self.age:.2g} samples late"
+
+    def _spare_rate(self) -> str:
+        """The lowest rate of a wall that holds, where it is lower than the present one."""
+        if self.rate_needed == 0.0:
+            return "; so it would at any rate"
+        return f"; {self.rate_needed:.4g} Hz would do"
 
     def tables(self) -> Tables:
         """The report, and the theoretical limit line."""
@@ -151,6 +189,7 @@ class LoopReport(Result):
             "interval, 99th percentile [s]": p99,
             "simulated period [s]": self.period,
             "delay [s]": self.delay,
+            "longest delay that explains the forces [s]": self.longest_delay,
             "age of the state [samples]": self.age,
             "forces limited [share]": self.limited,
             "K [N/m]": self.K,
@@ -162,7 +201,7 @@ class LoopReport(Result):
             "Z-width: largest K [N/m]": K,
             "at B [N.s/m]": B,
             "Z-width: largest B [N.s/m]": most,
-            "rate needed [Hz]": self.rate_needed,
+            "lowest stable rate [Hz]": self.rate_needed,
             "verdict": self.verdict,
         }
         line = {"B [N.s/m]": self.line_B, "K limit [N/m]": self.line_K}
@@ -202,12 +241,12 @@ def loop_report(exchanges: Exchanges, scenario: Scenario) -> LoopReport:
         "limited": float(np.mean(shortened)),
     }
     if fit is None or period <= 0.0:
-        note = note or "no simulated time passed between messages"
+        note = why_no_period(exchanges) if period <= 0.0 else note
         untold: dict[str, Any] = dict.fromkeys(UNTOLD, math.nan)
         untold |= dict(contact=0, normal=(1.0, 0.0), line_B=(), line_K=())
         return LoopReport(**common, **untold, note=note)
-    lag = exchanges.began[fit.back :] - exchanges.sampled[: -fit.back]
-    delay = max(0.0, float(np.median(lag)))
+    delay = lag_behind(exchanges, fit.back)
+    longest = math.inf if fit.oldest == fit.tried else lag_behind(exchanges, fit.oldest)
     handle = Handle.of(scenario, fit.place, fit.normal)
     limit = rendered_stiffness_limit(handle, fit.B, period, delay)
     slow = slowest_period(handle, fit.K, fit.B, delay / period, period)
@@ -215,6 +254,7 @@ def loop_report(exchanges: Exchanges, scenario: Scenario) -> LoopReport:
     return LoopReport(
         **common,
         delay=delay,
+        longest_delay=longest,
         K=fit.K,
         B=fit.B,
         K_error=fit.K_error,
@@ -225,6 +265,35 @@ def loop_report(exchanges: Exchanges, scenario: Scenario) -> LoopReport:
         rate_needed=1.0 / slow if slow else math.inf,
         line_B=line_B,
         line_K=line_K,
+    )
+
+
+def lag_behind(exchanges: Exchanges, back: int) -> float:
+    """Median time from a measurement to the force of a later message [s], 0 or more.
+
+    Args:
+        exchanges: of one client.
+        back: age of the answer with the measurement, 1 for the newest.
+    """
+    return max(0.0, float(np.median(exchanges.began[back:] - exchanges.sampled[:-back])))
+
+
+def why_no_period(exchanges: Exchanges) -> str:
+    """Why most messages found the arm where the one before had left it.
+
+    Args:
+        exchanges: of one client.
+    """
+    real = float(exchanges.received[-1] - exchanges.received[0])
+    moved = float(exchanges.began[-1] - exchanges.began[0])
+    if moved < KEPT_UP * real:
+        return (
+            "the arm stood still between most messages: the computer was late and skipped control "
+            f"samples ({moved:.3g} s of {real:.3g} s were simulated); --clock tick moves the arm "
+            "by one period at each message"
+        )
+    return (
+        "most messages came within the same control sample: the program is faster than the device"
     )
 
 
@@ -260,14 +329,16 @@ def fit_wall(exchanges: Exchanges) -> tuple[WallFit | None, str]:
     """
     force = exchanges.asked[:, :2]
     size = np.hypot(*force.T)
+    tried = max(FIRST, min(LATEST, len(force) // LOOKBACK))
     contact = np.isfinite(size) & (size > FORCE_LEAST)
-    contact[:LATEST] = False  # its state may have come with the inventory
+    contact[: FIRST + 1] = False  # its state may have come with the inventory
     if contact.sum() < FEWEST:
         return None, f"{int(contact.sum())} messages had a force: a fit needs {FEWEST}"
     normal = np.linalg.svd(force[contact], full_matrices=False)[2][0]
     normal = normal if normal[np.argmax(np.abs(normal))] > 0.0 else -normal
-    found = [_fitted(exchanges, force @ normal, normal, contact, back) for back in range(1, LATEST)]
-    best = max(found, key=lambda fit: fit.explained)
+    least, oldest, tried = _ages(exchanges, force @ normal, normal, contact, tried)
+    best = _fitted(exchanges, force @ normal, normal, contact, least)
+    best = best._replace(oldest=oldest, tried=tried)
     if best.explained < EXPLAINED:
         return None, f"a spring and damper explain {best.explained:.0%} of the force"
     if best.K <= 0.0 or best.K_error > DOUBT * best.K:
@@ -278,11 +349,31 @@ def fit_wall(exchanges: Exchanges) -> tuple[WallFit | None, str]:
     return best, ""
 
 
+def _ages(
+    exchanges: Exchanges, force: np.ndarray, normal: np.ndarray, contact: np.ndarray, tried: int
+) -> tuple[int, int, int]:
+    """Least and largest age of the state that explain the forces best, or as well; ages tried.
+
+    All are compared on the same messages. Motion of one frequency does not tell ages apart: any
+    stiffness and damping at one of them are others at the next.
+    """
+    later = contact.copy()
+    later[: tried + 1] = False
+    if later.sum() < FEWEST:
+        later, tried = contact, FIRST
+    fits = [_fitted(exchanges, force, normal, later, back) for back in range(1, tried + 1)]
+    left = np.array([1.0 - fit.explained for fit in fits])
+    alike = max(left.min(), ROUNDING**2) * math.exp(min(ALIKE / later.sum(), 1.0))
+    good = np.flatnonzero(left <= alike) + 1
+    return int(good[0]), int(good[-1]), tried
+
+
 def _fitted(
     exchanges: Exchanges, force: np.ndarray, normal: np.ndarray, contact: np.ndarray, back: int
 ) -> WallFit:
     """Least-squares fit of the force to the position and velocity a number of answers earlier."""
     at = np.flatnonzero(contact)
+    at = at[at >= back]
     place, rate = exchanges.position[at - back], exchanges.velocity[at - back]
     given = np.column_stack([place @ normal, rate @ normal, np.ones(len(at))])
     scale = np.maximum(np.abs(given).max(axis=0), 1e-300)
@@ -299,4 +390,4 @@ def _fitted(
     mean = place.mean(axis=0)
     way = float(normal[0]), float(normal[1])
     where = float(mean[0]), float(mean[1])
-    return WallFit(float(K), float(B), error, explained, back, way, where, len(at))
+    return WallFit(float(K), float(B), error, explained, back, back, back, way, where, len(at))

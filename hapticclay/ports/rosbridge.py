@@ -1,7 +1,8 @@
 """Messages of rosbridge v2, JSON over a WebSocket, without sockets, and the ROS messages in them.
 
-Every input is read into an `Operation`; its `error` says why it cannot be used. Type names of both
-ROS 1 and ROS 2 are accepted, and stamps have the fields of both.
+Every input is read into an `Operation`; its `error` says why it cannot be used, such as an id that
+is too long to be kept. Type names of both ROS 1 and ROS 2 are accepted, and stamps have the fields
+of both.
 """
 
 from __future__ import annotations
@@ -12,7 +13,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from .commands import AXES, NOTHING, Command, Vector, by_axis, finite
+from .commands import (
+    AXES,
+    FORCE,
+    LONGEST_TEXT,
+    NOTHING,
+    POSITION,
+    Command,
+    Vector,
+    by_axis,
+    finite,
+    read_numbers,
+    short_text,
+)
 from .inverse import Cursor
 
 FRAME = "base"
@@ -38,6 +51,8 @@ TAKEN = {
 PLACES = {"geometry_msgs/WrenchStamped": ("wrench", "force")}  # keys of the vector in a message
 PLACES |= {"geometry_msgs/PoseStamped": ("pose", "position"), "omni_msgs/OmniFeedback": ("force",)}
 JOINTS = ("shoulder", "elbow")
+OPTIONAL = ("type", "compression")  # anything but a text counts as none
+LONGEST_THROTTLE = 1e9  # [ms]
 
 
 @dataclass(frozen=True)
@@ -83,20 +98,44 @@ def read_operation(data: str | bytes) -> Operation:
         return Operation(error="not JSON")
     if not isinstance(tree, dict) or not isinstance(tree.get("op"), str):
         return Operation(error="no object with an op")
-    name = tree.get("id")
-    name = name if isinstance(name, str | int) else None
-    topic = tree.get("topic", tree.get("service", tree.get("level", "")))
+    texts = {key: tree.get(key, "") for key in ("op", "type", "compression")}
+    texts["topic"] = tree.get("topic", tree.get("service", tree.get("level", "")))
+    name, throttle = tree.get("id"), 0.0
+    if texts["op"] == "subscribe":
+        throttle = finite(tree.get("throttle_rate", 0))
+    error = next((e for e in (_text_error(*item) for item in texts.items()) if e), "")
+    if not _is_id(name):
+        name = None
+        error = error or f"id is no text of {LONGEST_TEXT} characters or whole number of 64 bits"
+    if throttle is None or abs(throttle) > LONGEST_THROTTLE:
+        error = error or f"throttle_rate is no number of milliseconds up to {LONGEST_THROTTLE:g}"
+    op, kind, compression, topic = (short_text(x) or "" for x in texts.values())
     msg = tree.get("msg", tree.get("args", {}))
     return Operation(
-        tree["op"],
+        op,
         name,
-        topic if isinstance(topic, str) else "",
-        plain_type(tree.get("type")),
+        topic,
+        plain_type(kind),
         msg if isinstance(msg, Mapping) else {},
-        1e-3 * max(0.0, finite(tree.get("throttle_rate", 0)) or 0.0),
-        str(tree.get("compression", "none")),
-        "" if isinstance(topic, str) else "topic is no text",
+        1e-3 * max(0.0, throttle or 0.0),
+        compression or "none",
+        error,
     )
+
+
+def _text_error(key: str, value: Any) -> str:
+    """Why a text of an operation cannot be used; "" if it can."""
+    if short_text(value) is not None or (key in OPTIONAL and not isinstance(value, str)):
+        return ""
+    what = f"longer than {LONGEST_TEXT} characters" if isinstance(value, str) else "no text"
+    return f"{key} is {what}"
+
+
+def _is_id(value: Any) -> bool:
+    """Whether an id can be repeated and kept: a short text, a number of 64 bits, or none."""
+    if isinstance(value, int):
+        return abs(value) < 2**63
+    return value is None or short_text(value) is not None
 
 
 def plain_type(given: Any) -> str:
@@ -134,10 +173,10 @@ def command_of(kind: str, msg: Mapping[str, Any]) -> tuple[Command, str]:
         part = part.get(name) if isinstance(part, Mapping) else None
     if not isinstance(part, Mapping):
         return _command(kind, None), f"{kind} without a vector"
-    x, y, z = (finite(part.get(axis, 0.0)) for axis in AXES)
-    if x is None or y is None or z is None:
-        return _command(kind, None), f"{kind} is not finite"
-    return _command(kind, (x, y, z)), ""
+    given, dropped = read_numbers(part, AXES, POSITION if kind == "servo_cp" else FORCE)
+    if given is None:
+        return _command(kind, None), f"{kind}: {dropped}"
+    return _command(kind, (given[0], given[1], given[2])), ""
 
 
 def _command(kind: str, vector: Vector | None) -> Command:

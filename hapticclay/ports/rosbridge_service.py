@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .sessions import Host, Session
 
 MOST_TOPICS = 100  # topics that a client may subscribe to
+MOST_SUBSCRIPTIONS = 500  # subscriptions of a client, which differ in topic or id
 
 
 @dataclass
@@ -43,6 +44,20 @@ class Subscriptions:
         """
         self.topics[operation.topic] = kind
         self.throttles.setdefault(operation.topic, {})[operation.id] = operation.throttle
+
+    def refusal(self, operation: Operation) -> str:
+        """Why a subscription would be one too many; "" if it would not.
+
+        Args:
+            operation: operation that requests it.
+        """
+        known = self.throttles.get(operation.topic)
+        if known is None and len(self.topics) >= MOST_TOPICS:
+            return f"more than {MOST_TOPICS} topics"
+        count = sum(map(len, self.throttles.values()))
+        if operation.id not in (known or {}) and count >= MOST_SUBSCRIPTIONS:
+            return f"more than {MOST_SUBSCRIPTIONS} subscriptions"
+        return ""
 
     def remove(self, operation: Operation) -> None:
         """Ends one subscription; without an id, all subscriptions to a topic.
@@ -133,9 +148,7 @@ class RosbridgeProtocol:
         wrong = _wrong_type(x, PUBLISHED.get(kind, ""))
         if x.compression not in ("none", "None"):
             wrong = f"compression {x.compression} is not simulated"
-        elif x.topic not in kept.topics and len(kept.topics) >= MOST_TOPICS:
-            wrong = f"more than {MOST_TOPICS} topics"
-        if wrong:
+        if wrong := wrong or (kept.refusal(x) if kind else ""):
             return self._status(service, session, "error", wrong, x)
         if not kind:
             text = f"nothing is published on {x.topic}"

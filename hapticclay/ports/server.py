@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import hmac
 import json
 import logging
 import secrets
@@ -13,20 +12,20 @@ import threading
 from collections.abc import Iterator
 from http import HTTPStatus
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import urlsplit
 
 from ..arguments import checked, named
-from ..errors import ParameterError, choice, integer, needing
+from ..errors import choice, needing
 from ..files import versions
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from .device import SimulatedDevice, Trajectory
 from .exchanges import Exchanges
+from .guard import LOCAL, REFUSED, Guard, listening, url_host
 from .inverse import LARGEST_MESSAGE
 from .service import Service
 from .sessions import PLAIN, Inverse3
 
-LOCAL = ("127.0.0.1", "localhost", "::1")
 CLOCKS = ("wall", "tick")
 PUSH_PERIOD = 0.002  # [s] between two states pushed to a client
 LONGEST_QUEUE = 16  # longest queue of unanswered messages of a client
@@ -53,29 +52,27 @@ class DeviceServer:
         Raises:
             ParameterError: port or address is not available, or websockets is not installed.
         """
-        integer("port", port, 0, 65_535)
-        if not isinstance(host, str):
-            raise ParameterError("host", host, "must be an address, as 127.0.0.1")
         with needing("a device server", "websockets", "device"):
             import websockets  # noqa: F401
         self.service = service
-        self._token = "" if host in LOCAL else secrets.token_urlsafe(16)
+        listens = listening(host, port)
+        token = "" if host in LOCAL else secrets.token_urlsafe(16)
+        self._guard = Guard(host, token, service.inverse3.origins)
         self._loop = asyncio.new_event_loop()
         self._done = asyncio.Event()
-        self._failed: OSError | None = None
+        self._failed: BaseException | None = None
         ready = threading.Event()
         self._thread = threading.Thread(
-            target=self._run, args=(host, port, ready), name="device server", daemon=True
+            target=self._run, args=(listens, ready), name="device server", daemon=True
         )
-        self.port = port
+        self.port = listens.getsockname()[1]
         self._thread.start()
         ready.wait()
         if self._failed is not None:
             self._thread.join()
-            why = self._failed.strerror or str(self._failed)
-            raise ParameterError("port", port, f"must be free on {host} ({why})")
-        query = f"/?token={self._token}" if self._token else ""
-        self.url = f"ws://{f'[{host}]' if ':' in host else host}:{self.port}{query}"
+            raise self._failed
+        query = f"/?token={token}" if token else ""
+        self.url = f"ws://{url_host(host)}:{self.port}{query}"
         service.start()
 
     def __enter__(self) -> DeviceServer:
@@ -107,25 +104,25 @@ class DeviceServer:
 
     # ---- the thread
 
-    def _run(self, host: str, port: int, ready: threading.Event) -> None:
+    def _run(self, listens: socket.socket, ready: threading.Event) -> None:
         asyncio.set_event_loop(self._loop)
         try:
-            self._loop.run_until_complete(self._serve(host, port, ready))
-        except OSError as error:
+            self._loop.run_until_complete(self._serve(listens, ready))
+        except Exception as error:  # noqa: BLE001  # raised where the server was started
             self._failed = error
         finally:
+            listens.close()
             ready.set()
             self._loop.close()
 
-    async def _serve(self, host: str, port: int, ready: threading.Event) -> None:
+    async def _serve(self, listens: socket.socket, ready: threading.Event) -> None:
         from websockets.asyncio.server import serve as listen
 
         quiet = logging.getLogger("hapticclay.ports.websockets")
         quiet.setLevel(logging.CRITICAL)  # a malformed request causes no traceback
         async with listen(
             self._talk,
-            host,
-            port,
+            sock=listens,
             compression=None,
             ping_interval=None,
             max_size=LARGEST_MESSAGE,
@@ -134,8 +131,7 @@ class DeviceServer:
             close_timeout=1.0,
             process_request=self._http,
             logger=quiet,
-        ) as server:
-            self.port = next(iter(server.sockets)).getsockname()[1]
+        ):
             ready.set()
             await self._done.wait()
 
@@ -176,10 +172,10 @@ class DeviceServer:
 
     def _http(self, connection: Any, request: Any) -> Any:
         """Answers plain GET requests; None passes a WebSocket on."""
+        if why := self._guard.reason(request):
+            self.service.count(_refused(request, why))
+            return _envelope(connection, HTTPStatus.FORBIDDEN, why)
         where = urlsplit(request.path)
-        given = parse_qs(where.query).get("token", [""])[0]
-        if not hmac.compare_digest(given.encode(), self._token.encode()):
-            return _envelope(connection, HTTPStatus.FORBIDDEN, "a token is needed: ?token=...")
         if "websocket" in request.headers.get("Upgrade", "").lower():
             return None
         if where.path == "/version":
@@ -187,6 +183,14 @@ class DeviceServer:
         if where.path == "/devices":
             return _envelope(connection, HTTPStatus.OK, data=self.service.inventory())
         return _envelope(connection, HTTPStatus.NOT_FOUND, f"no route {where.path}")
+
+
+def _refused(request: Any, why: str) -> str:
+    """A notice of a refused request."""
+    pages = request.headers.get_all("Origin")
+    if pages and why == REFUSED:
+        return f"a page of {pages[0]} was refused; --origin admits pages"
+    return f"a request was refused: {why}"
 
 
 def _version() -> dict[str, str]:
@@ -239,8 +243,8 @@ def serve(
         The server.
 
     Raises:
-        ParameterError: a value is out of its bounds, the port is taken, or websockets is not
-            installed.
+        ParameterError: a value is out of its bounds, the address is none of this machine, the port
+            is taken, or websockets is not installed.
     """
     most = inverse3.largest_force
     service = Service(

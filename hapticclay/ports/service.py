@@ -15,6 +15,7 @@ import time
 from collections import Counter
 from typing import Any
 
+from ..display import one_line
 from .commands import IDLE, NOTHING, Command, Vector
 from .driven_arm import LIMP, Drive
 from .exchanges import Exchange, ExchangeLog
@@ -166,7 +167,7 @@ class Service:
         Args:
             notice: what was dropped, and why.
         """
-        notice = notice[:LONGEST_NOTICE]
+        notice = one_line(notice, LONGEST_NOTICE)  # a client's text may hold control characters
         if notice not in self.notices and len(self.notices) >= MOST_NOTICES:
             notice = "further kinds"  # bounds memory under random input
         self.notices[notice] += 1

@@ -14,6 +14,7 @@ from .buttons import ButtonScript
 from .commands import IDLE, Command, Pair
 from .driven_arm import LARGEST_FORCE, Drive, Sensed
 from .exchanges import ExchangeLog
+from .guard import origins_of
 from .inverse import Cursor
 
 ID = re.compile("[0-9A-F]{1,16}")
@@ -32,6 +33,8 @@ class Inverse3:
         buttons: pressed buttons of the grip over time.
         largest_force: longer forces are shortened to this length [N], > 0, at most 1e3.
         protocol: "inverse" for the Haply Inverse service, or "rosbridge" for ROS topics as JSON.
+        origins: addresses of web pages that may drive the device, as ("http://localhost:8000",).
+            Others are refused, for a browser would let any page connect to this machine.
     """
 
     device_id: str = "04EA"
@@ -40,9 +43,11 @@ class Inverse3:
     buttons: ButtonScript = ButtonScript()
     largest_force: Annotated[float, Bound(0.0, 1e3, "N", above=True)] = LARGEST_FORCE
     protocol: Literal["inverse", "rosbridge"] = "inverse"
+    origins: Any = ()  # texts, checked below
 
     def __post_init__(self):
         check_fields(self)
+        object.__setattr__(self, "origins", origins_of(self.origins))
         for name in ("device_id", "grip_id"):
             if not ID.fullmatch(getattr(self, name)):
                 bound = "must be 1 to 16 hexadecimal digits, as 04EA"

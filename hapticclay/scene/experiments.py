@@ -14,9 +14,9 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import cos, radians
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, ParamSpec
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, ParamSpec, get_origin
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, field_types
 from ..formulas.constants import B_MAX
 from ..model.cells import Profile
@@ -44,8 +44,15 @@ from ..model.flow import Flow
 from ..model.operator import Operator
 from ..model.signals import Multisine
 from .changes import check_added_hand, nested
-from .field_kinds import ENTIRE, no_field
-from .fields import Field, bounds_at, dotted_names, field_descriptions, function_of
+from .field_kinds import ENTIRE, no_field, union_members
+from .fields import (
+    Field,
+    bounds_at,
+    dotted_names,
+    field_descriptions,
+    field_unit,
+    function_of,
+)
 from .given_values import make_part, merged_values, values_of
 from .scenario import (
     EXPERIMENTS,
@@ -118,6 +125,7 @@ class Experiment:
         raise NotImplementedError
 
     @classmethod
+    @checked
     def of(cls, words: Mapping[str, Any], *changes: Mapping[str, Any]) -> Scenario:
         """The scenario of an experiment whose parameters are given as in `parameters`.
 
@@ -179,7 +187,7 @@ class PathExperiment(Experiment):
     """Parameters of the experiments that end where a path ends.
 
     Attributes:
-        length: the run ends when the handle reaches this x [m], -10 to 10.
+        length: the run ends when the handle reaches this x [m], -10 to 10; None runs for t_max.
         start: handle position at t = 0, at rest [m].
         integrator: "fast" (second order, any stiffness) or "accurate" (fourth order, slower).
     """
@@ -396,13 +404,23 @@ def _split_names(
         )
         data["operator"] = {k: _operator(v) if k is ENTIRE else v for k, v in hand.items()}
     for name, value in data.items():
-        if name in types and (name not in known or _reaches(types[name], value)):
+        fits = name in types and not (_is_row(value) and _takes_one(types[name][0]))
+        if name in types and (name not in known or (fits and _reaches(types[name], value))):
             own[name] = value
         elif name in known:
             other[name] = value
         else:
             raise no_field(name, value, parameter_names(kind))
     return own, other
+
+
+def _is_row(value: Any) -> bool:
+    return isinstance(value, list | tuple)
+
+
+def _takes_one(hint: Any) -> bool:
+    """Whether a parameter is one number, where the field of its name is a pair."""
+    return not any(get_origin(kind) is tuple for kind in union_members(hint))
 
 
 def _reaches(field: tuple[Any, Bound | None], value: Any, *names: str) -> bool:
@@ -443,13 +461,7 @@ def parameter_unit(name: str) -> str:
     Args:
         name: the parameter, or the dotted name.
     """
-    head, *rest = name.split(".")
-    for kind in (*EXPERIMENTS.values(), Scenario):
-        if head in field_types(kind):
-            units = [b.unit for b in bounds_at(*field_types(kind)[head], rest)]
-            if any(units):
-                return next(filter(None, units))
-    return ""
+    return field_unit(name, *EXPERIMENTS.values(), Scenario)
 
 
 P = ParamSpec("P")

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import functools
 from collections.abc import Iterator, Mapping, Sequence
 from types import UnionType
 from typing import Any, Union, get_args, get_origin
 
-from ..errors import Bound, ParameterError, field_types
+from ..errors import Bound, ParameterError, field_types, nearest
 from ..model.constants import AXES
 from ..model.hardware import JOINTS
 
@@ -136,10 +135,10 @@ def no_field(name: str, value: Any, known: Sequence[str]) -> ParameterError:
         return ParameterError(name, value, bound)
     depth = name.count(".")
     level = list(dict.fromkeys(".".join(k.split(".")[: depth + 1]) for k in known))
-    near = difflib.get_close_matches(name, level, n=1)
+    near = nearest(name, level)
     if not near:  # another part may have this field
         last, ends = name.rpartition(".")[2], {k.rpartition(".")[2]: k for k in reversed(known)}
-        near = [ends[n] for n in difflib.get_close_matches(last, ends, n=1)]
+        near = [ends[n] for n in nearest(last, ends)]
     path, _, _ = name.rpartition(".")
     told = ", ".join(k.removeprefix(f"{path}.") for k in level)
     bound = (

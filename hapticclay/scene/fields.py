@@ -128,6 +128,22 @@ def bounds_at(hint: Any, bound: Bound | None, names: Sequence[str]) -> list[Boun
     return out
 
 
+def field_unit(name: str, *kinds: type) -> str:
+    """Unit of a number by its dotted name, in the first class that has one there; "" for none.
+
+    Args:
+        name: the dotted name.
+        *kinds: classes to look into.
+    """
+    head, *rest = name.split(".")
+    for kind in kinds:
+        if head in field_types(kind):
+            units = [b.unit for b in bounds_at(*field_types(kind)[head], rest)]
+            if any(units):
+                return next(filter(None, units))
+    return ""
+
+
 @functools.cache
 def function_of(
     kind: Callable[P, T], name: str, answer: Callable[[T], R], refused: str

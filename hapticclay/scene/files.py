@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import os
 import re
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ..errors import ParameterError
-from ..files import atomic
+from ..files import MOST_SETTINGS, atomic, parse_json, parse_toml, read_text
 from .earlier_names import with_present_names
 from .plain_data import plain_data
 
@@ -39,16 +38,14 @@ def read_settings(path: str | os.PathLike[str]) -> dict[str, Any]:
     file = Path(path)
     kind = _file_kind(file)
     try:
-        if file.exists() and not file.is_file():  # reading a pipe would block
-            raise ValueError("it is not a regular file")
-        text = file.read_bytes().decode("utf-8-sig")
-        data = tomllib.loads(text) if kind == "TOML" else json.loads(text, object_pairs_hook=_table)
+        text = read_text(file, MOST_SETTINGS)
+        data = parse_toml(text) if kind == "TOML" else parse_json(text, _table)
         if not isinstance(data, dict):
             raise ValueError("it holds no table")
     except OSError as error:
         bound = f"must be a file that can be read ({error.strerror})"
         raise ParameterError("scenario", str(path), bound) from None
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         fault = " ".join(str(error).split())
         if isinstance(error, UnicodeDecodeError):
             fault = f"byte {error.start} is not UTF-8"

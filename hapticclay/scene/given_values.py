@@ -155,6 +155,8 @@ def _taken_numbers(kind: Any, bound: Bound, value: Any, path: str, old: Any) -> 
         return tuple(out)
     if isinstance(value, list | tuple):
         return tuple(entry(i, x) for i, x in enumerate(value))
+    if open_ and isinstance(value, str) and value.lower() in ("", "none"):
+        return ()
     one = _taken_one((float,), bound, value, path)
     if isinstance(one, int | float) and not isinstance(one, bool) and get_origin(item) is not tuple:
         return (one,) * (1 if open_ else len(bound.names))

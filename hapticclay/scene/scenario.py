@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..display import html_table, one_line
 from ..errors import Bound, ParameterError, check_fields, choice, number, quantity
 from ..model import samples, shapes  # noqa: F401  # so that files and options know every Signal
@@ -40,7 +40,7 @@ Force = Annotated[tuple[float, float], Bound(-1e6, 1e6, "N")]
 STEP_LEAST = 1e-6  # [s]
 StepLength = Annotated[float, Bound(STEP_LEAST, 0.02, "s")]
 Duration = Annotated[float, Bound(0.0, 1e5, "s", above=True)]
-Length = Annotated[float, Bound(-10.0, 10.0, "m")]
+Length = Annotated[float | None, Bound(-10.0, 10.0, "m")]
 Position = Annotated[tuple[float, float], Bound(unit="m")]
 TorqueLimit = Annotated[tuple[float, float], Bound(0.0, 1e6, "N.m", above=True, names=JOINTS)]
 SamplePeriod = Annotated[float | None, Bound("dt", 1.0, "s")]
@@ -107,7 +107,7 @@ class Scenario:
     inertia_shaping: bool = False
     dt: StepLength = TS
     t_max: Duration = 60.0
-    length: Annotated[float | None, Bound(-10.0, 10.0, "m")] = PATH_LENGTH
+    length: Length = PATH_LENGTH
     start: Position = (0.0, 0.0)
     velocity: Annotated[tuple[float, float], Bound(-10.0, 10.0, "m/s")] = (0.0, 0.0)
     origin: Position = ORIGIN
@@ -161,6 +161,7 @@ class Scenario:
         return html_table(f"Scenario {self.name}", scenario_rows(self))
 
     @classmethod
+    @checked
     def of(cls, settings: Mapping[str, Any], *changes: Mapping[str, Any]) -> Scenario:
         """Makes a scenario from plain data: fields, or an experiment with parameters and fields.
 
@@ -189,6 +190,7 @@ class Scenario:
         return cls(**values)
 
     @classmethod
+    @checked
     def load(cls, path: str | os.PathLike[str], *changes: Mapping[str, Any]) -> Scenario:
         """Reads a scenario from a file (docs/scenarios.md).
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, choice, number
 from ..formulas.constants import B_MAX
 from ..model.arm import Arm
@@ -97,6 +97,7 @@ class VirtualWall:
             raise ParameterError("wall.velocity", self.velocity, bound)
 
     @classmethod
+    @checked
     def load(cls, path: str | os.PathLike[str]) -> VirtualWall:
         """Reads a wall from a file: fields by name, as in `device.mass = 0.1`, `Ts = "1 ms"`.
 

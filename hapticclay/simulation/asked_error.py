@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import re
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -18,6 +17,7 @@ from ..errors import ParameterError, number
 from ..kernel import native
 from ..kernel.pace import STABLE_STEP, check_explicit, fastest_rate
 from ..scene.scenario import Scenario
+from ..units import from_unit
 from .accuracy import Accuracy
 from .columns import ARRAYS
 from .one_run import run_once
@@ -62,7 +62,7 @@ def parse_error(error: object) -> tuple[float, str]:
     """Parses a requested error.
 
     Args:
-        error: seconds, or a text of a number and a unit: "1e-6 s", "1e-7 m".
+        error: seconds, or a text of a number and a unit of time or length: "100 ns", "0.1 um".
 
     Returns:
         The number, and its unit, "s" or "m".
@@ -70,18 +70,17 @@ def parse_error(error: object) -> tuple[float, str]:
     Raises:
         ParameterError: no such number or unit, or an error too small beside rounding.
     """
-    value, unit = error, "s"
-    if isinstance(error, str):
-        parts = re.fullmatch(r"\s*([-+.\deE]*?\d\.?|[-+]?(?:nan|inf))\s*([^\W\d]*)\s*", error)
-        unit = (parts and parts[2]) or "s"
+    if not isinstance(error, str):
+        return number("error", error, ROUNDING, 1.0, unit="s"), "s"
+    for unit in UNITS:
         try:
-            value = float(parts[1]) if parts else None
+            given = from_unit(error, unit)
+            value = float(error) if given is None else given
         except ValueError:
-            value = None
-        if value is None or unit not in UNITS:
-            bound = "must be a number of seconds, or of metres with its unit, such as '1e-7 m'"
-            raise ParameterError("error", error, bound)
-    return number("error", value, ROUNDING, 1.0, unit=unit), unit
+            continue
+        return number("error", value, ROUNDING, 1.0, unit=unit), unit
+    bound = "must be a number of seconds, or of metres with its unit, such as '1e-7 m' or '0.1 um'"
+    raise ParameterError("error", error, bound)
 
 
 def simulate_within(

@@ -76,8 +76,8 @@ def simulate_batch(
     """Runs scenarios in parallel; each gives the record of `simulate`, bit for bit.
 
     Results do not depend on the number of threads or the order. Without the compiled kernel, scenes
-    run one after the other. A record takes 160 bytes per sample, a summary 500 bytes. Scenarios may come from a
-    generator: they are read as they are run, and summaries do not keep them.
+    run one after the other. A record takes 160 bytes per sample, a summary 500 bytes. Scenarios may
+    come from a generator: they are read as they are run, and summaries do not keep them.
 
     Args:
         scenarios: what to run; they may differ in anything. Short runs, of up to 10 000 steps, that

@@ -8,7 +8,6 @@ from ..errors import ParameterError, choice
 from ..kernel import native
 
 ENGINES = ("auto", "python", "native")
-REMEDY = "install a C compiler and Python's headers (apt install gcc python3-dev), then hapticclay"
 LONG = 50_000  # steps that take Python more than a second
 _told = False
 
@@ -30,10 +29,28 @@ def engine_for(engine: str, steps: float = 0.0) -> str:
     if not why:
         return "native"
     if engine == "native":
-        raise ParameterError("engine", engine, f"needs the compiled kernel ({why}): {REMEDY}")
+        raise ParameterError("engine", engine, f"needs the compiled kernel ({why}): {remedy(why)}")
     if steps > LONG:
         tell(why)
     return "python"
+
+
+def remedy(why: str) -> str:
+    """What gets the compiled kernel.
+
+    Args:
+        why: there is none, as `native.why_not` says it.
+    """
+    root = native.PACKAGE.parent
+    again = f"pip install -e {root}" if (root / "setup.py").is_file() else "pip install . again"
+    lacks = "compiler" in why or "Python.h" in why
+    return f"apt install gcc python3-dev, then {again}" if lacks else again
+
+
+def made_by() -> str:
+    """Who makes the steps of runs here, and why if it is Python."""
+    why = native.why_not()
+    return f"Python: no compiled kernel ({why}); {remedy(why)}" if why else "the compiled kernel"
 
 
 def tell(why: str) -> None:
@@ -42,7 +59,7 @@ def tell(why: str) -> None:
     if not _told:
         _told = True
         print(
-            "hapticclay: Python makes the steps, some 15 times slower: no compiled kernel "
-            f"({why}); {REMEDY}",
+            "hapticclay: Python makes the steps, some 15 times slower: "
+            f"no compiled kernel ({why}); {remedy(why)}",
             file=sys.stderr,
         )

@@ -17,7 +17,7 @@ import numpy as np
 from ..arguments import checked, named
 from ..display import html_table, one_line
 from ..errors import ParameterError, choice
-from ..files import atomic, versions
+from ..files import DAMAGED, atomic, check_regular, parse_json, versions
 from ..model.clay import Clay
 from ..model.constants import AXES
 from ..model.signals import Multisine
@@ -65,10 +65,13 @@ class Record:
         outcome: how the run ended.
         crossings: of borders, in order.
         energy: work of the operator's muscle and of the motors; energy taken by the clay and by the
-            damper of Th, stored in the arm (kinetic) and in mass and spring of Th (hand_stored);
-            imbalance (residual) and sum of all magnitudes (throughput) [J]; for clay that springs
-            back, the part of the clay's share that its springs store and have dissipated
-            (springs_stored, springs_dissipated).
+            damper of Th, gained by the arm (kinetic) and by mass and spring of Th (hand_stored);
+            what these fail to balance by (residual), and the energy that came into play
+            (throughput): that at the start, and the magnitudes of both works, step by step [J].
+            For clay that springs back, the part of the clay's share that its springs store and
+            have dissipated (springs_stored, springs_dissipated). Clay that the motors hold takes
+            nothing itself (clay is 0): the work of its force, a part of motors, is rendered_clay.
+            With hardware: friction, passivity_controller, coupling (docs/hardware.md).
         steps: number of engine steps.
         wall_time: run time [s].
         versions: of the packages used.
@@ -105,6 +108,7 @@ class Record:
     ground: np.ndarray | None = None
 
     @classmethod
+    @checked
     def of(cls, run: Run, wall: float) -> Record:
         """The record of a finished run.
 
@@ -396,11 +400,11 @@ class Record:
         """
         folder = Path(path)
         head = {k: v for k, v in self.summary().items() if k != "regions"}
-        arrays = {name: getattr(self, name) for name in ARRAYS} | self.extra
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in ARRAYS} | self.extra
         if self.ground is not None:
             arrays["ground"] = self.ground
         with atomic(folder / "record.npz") as f:
-            np.savez(f, allow_pickle=False, summary=np.array(json.dumps(head)), **arrays)
+            np.savez(f, summary=np.array(json.dumps(head)), **arrays)
         with atomic(folder / "summary.json") as f:
             f.write((json.dumps(self.summary(), indent=2) + "\n").encode())
         if "left_out" in head.get("notes", {}):  # a function has no file; an older one misleads
@@ -410,6 +414,7 @@ class Record:
         return folder
 
     @classmethod
+    @checked
     def load(cls, path: str | os.PathLike[str]) -> Record:
         """Reads what `save` wrote.
 
@@ -423,15 +428,14 @@ class Record:
             ParameterError: there is no record, or it has another schema.
         """
         file = Path(path)
-        file = file / "record.npz" if file.is_dir() else file
+        file = file / "record.npz" if os.path.isdir(file) else file
         try:
-            if file.exists() and not file.is_file():  # reading a pipe would block
-                raise ValueError("it is not a regular file")
+            check_regular(file)
             if file.is_file() and not zipfile.is_zipfile(file):
-                raise ValueError("it is no .npz file")
+                raise ValueError("give its folder, or its record.npz; this is another file")
             with open(file, "rb") as f, np.load(f, allow_pickle=False) as z:
                 check_headers(z.zip)
-                head = json.loads(str(z["summary"]))
+                head = parse_json(str(z["summary"]))
                 arrays = {name: z[name] for name in ARRAYS}
                 extra = {name: z[name] for name in EXTRA if name in z}
                 ground = z["ground"] if "ground" in z else None
@@ -457,16 +461,7 @@ class Record:
                     error=_accuracy(head.get("error")),
                     ground=ground,
                 )
-        except (
-            OSError,
-            EOFError,
-            KeyError,
-            ValueError,
-            TypeError,
-            AttributeError,
-            RecursionError,
-            zipfile.BadZipFile,
-        ) as error:
+        except DAMAGED as error:
             text = getattr(error, "strerror", None) or " ".join(str(error).split())
             what = text or type(error).__name__
             raise ParameterError("record", str(path), f"must be a saved record ({what})") from None

@@ -359,6 +359,7 @@ class Run:
         filled = s.row
         if not filled or filled + n >= CHUNK - 1 or self._prepares:
             return False
+        self.draw(n)
         row.advance(filled + n)
         self._shown = None
         self._count()
@@ -370,8 +371,8 @@ class Run:
 
     @property
     def _prepares(self) -> bool:
-        """Whether something is to be prepared before steps, or looked at after them."""
-        return self.drives is not None or self.row.is_called or bool(self.row.m.chance)
+        """Whether something but chance is to be prepared before steps, or looked at after them."""
+        return self.drives is not None or self.row.is_called
 
     def interrupt(self) -> None:
         """Ends the run at its last sample."""

@@ -39,9 +39,9 @@ def simulate(
         The record. Instability and similar ends are outcomes (record.status), not exceptions.
 
     Raises:
-        ParameterError: an argument is of the wrong kind, there is no compiled kernel, the scene is too
-            stiff for its integrator, the record may not fit into memory, the law of its controller
-            is not found, or an error in seconds is requested without a border to cross.
+        ParameterError: an argument is of the wrong kind, there is no compiled kernel, the scene
+            is too stiff for its integrator, the record may not fit into memory, the law of its
+            controller is not found, or an error in seconds is requested without a border to cross.
         RuntimeError: the law of its controller raised an exception (`LawFailed`). Interruptions
             such as Ctrl-C are raised unchanged.
     """

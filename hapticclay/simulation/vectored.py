@@ -50,6 +50,7 @@ class VectoredRuns:
         self.states = np.zeros(n * native, layout.dtype_of(records.State))
         self.spares = [one(records.State) for _ in range(workers * native)]
         self.engines = np.zeros((workers, n), np.int64)  # addresses, by thread and run
+        self.kept: list[list[mover.Mover]] = [[] for _ in scenarios]  # what lies there
         places = [Place(self.movers[0]) for _ in scenarios]
         self.runs = [
             self._new(k, s, x) for k, (s, x) in enumerate(zip(scenarios, places, strict=True))
@@ -77,7 +78,8 @@ class VectoredRuns:
         self.force[k], self.gain[k] = s.force, s.gain
         self.looked_at[k], self.diverging[k] = -np.inf, False
         if self.engine == "native":
-            self.engines[:, k] = [x.of(s).row.ctypes.data for x in self.movers]
+            self.kept[k] = [x.of(s) for x in self.movers]
+            self.engines[:, k] = [x.row.ctypes.data for x in self.kept[k]]
         self.is_shown = False
 
     def _sync(self, k: int) -> Run:
@@ -169,7 +171,13 @@ class VectoredRuns:
         for k in which[alone].tolist() if self.engine == "native" else which.tolist():
             self._one(k, n)
         if self.engine == "native":
+            self._draw(which[~alone], n)
             self._together(which[~alone], n)
+
+    def _draw(self, which: np.ndarray, n: int) -> None:
+        """Draws what the hardware of runs leaves to chance in the next n steps."""
+        for k in which[self.models["chance"][which] != 0].tolist():
+            self.runs[k].draw(n)
 
     def _one(self, k: int, n: int) -> None:
         """Advances a run for which something is to be prepared, or in Python."""
@@ -248,6 +256,7 @@ class VectoredRuns:
             for k in live[alone].tolist() if self.engine == "native" else live.tolist():
                 self.shown[k] = self.runs[k].ahead()
             if self.engine == "native" and not alone.all():
+                self._draw(live[~alone], 1)
                 self._call(self._peek, live[~alone])
                 self._put_force(live[~alone])
             self.is_shown = True

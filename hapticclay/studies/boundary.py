@@ -10,7 +10,7 @@ from typing import Annotated, TypeVar
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..errors import Bound, ParameterError, number
 from ..formulas import arm as arm_law
 from ..formulas.constants import B_MAX
@@ -49,7 +49,7 @@ class PushedLoop(Loop):
     Attributes:
         b: clay on both axes [N.s/m].
         k: stiffness of the clay on both axes, at rest at the initial position of the handle [N/m].
-        K: compensator gain, > 0, at most 1e6.
+        K: compensator gain, > 0, at most 1e6 [1/kg] for the printed compensator.
         inertia_shaping: as in Scenario; without it the arm's mobility replaces the gain of Sh.
         pose: position of the handle relative to its nominal position [m].
         push: velocity of the handle at the start [m/s]. If C has no integrator, no state of C
@@ -60,7 +60,7 @@ class PushedLoop(Loop):
     """
 
     b: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 90.0
-    K: Annotated[float, Bound(0.0, 1e6, above=True)] = 1.0
+    K: Annotated[float, Bound(0.0, 1e6, "1/kg", above=True)] = 1.0
     inertia_shaping: bool = True
     pose: Position = (0.0, 0.0)
     push: Annotated[float, Bound(-10.0, 10.0, "m/s")] = SMALL_PUSH
@@ -72,6 +72,7 @@ class PushedLoop(Loop):
         number("delay", self.delay, 0.0, 1.0 if self.Ts else 0.0, unit="s")
 
     @classmethod
+    @checked
     def of(cls, scenario: Scenario, axis: str = "x", b: float | None = None) -> PushedLoop:
         """A runnable loop of one axis of a scenario, in uniform clay.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import json
 import multiprocessing
@@ -59,8 +60,9 @@ def run_columns(
     Raises:
         ParameterError: as by `simulate_columns`; or the folder holds other runs, or cannot be
             written, or a package is missing.
-        ChildProcessError: a worker here was killed.
+        ChildProcessError: workers here cannot be started, or one was killed.
         ConnectionError: the connection to the scheduler is lost.
+        FileNotFoundError: the folder, or a file in it, was removed while the runs were made.
     """
     plan, folder, done = ColumnRuns(base, columns, chunk), Path(out), 0
     with sweep.claimed(plan, folder) as (_, todo):
@@ -125,11 +127,15 @@ class ColumnRuns:
 
     def described(self) -> dict[str, Any]:
         """The runs as plain data; the columns by their names and a fingerprint."""
+        told = {"base": plain_data(self.base), "columns": list(self.columns), "runs": len(self)}
+        return {"schema": SCHEMA, **told, "chunk": self.chunk, "values": self._fingerprint}
+
+    @functools.cached_property
+    def _fingerprint(self) -> str:
         values = hashlib.sha256()
         for x in self.columns.values():
             values.update(x.tobytes())
-        told = {"base": plain_data(self.base), "columns": list(self.columns), "runs": len(self)}
-        return {"schema": SCHEMA, **told, "chunk": self.chunk, "values": values.hexdigest()}
+        return values.hexdigest()
 
     def digest(self) -> str:
         """Fingerprint of the runs and of the hapticclay release."""

@@ -125,6 +125,9 @@ def compare_files(
         ParameterError: fewer or more files, one of them twice, files of both kinds, or one that
             cannot be read.
     """
+    for p in paths:
+        if not isinstance(p, str | os.PathLike):
+            raise ParameterError("files", p, "must be paths")
     given = [str(p) for p in paths]
     if not 2 <= len(paths) <= MOST_COMPARED:
         bound = f"must be 2 to {MOST_COMPARED} files, as in hapticclay compare A.toml B.toml"

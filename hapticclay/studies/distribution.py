@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
 from ..arguments import named
-from ..errors import ParameterError, check_fields, choice
+from ..errors import ParameterError, check_fields, choice, number_in
 
 LawName = Literal["normal", "log-normal", "uniform", "log-uniform"]
 LAWS = get_args(LawName)
@@ -45,22 +46,28 @@ class Distribution:
             raise ParameterError(f"distribution {SIDES[3]}", self.second, bound)
 
     @classmethod
-    def parse(cls, field: str, text: object) -> Distribution:
+    def parse(cls, field: str, text: object, unit: str = "") -> Distribution:
         """Reads "normal:0:0.02", "log-normal:2:0.5", "uniform:0:1e-3" or "log-uniform:1:100".
 
         Args:
             field: name for the error.
-            text: the distribution.
+            text: the distribution; its numbers may have units, as in "uniform:0:1ms".
+            unit: unit of the parameter.
 
         Raises:
             ParameterError: it is none of these.
         """
-        law, *numbers = str(text).split(":")
+        if not isinstance(text, str):
+            raise ParameterError(field, text, "must be a text such as normal:0:0.02")
+        law, *numbers = text.split(":")
         choice(f"law of {field}", law, LAWS)
         try:
-            first, second = map(float, numbers)
+            first, second = (number_in(field, x, unit) for x in numbers)
+        except ParameterError:  # of a unit
+            raise
         except ValueError:
-            bound = f"must be like {law}:LOW:HIGH" if "uniform" in law else f"{law}:MEAN:SD"
+            sides = "LOW:HIGH" if "uniform" in law else "MEAN:SD"
+            bound = f"must be like {law}:{sides}"
             raise ParameterError(field, text, bound) from None
         return cls(law, first, second)  # type: ignore[arg-type]
 
@@ -155,20 +162,23 @@ def _normal_share(z: np.ndarray) -> np.ndarray:
     return ndtr(z)
 
 
-def parse_laws(text: str) -> dict[str, Distribution]:
+def parse_laws(text: str, unit_of: Callable[[str], str] = lambda _: "") -> dict[str, Distribution]:
     """Reads "delay=uniform:0:1e-3 pose.x=normal:0:0.02".
 
     Args:
         text: the distributions.
+        unit_of: unit of a parameter by name; by default no parameter has one.
 
     Raises:
         ParameterError: a word is not name=law:number:number, or a name stands twice.
     """
     out: dict[str, Distribution] = {}
+    if not isinstance(text, str):
+        raise ParameterError("vary", text, "must be a text such as delay=uniform:0:1e-3")
     for word in text.split():
         name, equals, law = word.partition("=")
         if not equals or not name or name in out:
             bound = "must be name=law:number:number, as in delay=uniform:0:1e-3, each name once"
             raise ParameterError("vary", word, bound)
-        out[name] = Distribution.parse(name, law)
+        out[name] = Distribution.parse(name, law, unit_of(name))
     return out

@@ -14,7 +14,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,9 +28,11 @@ from ..simulation.record import Record
 from .flow_models import (
     FLOW_LAWS,
     FLOW_UNITS,
+    OUTLYING,
     PARSIMONY,
     FlowParameter,
     best_fit,
+    far_forces,
     first_guesses,
     of_theta,
     parameter_intervals,
@@ -39,9 +41,11 @@ from .flow_models import (
     to_theta,
 )
 from .measurement import Measurement
+from .outliers import LOST, Cleaned, cleaned, robust_deviation, sentence, times
 from .sliding import (
     FAST,
     LEAST_SLIDING,
+    ROUNDED,
     UNDITHERED,
     Sliding,
     check_met,
@@ -49,6 +53,7 @@ from .sliding import (
     of_positions,
     of_record,
     quantum,
+    wrong_way,
 )
 from .trajectory import (
     Joint,
@@ -63,6 +68,8 @@ NARROW = 3.0  # ratio of speeds below which n is hardly identifiable
 MIDDLE = 0.96  # share of the samples whose speeds are compared
 EXACT = 1e-4  # of the force: smaller residuals are errors of splines or steps, not noise
 MISFIT = 1.25  # variance about a law over that about a free curve: above this no law fits
+SCREENINGS = 3  # of the forces, each with splines that the one before has freed of outliers
+TAILS = 1.5  # ratio of a noise by squares to that by the median, above which a warning is given
 CORRELATED = 2.0  # samples per independent sample, above which a warning is given
 
 
@@ -108,6 +115,9 @@ class Fitted(Result):
         warnings: limits of the result, one sentence each.
         axis: "x", "y", or "path" for the direction of motion.
         source: name of the data.
+        position_outliers: times of positions that were left out [s], (m,): spikes, lost packets,
+            repeated values.
+        force_outliers: times of forces that were left out [s], (m,): far from any law.
     """
 
     drawn_by = "hapticclay.views.fit_plots:fit_plot"
@@ -128,6 +138,8 @@ class Fitted(Result):
     warnings: tuple[str, ...]
     axis: str
     source: str
+    position_outliers: tuple[float, ...] = ()
+    force_outliers: tuple[float, ...] = ()
 
     def headline(self) -> str:
         """The law and its parameters with their intervals, in one line."""
@@ -197,6 +209,8 @@ class Fitted(Result):
             "force_noise": self.force_noise,
             "position_noise": self.position_noise,
             "spacing": self.spacing,
+            "position_outliers": list(self.position_outliers),
+            "force_outliers": list(self.force_outliers),
             "warnings": list(self.warnings),
             "units": {
                 "parameters": FLOW_UNITS,
@@ -205,6 +219,8 @@ class Fitted(Result):
                 "position_noise": "m",
                 "spacing": "s",
                 "correlation": "samples",
+                "position_outliers": "s",
+                "force_outliers": "s",
             },
             "versions": versions(),
         }
@@ -266,15 +282,12 @@ def fit_flow(
         raise ParameterError("data", f"{count} samples", bound)
     if met is not None:
         check_met(met, inside)
+    position = cleaned(p, quantum(p)) if v is None else None
     try:
-        s = of_positions(t, p, f, inside) if v is None else of_known_speed(t, v, f, inside)
+        return _fitted(_Columns(t, position, v, f, inside), names, level, axis, source)
     except np.linalg.LinAlgError:
         bound = "must be a motion that splines can follow"
         raise ParameterError("position", f"{count} samples", bound) from None
-    if float(np.sum(s.f)) <= 0.0:
-        bound = "must resist the motion: of the sign of the velocity, and not 0"
-        raise ParameterError("force", float(f"{np.mean(s.f):.4g}"), bound)
-    return _fitted(s, names, level, count, axis, source, f[inside])
 
 
 def _law_names(laws: Sequence[str] | str) -> list[str]:
@@ -293,22 +306,62 @@ def _plain_name(law: str) -> str:
     return str(law).lower().replace("-", " ")
 
 
+class _Columns(NamedTuple):
+    """What is fitted, (n,) each; `place` is None where velocities are known."""
+
+    t: np.ndarray
+    place: Cleaned | None
+    v: np.ndarray | None
+    f: np.ndarray
+    inside: np.ndarray
+
+    def sliding(self, out: np.ndarray) -> Sliding:
+        """The sliding samples without the forces of a mask."""
+        if self.place is None:
+            assert self.v is not None
+            return of_known_speed(self.t, self.v, self.f, self.inside & ~out)
+        return of_positions(self.t, self.place, self.f, self.inside, out)
+
+
+class _Laws(NamedTuple):
+    """Every candidate fitted: best within bounds, and with Fy and b of any sign."""
+
+    joint: Joint
+    found: dict[str, tuple[Minimum, Minimum]]
+    least: float  # variance of a force: smaller ones are errors of splines or steps
+    tau: float  # samples per independent sample
+
+
 def _joint(s: Sliding, ratio: float) -> Joint:
     return Joint(s.f, s.p, s.motion, s.v, ratio, 0.5 * s.slowest)
 
 
-def _fitted(
-    s: Sliding,
-    names: list[str],
-    level: float,
-    samples: int,
-    axis: str,
-    source: str,
-    raw: np.ndarray,
-) -> Fitted:
+def _without_outliers(data: _Columns) -> tuple[Sliding, np.ndarray]:
+    """The sliding samples without outliers of the force, and the mask of these."""
+    out = np.zeros(len(data.t), dtype=bool)
+    s = data.sliding(out)
+    for _ in range(SCREENINGS):
+        some = far_forces(s)
+        if not some.any():
+            break
+        out[s.at[some]] = True
+        s = data.sliding(out)
+    return s, out
+
+
+def _check_resisting(f: np.ndarray) -> None:
+    """Refuse forces that drive the motion; a few of them, as far off as they like, do not count."""
+    limit = float(np.quantile(np.abs(f), MIDDLE))
+    if float(np.sum(np.clip(f, -limit, limit))) <= 0.0:
+        bound = "must resist the motion: of the sign of the velocity, and not 0"
+        raise ParameterError("force", float(f"{np.mean(f):.4g}"), bound)
+
+
+def _fit_laws(s: Sliding, names: list[str]) -> _Laws:
+    """Every candidate fitted, with weights from the best of them."""
     n = len(s.f)
-    v = s.v if s.motion is None else np.maximum(s.motion.velocity(s.v), 0.5 * s.slowest)
-    least = EXACT**2 * float(np.mean(s.f**2))  # variance
+    v = s.speeds
+    least = EXACT**2 * float(np.mean(s.f**2))
     of_place = s.position_variance * s.position_correlation
     variance, tau = max(s.force_variance, least), 1.0
     starts = {law: first_guesses(law, v, s.f) for law in names}
@@ -325,6 +378,20 @@ def _fitted(
         tau = correlation_time(found[richest][0].rest) if variance > least else 1.0
         if not s.motion or abs(variance * tau / before - 1.0) < 0.05:
             break
+    return _Laws(joint, found, least, tau)
+
+
+def _fitted(
+    data: _Columns,
+    names: list[str],
+    level: float,
+    axis: str,
+    source: str,
+) -> Fitted:
+    s, out = _without_outliers(data)
+    _check_resisting(s.f)
+    joint, found, least, tau = _fit_laws(s, names)
+    n = len(s.f)
     count = n / tau
     if count < LEAST_INDEPENDENT:
         bound = f"must be {LEAST_INDEPENDENT} or more; what a law leaves of the force is correlated"
@@ -337,6 +404,7 @@ def _fitted(
     k = len(best.theta)
     variance = max(best.sum / (n - k), least)
     sizes = variance * tau, student_quantile(level, count - k)
+    bad = data.place.bad & data.inside if data.place else np.zeros_like(out)
     result = Fitted(
         law,
         parameter_intervals(joint, law, best, free, *sizes),
@@ -349,13 +417,38 @@ def _fitted(
         math.sqrt(variance),
         math.sqrt(s.position_variance),
         tau,
-        samples,
+        int(np.count_nonzero(data.inside)),
         s.spacing,
         (),
         axis,
         source,
+        tuple(data.t[bad].tolist()),
+        tuple(data.t[out].tolist()),
     )
-    return dataclasses.replace(result, warnings=_warnings(result, s, quantum(raw)))
+    told = _left_out(result, data, out) + _warnings(result, s, quantum(data.f[data.inside]))
+    return dataclasses.replace(result, warnings=told)
+
+
+def _left_out(r: Fitted, data: _Columns, out: np.ndarray) -> tuple[str, ...]:
+    """Warnings about outliers."""
+    told, n = [], r.samples
+    if len(r.position_outliers):
+        told.append(sentence("position", r.position_outliers, n, LOST))
+    steps = data.place.steps if data.place else ()
+    steps = [i for i in steps if data.inside[i]]
+    if steps:
+        told.append(
+            f"the position jumps and does not return at t = {times(data.t[steps])} s: the motion "
+            "is fitted in parts"
+        )
+    if len(r.force_outliers):
+        why = f"more than {OUTLYING:g} deviations from any law"
+        if n_wrong := np.count_nonzero(wrong_way(data.f, data.place, data.v)[out]):
+            why += (
+                f"; {n_wrong} of them drive the motion: wrong signs, or a delay between the columns"
+            )
+        told.append(sentence("force", r.force_outliers, n, why))
+    return tuple(told)
 
 
 def _compared(
@@ -421,6 +514,7 @@ def _warnings(r: Fitted, s: Sliding, count: float) -> tuple[str, ...]:
             f"the force is rounded to {count:.3g} N, more than its noise, {r.force_noise:.2g} N: "
             "rounding may bias the fit by a part of that"
         )
+    out += _tail_warnings(r, s, count)
     for p in r.parameters:
         if p.name == "n" and (p.low <= N_MIN or p.high >= N_MAX):
             out.append(f"the interval of n ends at its bound, {N_MIN:g} or {N_MAX:g}")
@@ -434,3 +528,17 @@ def _warnings(r: Fitted, s: Sliding, count: float) -> tuple[str, ...]:
                 "is off, or the clay is not alike both ways"
             )
     return tuple(out)
+
+
+def _tail_warnings(r: Fitted, s: Sliding, count: float) -> list[str]:
+    """Warnings about errors that are too large for noise and yet were not left out."""
+    left = r.residuals - np.median(r.residuals)
+    usual = max(robust_deviation(left), ROUNDED * count)
+    tails = {"forces": float(np.std(left)) / usual if usual > 0.0 else 1.0}
+    tails["positions"] = s.position_tails
+    return [
+        f"the {name} have errors that are no noise: their deviation is {x:.3g} times that of "
+        "normal noise with the same median"
+        for name, x in tails.items()
+        if x > TAILS
+    ]

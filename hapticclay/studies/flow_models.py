@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arguments import named
+from .outliers import robust_deviation
+from .sliding import Sliding
 from .trajectory import (
     FIT_RANGES,
     Flowing,
@@ -25,6 +27,10 @@ FLOW_LAWS: dict[str, Flowing] = {  # from simple to rich, named as `Flow.kind`
 }
 FLOW_UNITS = {"Fy": "N", "K": "N/(m/s)^n", "n": "", "b": "N.s/m"}
 PARSIMONY = 6.0  # of AICc: a richer law needs odds of 20 to 1, exp(6/2), over a simpler one
+OUTLYING = 6.0  # deviations from every law that make a force an outlier
+SMALLEST_OUTLIER = 1e-2  # of the usual force; smaller ones are errors of splines and steps
+PEELED = 0.5  # of the largest residual: outliers go from large to small, which hide behind them
+MOST_OUTLIERS = 0.2  # share of the forces; more of them are no outliers
 TRIAL_INDICES = (0.15, 0.3, 0.5, 0.75, 1.0, 1.5, 2.2)  # flow indices from which fits start
 
 
@@ -112,6 +118,37 @@ def best_fit(joint: Joint, law: str, start: np.ndarray) -> tuple[Minimum, Minimu
         held |= bad
         found = joint.least(flowing, np.where(held, 0.0, found.theta), held.tolist())
     return found, free
+
+
+def far_forces(s: Sliding) -> np.ndarray:
+    """Forces far from the law of most of them, (n,): spikes, wrong signs.
+
+    The law is the richest, fitted to the speeds of the motion; the noise is that of the median.
+    Near rest it grows by that of the speed. None is far where many are: the law is then wrong.
+
+    Args:
+        s: sliding samples.
+    """
+    law, v = FLOW_LAWS["Herschel-Bulkley"], s.speeds
+    least = SMALLEST_OUTLIER / OUTLYING * float(np.median(np.abs(s.f)))
+    out = np.zeros(len(v), dtype=bool)
+    for _ in range(40):
+        joint = Joint(s.f[~out], s.p[:0], None, v[~out], 0.0, 0.5 * s.slowest)
+        found = best_fit(
+            joint, "Herschel-Bulkley", first_guesses("Herschel-Bulkley", v[~out], s.f[~out])
+        )[0]
+        force, slope, _ = law.slopes(found.theta, v)
+        rest = np.abs(s.f - force)
+        usual = OUTLYING * max(robust_deviation(rest[~out]), least)
+        usual = usual + (2.0 * s.slowest * np.abs(slope) if s.motion else 0.0)
+        far = rest > np.maximum(usual, PEELED * float(np.max(rest[~out])))
+        new = far | (out & (rest > usual))
+        if np.count_nonzero(new) > MOST_OUTLIERS * len(v):
+            return np.zeros(len(v), dtype=bool)
+        if np.array_equal(new, out):
+            break
+        out = new
+    return out
 
 
 def refit_nested(joint: Joint, found: dict[str, tuple[Minimum, Minimum]]) -> None:

@@ -47,6 +47,7 @@ IDENTIFICATION_BAND = {"G": (0.15, 20.0), "S": (0.15, 20.0), "Th": (0.08, 3.0)} 
 PERIOD = {"G": 5.0, "S": 5.0, "Th": 10.0}  # [s]
 AMPLITUDE = {"G": 2e-3, "S": 2e-3, "Th": 1e-2}  # [m]: small enough to keep the pose; none for Th
 MULTISINE_LINES = 40
+REALISATIONS = 8  # runs; rounding errors of one run are flat-topped, and t over four is too short
 COHERENT = 0.5  # least coherence of a usable line
 # Relative deviation of the loop from the fitted form at AMPLITUDE, in runs without noise; SHAPED
 # for Sh where it holds at every pose.
@@ -141,6 +142,7 @@ class Identified(Result):
         periods: periods kept of each run; 0 for a measured record without a period.
         realisations: number of runs.
         source: name of the measured columns; empty for the simulated arm.
+        warnings: limits of the result, one sentence each.
     """
 
     drawn_by = "hapticclay.views.identification_plots:identified_plot"
@@ -158,14 +160,15 @@ class Identified(Result):
     periods: int
     realisations: int
     source: str = ""
+    warnings: tuple[str, ...] = ()
 
     def headline(self) -> str:
-        """Block, axis and coefficients with their intervals, in one line."""
+        """Block, axis or source, and coefficients with their intervals, in one line."""
         told = (
             f"{c.name} {c.value:.5g} ({c.low:.5g} to {c.high:.5g}) {c.unit}"
             for c in self.coefficients
         )
-        return f"{self.what} of {self.axis}: {', '.join(told)}"
+        return f"{self.what} of {self.source or self.axis}: {', '.join(told)}"
 
     def tables(self) -> dict[str, dict[str, Any]]:
         """Coefficients, and the response beside those of the fit and of the paper."""
@@ -182,6 +185,18 @@ class Identified(Result):
         if self.periods:
             return f"lines of {self.periods} whole periods"
         return "whole record, with its start and end"
+
+    @property
+    def device(self) -> tuple[float, float, float]:
+        """Mass [kg], damper [N.s/m] and spring [N/m] of what moves: a device, or an arm at a pose.
+
+        Raises:
+            ParameterError: of G, whose input is no force.
+        """
+        if self.what == "G":
+            raise ParameterError("what", self.what, 'must be "S" or "Th": their input is a force')
+        a, b, c = self.values
+        return (a, b, c) if self.what == "Th" else (1.0 / a, b / a, c / a)
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -208,6 +223,7 @@ class Identified(Result):
             "seed": self.seed,
             "periods": self.periods,
             "realisations": self.realisations,
+            "warnings": list(self.warnings),
             "units": {
                 "frequency": "Hz",
                 "response": {"G": "m/m", "S": "m/N", "Th": "N/m"}[self.what],
@@ -295,7 +311,8 @@ class Identification:
         period: of the multisine [s], rounded up to a number of samples that is quick to transform;
             None for 5, Th 10.
         periods: kept of each run, after one that is discarded.
-        realisations: number of runs, each with its own phases.
+        realisations: number of runs, each with its own phases. With coarse encoders, intervals of
+            fewer than eight hold the truth less often than stated (docs/intervals.md).
         lines: of the multisine, spread over the logarithm of frequency; fewer where the period is
             too short for them.
         amplitude: rms of the handle's motion to aim at [m]; None for 2e-3, Th 1e-2.
@@ -314,7 +331,7 @@ class Identification:
     band: tuple[float, float] | None = None
     period: float | None = None
     periods: int = 2
-    realisations: int = 4
+    realisations: int = REALISATIONS
     lines: int = MULTISINE_LINES
     amplitude: float | None = None
     control: Control = "continuous"

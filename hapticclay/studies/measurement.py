@@ -7,9 +7,6 @@ of the whole record (R. Pintelon, J. Schoukens, System Identification: A Frequen
 
 from __future__ import annotations
 
-import csv
-import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import checked, named
+from ..columns import Sheet, unreadable
+from ..display import brief
 from ..errors import ParameterError, array_of, choice
-from ..units import parse_unit
 
 COLUMNS = {  # columns of a file and their contents
     "t": "time [s]",
@@ -28,7 +26,6 @@ COLUMNS = {  # columns of a file and their contents
     "reference": "what drives the experiment, free of noise, in any unit",
 }
 UNITS = {"t": ("s",), "input": ("N", "m"), "output": ("m",)}
-NAMED_UNIT = re.compile(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]")  # "time [ms]", "force (N)"
 LEAST_ROWS = 100
 LARGEST_VALUE = 1e50  # value in a column; squares and sums of it do not overflow
 JITTER = 0.05  # largest deviation of a step from the mean step
@@ -55,6 +52,9 @@ class Measurement:
             finite; the sampling is uneven.
     """
 
+    def __repr__(self) -> str:
+        return brief(self)
+
     t: np.ndarray
     input: np.ndarray
     output: np.ndarray
@@ -78,13 +78,15 @@ class Measurement:
         return float(self.t[-1] - self.t[0]) / (len(self.t) - 1)
 
     @classmethod
+    @checked
     def load(cls, path: str | Path, columns: Mapping[str, str] | None = None) -> Measurement:
         """Read a CSV file, whose first line names its columns.
 
         Comma, semicolon or tab separate cells; empty lines and lines that begin with # are skipped.
         A last row after a shorter step is skipped too, because a run ends between two samples.
-        Other columns may hold anything. Values are SI, unless the name of a column ends with
-        another unit in brackets, as in "time [ms]": they are then converted.
+        Other columns may hold anything. Where semicolons or tabs separate cells, numbers may have
+        decimal commas. Values are SI, unless the name of a column holds another unit, as in
+        "time [ms]" or "t_ms", or a row of units stands below the names: they are then converted.
 
         Args:
             path: the file.
@@ -92,9 +94,9 @@ class Measurement:
                 to its key, and a reference is read only if it is given.
 
         Raises:
-            ParameterError: the file cannot be read or is empty; a column is missing, named twice,
-                holds a value that is not a finite number, or names a unit of another quantity; or
-                as `Measurement`.
+            ParameterError: the file cannot be read, is empty or not UTF-8; a column is missing,
+                named twice, holds a value that is not a finite number, or names a unit that is
+                unknown or of another quantity; or as `Measurement`.
         """
         for key in dict(columns or {}):
             choice("columns", key, tuple(COLUMNS))
@@ -139,60 +141,11 @@ def _check_sampling(t: np.ndarray) -> None:
 
 def _read_columns(path: Path, wanted: Mapping[str, str]) -> dict[str, np.ndarray]:
     """Columns of a CSV file as floats, by the keys of `wanted`."""
-    (_, first), *rows = _read_table(path)
-    head = [x.strip() for x in first]
-    if all(_is_number(x) for x in head):
-        bound = f"must name its columns in the first line; that holds {head[0]}, ..."
-        raise _bad_file(path, bound)
-    at = _places(path, head, wanted)
-    sizes = {key: _unit_size(path, key, head[i]) for key, i in at.items()}
-    out: dict[str, list[float]] = {key: [] for key in at}
-    for line, row in rows:
-        if len(row) != len(head):
-            raise _bad_file(path, f"line {line}: must have {len(head)} cells, has {len(row)}")
-        for key, i in at.items():
-            if not _is_number(row[i]):
-                bound = f"must be a finite number, is {row[i][:20]!r}"
-                raise _bad_file(path, f"line {line}, column {head[i]!r}: {bound}")
-            out[key].append(float(row[i]))
-    return {key: sizes[key] * np.array(x) for key, x in out.items()}
-
-
-def _unit_size(path: Path, key: str, name: str) -> float:
-    """SI size of the unit that the name of a column ends with; 1 without a known unit."""
-    found = NAMED_UNIT.fullmatch(name)
-    unit = parse_unit(found[1]) if found else None
-    if not found or unit is None or not any(unit[1]) or key not in UNITS:
-        return 1.0
-    if unit[1] not in [(parse_unit(x) or unit)[1] for x in UNITS[key]]:
-        bound = f"must be in {' or '.join(UNITS[key])}, not in {found[1]}"
-        raise _bad_file(path, f"column {name!r}: {bound}")
-    return float(unit[0])
-
-
-def _bad_file(path: Path, bound: str) -> ParameterError:
-    return ParameterError("csv", str(path), bound)
-
-
-def _read_table(path: Path) -> list[tuple[int, list[str]]]:
-    """Lines of a CSV file without comments: number and cells."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        sheet = Sheet.read("csv", path)
     except OSError as error:
-        raise _bad_file(path, f"must be a readable file ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise _bad_file(path, "must be a text file in UTF-8") from None
-    lines = [
-        (i, x) for i, x in enumerate(text.splitlines(), 1) if x.strip() and not x.startswith("#")
-    ]
-    if not lines:
-        raise _bad_file(path, "must name its columns in the first line; it is empty")
-    separator = max(",;\t", key=lines[0][1].count)
-    rows = csv.reader((x for _, x in lines), delimiter=separator, skipinitialspace=True)
-    try:
-        return [(lines[rows.line_num - 1][0], row) for row in rows]
-    except csv.Error as error:
-        raise _bad_file(path, f"must be a table of cells ({error})") from None
+        raise unreadable("csv", path, error) from None
+    return sheet.numbers(_places(path, sheet.head, wanted), UNITS)
 
 
 def _places(path: Path, head: list[str], wanted: Mapping[str, str]) -> dict[str, int]:
@@ -208,10 +161,3 @@ def _places(path: Path, head: list[str], wanted: Mapping[str, str]) -> dict[str,
     if len(set(at.values())) < len(at):
         raise ParameterError("columns", dict(wanted), "must be different columns")
     return at
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        return math.isfinite(float(cell))
-    except ValueError:
-        return False

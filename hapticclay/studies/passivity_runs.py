@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
+from ..display import brief
 from ..errors import ParameterError, number
 from ..model.hardware import Hardware
 from ..scene.scenario import Scenario
@@ -50,6 +51,9 @@ class IndexOverFrequency:
         worst_omega: frequencies of the runs along the worst paths of a hand [rad/s], (k,).
         worst: energy taken over the integral of v^2 in those runs [N.s/m], (k,).
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     name: str
     omega: np.ndarray
@@ -133,6 +137,9 @@ class PassiveRegion:
         run_Ts: of the runs [s], (m,).
         found: largest K at which no path of a hand draws energy, by runs [N/m], (len(delays), m).
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     wall: VirtualWall
     delays: tuple[float, ...]

@@ -70,6 +70,7 @@ class Hands:
             raise ParameterError("hands.correlation", self.correlation, bound)
 
     @classmethod
+    @checked
     def around(cls, operator: Operator, variation: float = 0.3, **about: Any) -> Hands:
         """Log-normal hands around a mean: an assumption for data without a published spread.
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
+from ..display import brief
 from ..errors import ParameterError, choice, integer
 from ..results import Result
 from ..scene.virtual_wall import VirtualWall
@@ -45,6 +46,9 @@ class RiskMap:
         runs: number of runs of each cell, shape (n, m).
         events: number of unstable runs of each cell, shape (n, m).
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     x_name: str
     y_name: str
@@ -287,6 +291,8 @@ def monte_carlo(
     Raises:
         ParameterError: the disk has too little space, the folder holds other runs or cannot be
             written.
+        ChildProcessError: workers cannot be started, or one was killed.
+        FileNotFoundError: the folder, or a file in it, was removed while the runs were made.
     """
     workers, show = integer("workers", workers, 1, 1024), progress or (lambda n: None)
     if out is None:
@@ -300,8 +306,8 @@ def monte_carlo(
     folder = Path(out)
     with sweep_store.claimed(trials, folder) as (_, todo):
         if todo:
-            left = sum(len(trials.chunk_runs(n)) for n in todo)
-            cost = measure_cost(trials, left, folder, sweep.processes(todo, workers))
+            left = sum(map(len, todo))
+            cost = measure_cost(trials, left, folder, sweep.processes(trials, todo, workers))
             if announce:
                 announce(cost)
             if cost.size > cost.free:

@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import ParameterError, choice
 from ..model.constants import AXES
 from ..simulation.record import Record
+from .outliers import Cleaned, robust_deviation, runs_of
 from .trajectory import (
     LEAST_PER_KNOT,
     Motion,
@@ -26,6 +27,7 @@ DEVIATIONS = 60  # samples for the estimate of the usual deviation
 COUNTS = 3.0  # ... and counts of the encoder between knots
 LEAST_STRETCH = 3 * LEAST_PER_KNOT  # samples of a stretch
 STEADY_STEP = 0.05  # largest change of a known velocity in a step; a force is the mean over one
+ROUNDED = 0.29  # counts: standard deviation of rounding
 UNDITHERED = 0.4  # counts: rounding alone leaves 0.29, noise of 0.3 beside it 0.42
 
 
@@ -56,6 +58,9 @@ class Sliding(NamedTuple):
         force_variance: variance of the force about a free curve [N^2]; nan without one.
         position_variance: variance of a position [m^2].
         position_correlation: position samples per independent sample.
+        position_tails: standard deviation of a position over that of normal noise with the same
+            median residual; far above 1, some positions have other errors than noise.
+        at: indices of these samples in the data.
     """
 
     t: np.ndarray
@@ -69,6 +74,15 @@ class Sliding(NamedTuple):
     force_variance: float
     position_variance: float
     position_correlation: float
+    position_tails: float
+    at: np.ndarray
+
+    @property
+    def speeds(self) -> np.ndarray:
+        """Speeds of the sliding samples, by the positions alone where they are not known [m/s]."""
+        if self.motion is None:
+            return self.v
+        return np.maximum(self.motion.velocity(self.v), 0.5 * self.slowest)
 
 
 def of_record(r: Record, axis: str | None) -> tuple[str, Any, Any, Any, Any, Any]:
@@ -158,7 +172,9 @@ def of_known_speed(t: np.ndarray, v: np.ndarray, f: np.ndarray, inside: np.ndarr
     sign = np.sign(v[at])
     speed, none = speed[at], np.zeros(0)
     slowest = float(speed.min())
-    return Sliding(t[at], sign, sign * f[at], none, speed, slowest, None, 0.0, math.nan, 0.0, 1.0)
+    index = np.flatnonzero(at)
+    known = none, speed, slowest, None, 0.0, math.nan, 0.0, 1.0, 1.0
+    return Sliding(t[at], sign, sign * f[at], *known, index)
 
 
 def _too_few(count: int) -> ParameterError:
@@ -166,7 +182,9 @@ def _too_few(count: int) -> ParameterError:
     return ParameterError("data", f"{count} samples", bound)
 
 
-def of_positions(t: np.ndarray, p: np.ndarray, f: np.ndarray, inside: np.ndarray) -> Sliding:
+def of_positions(
+    t: np.ndarray, p: Cleaned, f: np.ndarray, inside: np.ndarray, out: np.ndarray
+) -> Sliding:
     """Sliding stretches and the splines along them.
 
     Args:
@@ -174,15 +192,17 @@ def of_positions(t: np.ndarray, p: np.ndarray, f: np.ndarray, inside: np.ndarray
         p: position [m].
         f: force of the clay [N].
         inside: mask of the samples used.
+        out: mask of forces to leave out.
 
     Raises:
         ParameterError: there are too few.
     """
-    p = p - p.mean()
-    runs = [(a, b) for a, b in _runs(inside) if b - a >= LEAST_STRETCH]
+    inside, good, p = _unbroken(inside, p), ~p.bad, p.x - p.x.mean()
+    told, count = good & ~out, quantum(p[good])
+    runs = [(a, b) for a, b in runs_of(inside) if b - a >= LEAST_STRETCH]
     if not runs:
         raise _too_few(0)
-    stretches = [Stretch(t[a:b]) for a, b in runs]
+    stretches = [Stretch(t[a:b], (), good[a:b]) for a, b in runs]
     at = np.concatenate([np.arange(a, b) for a, b in runs])
     spacing, (variance,) = chosen_spacing([Series(stretches, p[at])])
     motion = Motion(stretches, spacing)
@@ -190,16 +210,18 @@ def of_positions(t: np.ndarray, p: np.ndarray, f: np.ndarray, inside: np.ndarray
     v[at] = motion.velocity(motion.follow(p[at]))
     margin = math.ceil(spacing / float(np.median(np.diff(t))))
     slow = _slowest(motion, runs, margin, LEAST_SIGNAL * math.sqrt(variance))
-    slow = np.maximum(slow, COUNTS * quantum(p) / spacing)
+    slow = np.maximum(slow, COUNTS * count / spacing)
     direction = np.zeros(len(t))
     direction[at] = np.where(np.abs(v[at]) > slow, np.sign(v[at]), 0.0)
     pieces = [x for a, b in runs for x in _between_rests(direction, a, b, margin)]
     # of each piece, where it slides one way
     slides = [
-        sorted((c + a, d + a) for way in (1.0, -1.0) for c, d in _runs(direction[a:b] == way))
+        sorted((c + a, d + a) for way in (1.0, -1.0) for c, d in runs_of(direction[a:b] == way))
         for a, b in pieces
     ]
-    slides = [[x for x in some if x[1] - x[0] >= LEAST_PER_KNOT] for some in slides]
+    slides = [
+        [x for x in some if np.count_nonzero(told[slice(*x)]) >= LEAST_PER_KNOT] for some in slides
+    ]
     pieces = [x for x, some in zip(pieces, slides, strict=True) if some]
     slides = [some for some in slides if some]
     single = [x for some in slides for x in some]
@@ -207,23 +229,31 @@ def of_positions(t: np.ndarray, p: np.ndarray, f: np.ndarray, inside: np.ndarray
         raise _too_few(sum(b - a for a, b in single))
     stretches = [
         Stretch(
-            t[a:b], [0.5 * float(t[x[1]] + t[y[0]]) for x, y in zip(some, some[1:], strict=False)]
+            t[a:b],
+            [0.5 * float(t[x[1]] + t[y[0]]) for x, y in zip(some, some[1:], strict=False)],
+            good[a:b],
         )
         for (a, b), some in zip(pieces, slides, strict=True)
     ]
     at, sliding = (np.concatenate([np.arange(*x) for x in some]) for some in (pieces, single))
-    sign, place = direction[sliding], p[at]
-    force = sign * f[sliding]
-    one_way = [Stretch(t[a:b]) for a, b in single]
-    spacing, (of_p, of_f) = chosen_spacing([Series(stretches, place), Series(one_way, force)])
+    place = np.where(good[at], p[at], 0.0)
+    one_way = [x for a, b in single for x in _without_gaps(told, a, b)]
+    told_at = np.concatenate([np.arange(*x) for x in one_way])
+    forces = [Stretch(t[a:b], (), told[a:b]) for a, b in one_way]
+    series = [Series(stretches, place), Series(forces, direction[told_at] * f[told_at])]
+    spacing, (of_p, of_f) = chosen_spacing(series)
+    sliding = sliding[told[sliding]]
+    sign = direction[sliding]
     motion = Motion(stretches, spacing, np.searchsorted(at, sliding), sign)
     c = motion.follow(place)
-    correlation = correlation_time(place - motion.place(c))
+    left = (place - motion.place(c))[good[at]]
+    correlation = correlation_time(left)
     of_p = max(of_p, (1e-12 * float(np.ptp(p))) ** 2)  # rounding
+    usual = max(robust_deviation(left), ROUNDED * count, 1e-12 * float(np.ptp(p)))
     return Sliding(
         t[sliding],
         sign,
-        force,
+        sign * f[sliding],
         place,
         c,
         float(slow.min()),
@@ -232,7 +262,26 @@ def of_positions(t: np.ndarray, p: np.ndarray, f: np.ndarray, inside: np.ndarray
         of_f,
         of_p,
         correlation,
+        math.sqrt(of_p) / usual,
+        sliding,
     )
+
+
+def _unbroken(inside: np.ndarray, p: Cleaned) -> np.ndarray:
+    """Samples used, without steps of the position and gaps that no spline should bridge."""
+    out = inside.copy()
+    out[p.steps] = False
+    for first, stop in runs_of(p.bad):
+        if stop - first > LEAST_PER_KNOT:
+            out[first:stop] = False
+    return out
+
+
+def _without_gaps(kept: np.ndarray, start: int, stop: int) -> list[tuple[int, int]]:
+    """Parts of a run that begin and end with kept samples, without long gaps, not too short."""
+    good = np.flatnonzero(kept[start:stop]) + start
+    parts = np.split(good, np.flatnonzero(np.diff(good) > LEAST_PER_KNOT) + 1)
+    return [(int(x[0]), int(x[-1]) + 1) for x in parts if len(x) >= LEAST_PER_KNOT]
 
 
 def _slowest(motion: Motion, runs: list[tuple[int, int]], margin: int, sigma: float) -> np.ndarray:
@@ -251,7 +300,7 @@ def _between_rests(
     direction: np.ndarray, start: int, stop: int, margin: int
 ) -> list[tuple[int, int]]:
     """Parts of a run without rests, which last longer than a knot's width, and its like around."""
-    rests = [(a + start, b + start) for a, b in _runs(direction[start:stop] == 0.0)]
+    rests = [(a + start, b + start) for a, b in runs_of(direction[start:stop] == 0.0)]
     out, begin = [], start
     for a, b in rests:
         if b - a > margin or a == start or b == stop:
@@ -259,12 +308,6 @@ def _between_rests(
             begin = b + margin if b - a > margin else b
     out.append((begin, stop))
     return [(a, b) for a, b in out if b - a >= LEAST_STRETCH]
-
-
-def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
-    """(start, stop) of each run of True in a mask."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def quantum(x: np.ndarray) -> float:
@@ -279,3 +322,17 @@ def quantum(x: np.ndarray) -> float:
         return 0.0
     whole = steps / steps.min()
     return 0.0 if np.any(np.abs(whole - np.round(whole)) > 0.02) else float(steps.min())
+
+
+def wrong_way(f: np.ndarray, p: Cleaned | None, v: np.ndarray | None) -> np.ndarray:
+    """Mask of the forces that drive the motion, (n,).
+
+    Args:
+        f: force of the clay on the tool, counted as resistance [N].
+        p: position [m]; None where the velocity is known.
+        v: velocity [m/s], where it is known.
+    """
+    if v is None:
+        assert p is not None
+        v = np.gradient(p.x)
+    return f * v < 0.0

@@ -25,6 +25,8 @@ from .identification import (
     response,
 )
 from .measurement import Measurement
+from .outliers import LOST, Cleaned, bridged, cleaned, runs_of, sentence, times
+from .sliding import quantum
 
 LEAST_LINES = 20  # of the spectrum in the band, without a period
 LEAST_EXCITED = 5  # lines of a periodic input
@@ -33,6 +35,7 @@ PERIODIC = 3e-5  # largest share of a periodic input's power in the band between
 REPEATED = 0.95  # least autocorrelation at a period
 TRANSIENT_TERMS = 4  # two of a second-order block's start and end, two of sampling
 
+USUAL, FAR_BEYOND = 0.99, 2.0  # quantile of a column, and times that an impossible value is of it
 NEIGHBOURS = 20  # lines to each side over which noise is averaged, at most
 WEIGHT_ROUNDS = 4  # of fit and noise; the weights settle in two
 
@@ -51,7 +54,8 @@ def identify_data(
     Any excitation is suitable. Of a periodic one with two or more whole periods after the first,
     these periods are used; otherwise the whole record is used, and its start and end are fitted
     too. Other forces on the handle, and for Th the muscle force uh, must be independent of the
-    input, or of the reference if there is one.
+    input, or of the reference if there is one. Outliers of the position, and of other columns
+    where the block then explains more, are left out and named in `warnings`.
 
     Args:
         data: the columns.
@@ -72,22 +76,20 @@ def identify_data(
     choice("axis", axis, AXES)
     if flag("held", held) and what == "Th":
         raise ParameterError("held", held, 'must be False for "Th", whose input is a position')
-    u, y = (data.output, -data.input) if what == "Th" else (data.input, data.output)
-    signals = np.array((u if data.reference is None else data.reference, u, y))
-    low, high = _band(what, band, data.dt, len(u))
-    n = _period(signals[0], high * data.dt)
-    periods = len(u) // n - 1 if n else 0
-    spectrum = _spectrum(signals[:, -periods * n :], data.dt, (low, high), periods, held)
-    _check_coherence(spectrum)
-    try:
-        with np.errstate(all="ignore"):  # of what cannot be fitted
-            fitted = _fit_spectrum(what, spectrum, data.reference is not None)
-            frequency, H, deviation, coherence = _shown(spectrum, fitted)
-        if not np.all(np.isfinite(np.concatenate((fitted.value, fitted.half, deviation)))):
-            raise np.linalg.LinAlgError("no bounded intervals")
-    except (np.linalg.LinAlgError, ValueError) as error:
-        bound = f"must be that of a block of the form of {what}; none fits ({error})"
-        raise ParameterError("output", f"{len(spectrum.y)} lines", bound) from None
+    columns, warnings = _Columns.of(data), []
+    place = cleaned(columns.output, quantum(columns.output))
+    if place.bad.any():
+        warnings.append(sentence("position", data.t[place.bad], len(data.t), LOST))
+    if len(place.steps):
+        warnings.append(
+            f"the position jumps and does not return at t = {times(data.t[place.steps])} s: "
+            "identify the parts one by one"
+        )
+    columns = columns._replace(output=place.x)
+    found, told = _better(what, columns, data, band, held)
+    fitted, periods = found.fitted, found.periods
+    frequency, H, deviation, coherence = found.shown
+    warnings += told
     rows = zip(
         COEFFICIENT_NAMES[what],
         COEFFICIENT_UNITS[what],
@@ -114,7 +116,105 @@ def identify_data(
         periods,
         1,
         data.name,
+        tuple(warnings),
     )
+
+
+class _Columns(NamedTuple):
+    """Columns of a measurement, (n,) each."""
+
+    input: np.ndarray
+    output: np.ndarray
+    reference: np.ndarray | None
+
+    @classmethod
+    def of(cls, data: Measurement) -> _Columns:
+        return cls(data.input, data.output, data.reference)
+
+
+class _Estimate(NamedTuple):
+    """A block fitted to columns: what is shown of it, and periods used."""
+
+    spectrum: _Spectrum
+    fitted: _Fitted
+    shown: tuple[np.ndarray, ...]
+    periods: int
+
+    @property
+    def unexplained(self) -> float:
+        """Share of the output's power that the block does not explain."""
+        power = float(np.sum(np.abs(self.spectrum.y) ** 2))
+        return float(np.sum(np.abs(self.fitted.left) ** 2)) / max(power, 1e-300)
+
+
+def _better(
+    what: str, columns: _Columns, data: Measurement, band: object, held: bool
+) -> tuple[_Estimate, list[str]]:
+    """The columns as they are, or without outliers of input and reference: what explains more.
+
+    A force may well jump away and back, as in a blow; then the motion follows it. Of a wrong
+    reading the motion knows nothing, and without it the block explains more.
+    """
+    names = {"input": "command" if what == "G" else "force", "reference": "reference"}
+    values = {name: getattr(columns, name) for name in names}
+    found = {name: cleaned(x, quantum(x)) for name, x in values.items() if x is not None}
+    found = {name: clean for name, clean in found.items() if clean.bad.any()}
+    best: _Estimate | ParameterError | None = None
+    told: list[str] = []
+    for few in (None, True, False) if found else (None,):
+        bad = {} if few is None else {k: _far(values[k], x, few) for k, x in found.items()}
+        other = {k: bridged(values[k], x) for k, x in bad.items() if x.any()}
+        if few is not None and (not other or min(map(np.ptp, other.values())) == 0.0):
+            continue
+        try:
+            made = _estimate(what, columns._replace(**other), data, band, held)
+        except ParameterError as error:
+            best = best or error
+            continue
+        if isinstance(best, _Estimate) and best.unexplained <= made.unexplained:
+            continue
+        best = made
+        why = "jumps away and back that the position does not follow: lost packets, wrong signs?"
+        told = [sentence(names[k], data.t[bad[k]], len(data.t), why) for k in other]
+    if not isinstance(best, _Estimate):
+        assert best is not None
+        raise best
+    return best, told
+
+
+def _far(x: np.ndarray, clean: Cleaned, few: bool) -> np.ndarray:
+    """The outliers of a column, or the few of them that lie far beyond all its other values."""
+    if not few:
+        return clean.bad
+    size = np.abs(x - np.median(x))
+    peaks = [np.max(size[first:stop]) for first, stop in runs_of(clean.bad)]
+    usual = max(float(np.quantile(size, USUAL)), float(np.median(peaks)))
+    return clean.bad & (size > FAR_BEYOND * usual)
+
+
+def _estimate(
+    what: str, columns: _Columns, data: Measurement, band: object, held: bool
+) -> _Estimate:
+    """Fit a block to columns."""
+    u, y = columns.input, columns.output
+    if what == "Th":
+        u, y = y, -u
+    signals = np.array((u if columns.reference is None else columns.reference, u, y))
+    low, high = _band(what, band, data.dt, len(u))
+    n = _period(signals[0], high * data.dt)
+    periods = len(u) // n - 1 if n else 0
+    spectrum = _spectrum(signals[:, -periods * n :], data.dt, (low, high), periods, held)
+    _check_coherence(spectrum)
+    try:
+        with np.errstate(all="ignore"):  # of what cannot be fitted
+            fitted = _fit_spectrum(what, spectrum, columns.reference is not None)
+            shown = _shown(spectrum, fitted)
+        if not np.all(np.isfinite(np.concatenate((fitted.value, fitted.half, shown[2])))):
+            raise np.linalg.LinAlgError("no bounded intervals")
+    except (np.linalg.LinAlgError, ValueError) as error:
+        bound = f"must be that of a block of the form of {what}; none fits ({error})"
+        raise ParameterError("output", f"{len(spectrum.y)} lines", bound) from None
+    return _Estimate(spectrum, fitted, shown, periods)
 
 
 def _band(what: str, band: object, dt: float, n: int) -> tuple[float, float]:

@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..display import brief
 from ..errors import choice
 from ..model.constants import TS
-from ..theory import gain_crossings, loop_passivity, stability_margins
+from ..scene.virtual_wall import Device, VirtualWall
+from ..theory import gain_crossings, loop_passivity, stability_margins, wall_limits
 from ..theory.loops import TIMING
 from ..theory.roots import bisect, first_failure
 from . import boundary
@@ -63,6 +65,9 @@ class StabilityMap:
         limit: name of the line of the linear loop of the runs: above it, the gain margin is below
             1; "" for none.
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     kind: str
     loop: PushedLoop
@@ -188,7 +193,9 @@ def _delay_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress
     damper = loop.hand.damper
     if damper:
         name = "held clay passive (Colgate, Schenkel)"
-        lines[name] = (fine, [_passive_damping(Ts, d, damper) for d in fine])
+        held = VirtualWall(device=Device(damper=damper), Ts=Ts)
+        limits = [wall_limits.passive_damping_limit(replace(held, delay=d)) for d in fine]
+        lines[name] = (fine, limits)
     else:
         notes.append(UNDAMPED)
     exact = [_unstable_damping(loop, Ts, d) for d in x]
@@ -284,15 +291,3 @@ def _unstable_damping(loop: PushedLoop, Ts: float | None, delay: float) -> float
 
     low, high = first_failure(stable, np.geomspace(1.0, MOST_DAMPING, 60).tolist())
     return high if low else 0.0
-
-
-def _passive_damping(Ts: float, delay: float, damper: float) -> float:
-    """Largest held, delayed clay that is passive behind a damper [N.s/m].
-
-    The required damper is proportional to the clay, so one test suffices.
-    """
-
-    def late(z: np.ndarray) -> np.ndarray:
-        return (1.0 - 1.0 / z) / Ts * z ** (-delay / Ts)
-
-    return damper / (damper - loop_passivity.colgate_schenkel(late, Ts, damper, 2001).margin)

@@ -1,18 +1,20 @@
 """Many runs over a space of parameters, as a data set that survives interruptions.
 
-A sweep is cut into chunks; each chunk is one Parquet file, written whole or not at all by the
-process that ran it. Missing and damaged files define the remaining work, so an interrupted or
-killed sweep resumes where it stopped.
+The runs are stored in Parquet files, each written whole or not at all by the process that made its
+runs. Missing and damaged files define the remaining work, so an interrupted or killed sweep resumes
+where it stopped. A file holds a chunk of given size; without one, a process makes runs for a share
+of the time spent so far and then writes them, so that files stay few, whatever a run takes.
 """
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
-import itertools
 import logging
+import math
 import os
 import sys
+import time
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import Any
@@ -22,38 +24,124 @@ from ..errors import ParameterError
 from ..files import atomic
 from ..simulation.batch import cores
 from .sampling import Sweep
-from .sweep_rows import PROBE_TIME, probed, run_point
+from .sweep_rows import CHUNK_TIME, PROBE_TIME, probed, run_point
 from .sweep_store import (
+    MOST_IN_CHUNK,
     Plan,
+    check_begun,
+    check_complete,
     chunk_size,
     claimed,
     parquet_schema,
+    part_number,
     row_size,
     sweep_part,
     write_part,
 )
+from .workers import ended, started
 
 SCHEDULER_PATIENCE = 4.0  # until a scheduler answers [s]; dask tries for up to twice as long
 FINISHING = "hapticclay: finishing the chunks in progress"
+CLUSTER_CHUNK_TIME = 10.0  # as CHUNK_TIME, on a cluster: its scheduler serves many workers [s]
+CHUNK_SHARE = 0.05  # of the time spent so far, which a file may take instead
+AHEAD = 2  # tasks of a cluster per worker, so that none waits for the next
 
 
-def run_chunk(sweep: Plan, number: int, out: str) -> int:
-    """Runs one chunk and writes its file, in any process; returns the number of its runs.
+def run_part(
+    sweep: Plan,
+    runs: range,
+    out: str,
+    patience: float = math.inf,
+    ended: Callable[[], bool] = lambda: False,
+) -> tuple[int, float]:
+    """Makes runs and writes their file, in any process.
 
     Args:
         sweep: the sweep.
-        number: the chunk.
+        runs: a chunk, or where chunks have no size, any runs.
         out: folder of the sweep.
+        patience: time after which fewer runs are made, at least one, if chunks have no size [s].
+        ended: whether to make no more than those.
+
+    Returns:
+        Number of runs made, and their time [s].
+
+    Raises:
+        ParameterError: the file cannot be written.
+        FileNotFoundError: the folder was removed.
     """
-    runs = sweep.chunk_runs(number)
+    begin, number = time.perf_counter(), part_number(sweep, runs)
+    check_begun(sweep, Path(out))  # before the work, too: a cluster repeats what has failed
     if isinstance(sweep, Sweep):
-        points = sweep.points(runs.start, runs.stop)
-        rows = [run_point(sweep, index, point) for index, point in zip(runs, points, strict=True)]
+        rows: list[dict[str, Any]] = []
+        for index, point in zip(runs, sweep.points(runs.start, runs.stop), strict=True):
+            rows.append(run_point(sweep, index, point))
+            late = time.perf_counter() - begin > patience or ended()
+            if late and sweep.chunk is None:
+                break
     else:
         rows = sweep.chunk_rows(number)
+    check_begun(sweep, Path(out))
     with atomic(sweep_part(Path(out), number)) as f:
         write_part(rows, parquet_schema(sweep, number), f)
-    return len(runs)
+    return len(rows), time.perf_counter() - begin
+
+
+class Work:
+    """Runs still to be made, and how many of them go to one process at a time.
+
+    Args:
+        sweep: the sweep.
+        todo: the runs, in ranges as by `missing_parts`.
+        least: time of a file, if chunks have no size [s]; later CHUNK_SHARE of the time spent.
+    """
+
+    def __init__(self, sweep: Plan, todo: list[range], least: float):
+        self.sweep, self.free, self.least = sweep, sweep.chunk is None, least
+        self.left, self.count = todo[::-1], sum(map(len, todo))
+        self.begin, self.each = time.perf_counter(), 0.0  # each: time of a run, latest known [s]
+
+    @property
+    def patience(self) -> float:
+        """Time after which a process writes a file [s]."""
+        if not self.free:
+            return math.inf
+        return max(self.least, CHUNK_SHARE * (time.perf_counter() - self.begin))
+
+    def take(self, workers: int) -> range | None:
+        """The next runs for one process; None if none are left.
+
+        Args:
+            workers: number of processes that share the work.
+        """
+        if not self.left:
+            return None
+        runs = self.left.pop()
+        if self.free:
+            # a share of the rest, so that all end together, but no small files towards the end
+            fair = -(-self.count // (AHEAD * workers)) if workers > 1 else self.count
+            least = self.patience / (4.0 * self.each) if self.each else 0.0
+            n = min(MOST_IN_CHUNK, max(fair, int(min(least, MOST_IN_CHUNK))))
+            self._put_back(runs[n:])
+            runs = runs[:n]
+        self.count -= len(runs)
+        return runs
+
+    def give_back(self, runs: range, made: int, seconds: float) -> None:
+        """Notes what a process has made; the rest of its runs is to be made.
+
+        Args:
+            runs: what it took.
+            made: how many of them it made.
+            seconds: in what time [s].
+        """
+        self.each = seconds / made
+        self.count += len(runs) - made
+        self._put_back(runs[made:])
+
+    def _put_back(self, runs: range) -> None:
+        if runs:
+            self.left.append(runs)
 
 
 @checked
@@ -65,17 +153,18 @@ def run_sweep(
     scheduler: str | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> int:
-    """Runs the missing chunks of a sweep; returns the number of runs made.
+    """Makes the missing runs of a sweep; returns their number.
 
     Args:
         sweep: the sweep.
         out: folder of sweep.json and data/.
         workers: as in `run_chunks`.
         scheduler: as in `run_chunks`.
-        progress: called with the number of runs of each finished chunk.
+        progress: called with the number of runs of each finished file.
 
     Raises:
         ParameterError: as `claimed` and `run_chunks`.
+        ChildProcessError, ConnectionError, FileNotFoundError: as `run_chunks`.
     """
     done, out = 0, Path(out)
     with (
@@ -92,86 +181,102 @@ def run_sweep(
 def run_chunks(
     sweep: Plan,
     out: Path,
-    todo: list[int],
+    todo: list[range],
     workers: int | None = None,
     scheduler: str | None = None,
 ) -> Generator[int, None, None]:
-    """Runs chunks of a sweep whose folder is locked; yields the number of runs of each.
+    """Makes the missing runs of a sweep whose folder is locked; yields the number in each file.
 
     Args:
         sweep: the sweep.
         out: its folder.
-        todo: the chunks.
+        todo: the missing runs.
         workers: processes on this machine; None for one per core.
         scheduler: address of a dask scheduler to use instead.
 
     Raises:
         ParameterError: a file cannot be written, or a package is missing.
-        ChildProcessError: a worker here was killed.
+        ChildProcessError: workers here cannot be started, or one was killed.
         ConnectionError: the connection to the scheduler is lost.
+        FileNotFoundError: the folder, or a file in it, was removed while the runs were made.
     """
-    return (
-        _run_on_cluster(sweep, out, todo, scheduler)
-        if scheduler
-        else _run_here(sweep, out, todo, processes(todo, workers))
-    )
+    work = Work(sweep, todo, CLUSTER_CHUNK_TIME if scheduler else CHUNK_TIME)
+    if scheduler:
+        yield from _run_on_cluster(work, str(out.resolve()), scheduler)
+    else:
+        yield from _run_here(work, str(out), processes(sweep, todo, workers))
+    check_complete(sweep, out)
 
 
-def processes(todo: list[int], workers: int | None) -> int:
-    """Number of processes that run chunks on this machine.
+def processes(sweep: Plan, todo: list[range], workers: int | None) -> int:
+    """Number of processes that make runs on this machine.
 
     Args:
-        todo: the chunks.
+        sweep: the sweep.
+        todo: the runs.
         workers: largest number to use; None for one per core.
     """
-    return max(1, min(workers or cores(), len(todo)))
+    tasks = sum(map(len, todo)) if sweep.chunk is None else len(todo)
+    return max(1, min(workers or cores(), tasks))
 
 
-def _run_here(sweep: Plan, out: Path, todo: list[int], workers: int) -> Generator[int, None, None]:
-    import multiprocessing
-    from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-    from concurrent.futures.process import BrokenProcessPool
+def _run_here(work: Work, out: str, crew: int) -> Generator[int, None, None]:
+    """As `run_chunks`, on this machine."""
+    if crew == 1:
+        while work.left:
+            yield _made_in_turn(work, out)
+    elif work.free and work.left:  # it may be all, and what is compiled here is compiled for all
+        yield _made_in_turn(work, out)
+    if work.left:
+        yield from _run_in_processes(work, out, crew)
 
-    if workers == 1:
-        for number in todo:
-            with _finishing():
-                made = run_chunk(sweep, number, str(out))
-            yield made
-        return
-    context = multiprocessing.get_context("spawn")  # the engine's threads do not survive a fork
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool:
+
+def _made_in_turn(work: Work, out: str) -> int:
+    """Makes the next file in this process."""
+    runs = work.take(1)
+    assert runs
+    with _finishing() as ended:
+        made, seconds = run_part(work.sweep, runs, out, work.patience, ended)
+    work.give_back(runs, made, seconds)
+    return made
+
+
+def _run_in_processes(work: Work, out: str, crew: int) -> Generator[int, None, None]:
+    from concurrent.futures import FIRST_COMPLETED, Future, wait
+
+    with started(crew) as submit:
+        jobs: dict[Future[tuple[int, float]], range] = {}
         try:
-            jobs: set[Future[int]] = set()
-            left = iter(todo)
-            while True:  # one chunk per worker: Ctrl-C would wait for queued ones
-                jobs |= {
-                    pool.submit(run_chunk, sweep, number, str(out))
-                    for number in itertools.islice(left, workers - len(jobs))
-                }
+            while True:  # one task per worker: Ctrl-C would wait for queued ones
+                while len(jobs) < crew and (runs := work.take(crew)) is not None:
+                    jobs[submit(_part_of_worker, work.sweep, runs, out, work.patience)] = runs
                 if not jobs:
                     return
-                done, jobs = wait(jobs, return_when=FIRST_COMPLETED)
-                yield from (job.result() for job in done)
+                for job in wait(jobs, return_when=FIRST_COMPLETED).done:
+                    made, seconds = job.result()
+                    work.give_back(jobs.pop(job), made, seconds)
+                    yield made
         except (KeyboardInterrupt, GeneratorExit):  # Ctrl-C here or in the consumer of the results
             print(FINISHING, file=sys.stderr, flush=True)
             raise
-        except BrokenProcessPool:
-            raise ChildProcessError(
-                "a worker was killed (memory?); the same command resumes the sweep"
-            ) from None
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _part_of_worker(sweep: Plan, runs: range, out: str, patience: float) -> tuple[int, float]:
+    return run_part(sweep, runs, out, patience, ended)
 
 
 @contextlib.contextmanager
-def _finishing() -> Iterator[None]:
-    """Makes Ctrl-C wait for the running chunks, with a message; a second Ctrl-C does not wait."""
+def _finishing() -> Iterator[Callable[[], bool]]:
+    """Makes Ctrl-C wait for the runs in progress, with a message; a second one does not wait.
+
+    Yields a function that tells whether there was one.
+    """
     import signal
     import threading
 
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(before):
-        yield
+        yield lambda: False
         return
     caught: list[int] = []
 
@@ -182,36 +287,14 @@ def _finishing() -> Iterator[None]:
 
     signal.signal(signal.SIGINT, note)
     try:
-        yield
+        yield lambda: bool(caught)
     finally:
         signal.signal(signal.SIGINT, before)
     if caught:
         raise KeyboardInterrupt
 
 
-def _start_worker() -> None:
-    """Ignores signals of the terminal, so a worker finishes; the worker ends with its parent."""
-    import signal
-    import threading
-
-    for name in ("SIGINT", "SIGHUP"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    import multiprocessing
-
-    parent = multiprocessing.parent_process()
-    assert parent
-    parent.join()
-    os._exit(1)  # a killed parent receives no report
-
-
-def _run_on_cluster(
-    sweep: Plan, out: Path, todo: list[int], address: str
-) -> Generator[int, None, None]:
+def _run_on_cluster(work: Work, out: str, address: str) -> Generator[int, None, None]:
     from concurrent.futures import CancelledError
 
     try:
@@ -226,13 +309,23 @@ def _run_on_cluster(
         raise ParameterError(
             "scheduler", address, f"must be the address of a dask scheduler ({error})"
         ) from None
+    jobs: dict[Any, range] = {}
     with _quiet("distributed"), client:
-        jobs = client.map(
-            lambda n: run_chunk(sweep, n, str(out.resolve())), todo, pure=False, retries=10
-        )
+        results = as_completed(loop=client.loop)
         try:
-            for job in as_completed(jobs, loop=client.loop):
-                yield job.result()
+            while True:
+                crew = max(1, sum(client.nthreads().values()))  # workers come and go
+                while len(jobs) < AHEAD * crew and (runs := work.take(crew)) is not None:
+                    given = (work.sweep, runs, out, work.patience)
+                    job = client.submit(run_part, *given, pure=False, retries=10)
+                    jobs[job.key] = runs
+                    results.add(job)
+                if not jobs:
+                    return
+                job = next(results)
+                made, seconds = job.result()
+                work.give_back(jobs.pop(job.key), made, seconds)
+                yield made
         except CancelledError:
             raise ConnectionError(
                 f"the dask scheduler {address} has gone; the same command resumes the sweep"

@@ -18,7 +18,7 @@ from ..theory import gain_limits
 from .sampling import Sweep
 
 CROSSINGS_KEPT = 3  # crossings that have columns of their own
-CHUNK_TIME = 1.5  # target time of a chunk in one process [s]: an interruption waits for it
+CHUNK_TIME = 1.5  # least time of a file in one process [s], if no chunk was given: a kill loses it
 PROBES = 20  # runs used for an estimate ...
 PROBE_TIME = 5.0  # ... or fewer after this time [s]
 NO_INDEX: dict[str, Any] = {"index_columns": [], "column_indexes": [], "columns": []}  # of pandas
@@ -107,19 +107,6 @@ def run_point(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:
         return result_row(index, names, point, simulate(scenario))
     except ParameterError as error:
         return result_row(index, names, point, None, str(error))
-
-
-def run_time(sweep: Sweep) -> float:
-    """Run time [s], from one random run if it is long, from a few if it is short.
-
-    Args:
-        sweep: the sweep.
-    """
-    (first,), _ = probed(sweep, 0.0)  # loads and compiles, before its own time begins
-    if first["wall_time"] > CHUNK_TIME:
-        return first["wall_time"]
-    rows, spent = probed(sweep, CHUNK_TIME / 10)
-    return spent / len(rows)
 
 
 def probed(sweep: Sweep, patience: float) -> tuple[list[dict[str, Any]], float]:

@@ -33,10 +33,17 @@ class Stretch(NamedTuple):
     Attributes:
         t: times [s], (n,), ascending.
         bends: times at which the acceleration may jump [s], ascending.
+        kept: mask of the samples that count, (n,); None for all.
     """
 
     t: np.ndarray
     bends: Sequence[float] = ()
+    kept: np.ndarray | None = None
+
+    @property
+    def counted(self) -> np.ndarray:
+        """Mask of the samples that count, (n,)."""
+        return np.ones(len(self.t), dtype=bool) if self.kept is None else self.kept
 
 
 class Motion:
@@ -50,6 +57,7 @@ class Motion:
 
     Attributes:
         size: number of coefficients.
+        counted: mask of the samples that count; the position at others is 0.
     """
 
     def __init__(
@@ -68,6 +76,8 @@ class Motion:
             first.append(at + self.size)
             self.size += int(at[-1]) + DEGREE + 1
         self._first, self._place = np.concatenate(first), np.concatenate(places)
+        self.counted = np.concatenate([x.counted for x in stretches])
+        self._place[~self.counted] = 0.0
         velocity = np.concatenate(velocities)
         chosen = np.arange(len(velocity)) if sliding is None else sliding
         self._velocity, self._near = velocity[chosen], self._first[chosen]
@@ -163,11 +173,12 @@ def _basis(stretch: Stretch, spacing: float) -> tuple[np.ndarray, np.ndarray, np
     """Rows of positions and of velocities, (n, DEGREE + 1), and the first coefficient of each."""
     from scipy.interpolate import BSpline
 
-    k, t = DEGREE, stretch.t
+    k, t, counted = DEGREE, stretch.t, stretch.t[stretch.counted]
     ends = [float(t[0]), *stretch.bends, float(t[-1])]
     knots = [np.full(k + 1, t[0])]
     for i, (a, b) in enumerate(zip(ends, ends[1:], strict=False)):
-        most = max(1, int(np.searchsorted(t, b) - np.searchsorted(t, a)) // LEAST_PER_KNOT)
+        within = int(np.searchsorted(counted, b) - np.searchsorted(counted, a))
+        most = max(1, within // LEAST_PER_KNOT)
         inner = np.linspace(a, b, int(np.clip(round((b - a) / spacing), 1, most)) + 1)
         knots += [inner[1:-1], np.full(k + 1 if i == len(ends) - 2 else k - 1, b)]
     knots = np.concatenate(knots)
@@ -213,11 +224,12 @@ def chosen_spacing(series: Sequence[Series]) -> tuple[float, list[float]]:
     for spacing in np.geomspace(finest, longest, count).tolist():
         score, variances = 0.0, []
         for x in series:
-            motion, n = Motion(x.stretches, spacing), len(x.y)
-            left = float(np.sum((x.y - motion.place(motion.follow(x.y))) ** 2))
+            motion = Motion(x.stretches, spacing)
+            y, n = np.where(motion.counted, x.y, 0.0), int(np.count_nonzero(motion.counted))
+            left = float(np.sum((y - motion.place(motion.follow(y))) ** 2))
             # corrected for few samples (Hurvich, Tsai 1989)
             m = motion.size
-            score += n * math.log(max(left, 1e-24 * float(x.y @ x.y) + 1e-300))
+            score += n * math.log(max(left, 1e-24 * float(y @ y) + 1e-300))
             score += n * (n + m) / max(n - m - 2, 1)
             variances.append(left / max(n - m, 1))
         if best is None or score < best[0]:

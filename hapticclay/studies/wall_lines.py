@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import named
+from ..display import brief
 from ..model.constants import TS
 from ..model.operator import Operator
 from ..scene.virtual_wall import VirtualWall
@@ -40,6 +41,9 @@ class Limit:
         K: [N/m], of the length of B; 0 where there is none.
         note: range of validity.
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     name: str
     kind: str

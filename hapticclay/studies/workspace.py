@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
+from ..display import brief
 from ..errors import integer, number
 from ..model.constants import AXES, L1, L2
 from .identification import (
@@ -41,6 +42,9 @@ class Drift:
             damping, stiffness.
         mobility: Wxx and Wyy of the bare arm [1/kg], (m, 2): the gain of Sh without shaping.
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     x: np.ndarray
     y: np.ndarray

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..display import brief
 from ..errors import ParameterError, choice
 from ..model.clay import slab
 from ..model.constants import AXES
@@ -90,6 +91,9 @@ class YieldMap:
         speed: largest velocity of the limit cycle [m/s per N]; NaN at and above `limit`.
         cells: points at which theory and a run are compared.
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     loop: PushedLoop
     least: float

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
+from ..display import brief
 from ..errors import ParameterError, choice, number
 from ..model.constants import AXES
 from ..results import Result
@@ -86,6 +87,9 @@ class ZRegion:
         box_K: largest stable K of runs with the worst hand of the box, for each B [N/m].
         box_exact: the same for the linear loop.
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     name: str
     wall: Wall

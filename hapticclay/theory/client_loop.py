@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arguments import checked
+from ..display import brief
 from ..errors import ParameterError, number, pair
 from ..formulas.arm import inverse_kinematics, jacobian, mobility
 from ..scene.scenario import Scenario
@@ -27,6 +28,7 @@ SOFTEST = 1e-3  # [N/m] start of the search
 AT_ONCE = 40  # values of K evaluated at a time
 AT_REST = 1e-6  # modes this near to z = 1 are rigid motion of the handle, which may have no spring
 ROUNDING = 1e-12  # of an eigenvalue
+PERIODS = 199  # in the search for the longest one
 LONGEST_QUEUE = 500  # samples of delay
 
 
@@ -41,12 +43,16 @@ class Handle:
         normal: unit normal of the wall, shape (2,).
     """
 
+    def __repr__(self) -> str:
+        return brief(self)
+
     inertia: np.ndarray
     damping: np.ndarray
     stiffness: np.ndarray
     normal: np.ndarray
 
     @classmethod
+    @checked
     def of(
         cls,
         scenario: Scenario,
@@ -213,26 +219,29 @@ def _limit(soft: np.ndarray, by_K: np.ndarray) -> float:
 
 @checked
 def slowest_period(handle: Handle, K: float, B: float, late: float, Ts: float) -> float:
-    """Longest Ts, up to a given one, at which a wall rendered by a program is stable [s].
+    """Longest sampling period, up to which a wall rendered by a program is stable [s].
+
+    The wall is stable at this and at every shorter period that is tested: 33 in each factor of ten.
 
     Args:
         handle: arm and hand.
         K: stiffness of the wall [N/m].
         B: damping of the wall [N.s/m].
-        late: delay in samples, the same at every Ts.
-        Ts: longest Ts to test, the start of the search [s].
+        late: delay in samples, the same at every period.
+        Ts: the middle of the search [s]: from a thousandth to a thousand times it.
 
     Returns:
-        The period; 0 if the loop is unstable down to a thousandth of Ts.
+        The period; 0 if the loop is unstable at a thousandth of Ts, inf if it is stable at every
+        period up to a thousand times Ts.
     """
-    grid = np.geomspace(Ts, 1e-3 * Ts, 200).tolist()
+    grid = np.geomspace(1e-3 * Ts, 1e3 * Ts, PERIODS).tolist()
 
     def stable(period: float) -> bool:
         return holds(handle, K, B, period, late * period)
 
-    if stable(grid[0]):
-        return grid[0]
-    for high, low in zip(grid[:-1], grid[1:], strict=True):
-        if stable(low):
+    if not stable(grid[0]):
+        return 0.0
+    for low, high in zip(grid[:-1], grid[1:], strict=True):
+        if not stable(high):
             return roots.bisect(stable, low, high, 1e-9)[0]
-    return 0.0
+    return math.inf

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from ..arguments import named
-from ..errors import ParameterError, number, pair
+from ..errors import ParameterError, choice, number, pair
 from ..model.compensator import Compensator
 from ..results import Result
-from . import gain_limits, stability_margins
+from . import gain_limits, margin_gains, stability_margins
 from .loops import TIMING, Loop, of_loop
-from .roots import first_failure
 
-K_MAX = 1e6  # bound of Scenario.gain: a margin that holds here counts as holding for any gain
+K_MAX = 1e6  # bound of Scenario.gain: a margin that holds up to here counts as holding for any gain
+SPARE = 1e-10  # a gain is lower by this share, so that rounding does not cost it its margin
 DESIGN_BAND = (0.3, 30.0)  # [rad/s]: voluntary motion of a hand, up to about 5 Hz
 
 
@@ -44,7 +44,9 @@ def design_gain(
         at: where the loop is opened for the margins (see `open_loop`).
 
     Returns:
-        K; inf if every gain keeps the margins, 0 if no gain does.
+        K; inf if every gain up to 1e6, the largest of a scenario, keeps the margins and the loop is
+        stable above; 0 if no small gain does. In continuous time K is the least over all
+        frequencies of the gains that use up a margin there.
 
     Raises:
         ParameterError: a value is out of its bounds.
@@ -53,6 +55,7 @@ def design_gain(
     phase = number("phase_margin", phase_margin, 0.0, math.pi, unit="rad")
     disk = number("disk_margin", disk_margin, 0.0, 2.0)
     late = number("delay_margin", delay_margin, 0.0, unit="s")
+    choice("at", at, stability_margins.BREAKS)
     top = gain_limits.gain_limit(loop)
     if loop.Ts is not None or loop.delay:
         if phase or disk or late or at != "compensator":
@@ -61,18 +64,10 @@ def design_gain(
             raise ParameterError(field, (phase, disk, late, at), bound)
         return top / gain
 
-    def good(K: float) -> bool:
-        m = stability_margins.margins(loop, K=K, at=at)
-        kept = m.phase >= phase and m.disk >= disk and m.delay >= late
-        return m.stable and m.gain[1] >= gain and kept
-
-    if top == 0.0:
-        return 0.0
-    if top == math.inf:
-        top = K_MAX
-        if good(top):
-            return math.inf
-    return first_failure(good, np.geomspace(1e-6 * top, top, 200).tolist(), below=0.0)[0]
+    if at == "compensator":
+        top /= gain
+    K = (1.0 - SPARE) * min(top, margin_gains.first_gain(loop, at, gain, phase, disk, late))
+    return math.inf if top == math.inf and K > K_MAX else K
 
 
 @named

@@ -14,17 +14,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..errors import number
 from ..model.compensator import Compensator
-from . import linear_loop, roots
+from . import exact_roots, late_roots, linear_loop, roots
+from .exact_roots import rational
 from .linear_loop import LinearLoop
 
 PHASE_STEP = 1.01  # the frequency grid grows by this factor ...
 NEAR_AXIS = 10.0 ** np.arange(-9.0, 0.0, 0.25)  # ... and closes in on every resonance
+SAME_FREQUENCY = 1e-10  # of a pole's: a crossing as near belongs to K = 0
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+LOWEST = -200.0  # logarithm of the least frequency of a search
+MOST_TURNS = 100_000  # points that follow the turns of a delay
 LEAST_GAIN = 1e-60  # no pole crosses at a lower gain, and products of such numbers underflow
 SMALL_ANGLE = 1e-6  # eigenvalues below this share of the largest are computed from the inverse
 
@@ -40,7 +46,7 @@ def critical_gain(loop: LinearLoop) -> tuple[float, float]:
     """
     if loop.Ts is not None or loop.delay:
         return first_instability(loop_family(loop))
-    denominator, passive, driven = linear_loop.loop_polynomials(loop)
+    denominator, passive, driven = linear_loop.loop_polynomials(loop, rational)
     return roots.first_crossing(denominator + passive, driven)
 
 
@@ -67,11 +73,6 @@ def loop_family(loop: LinearLoop) -> LoopFamily:
     return delayed_loop(loop) if loop.Ts is None else sampled_loop(loop)
 
 
-def no_poles() -> int:
-    """Number of right-half-plane poles of an h that has none: 0."""
-    return 0
-
-
 @dataclass(frozen=True)
 class LoopFamily:
     """A loop for every gain.
@@ -85,7 +86,10 @@ class LoopFamily:
         most: gain from which poles of arbitrarily high frequency lie right of the axis; inf for
             none.
         order: multiplicity of the pole of h at 0, or at z = 1.
-        right: number of poles of h right of the axis, or outside the unit circle.
+        right: number of poles right of the axis, or outside the unit circle, at K; at 0 those of h,
+            without those on the border within rounding. None where nothing asks for it.
+        poles: frequencies of poles of h on the border within rounding [rad/s].
+        rounding: size of h up to which its sign is rounding, (n,) to (n,).
     """
 
     h: Callable[[np.ndarray], np.ndarray]
@@ -94,7 +98,9 @@ class LoopFamily:
     ends: tuple[float, ...] = ()
     most: float = math.inf
     order: int = 0
-    right: Callable[[], int] = no_poles
+    right: Callable[[float], int] = lambda K: 0
+    poles: tuple[float, ...] = ()
+    rounding: Callable[[np.ndarray], np.ndarray] = np.zeros_like
 
 
 def first_instability(loop: LoopFamily) -> tuple[float, float]:
@@ -111,7 +117,7 @@ def first_instability(loop: LoopFamily) -> tuple[float, float]:
     if not loop.stable(0.5 * found[0][0] if found else 1.0):
         return 0.0, math.nan
     for i, (K, omega) in enumerate(found):
-        following = found[i + 1][0] if i + 1 < len(found) else 4.0 * K
+        following = min(found[i + 1][0] if i + 1 < len(found) else math.inf, 4.0 * K)
         if following > (1.0 + 1e-9) * K and not loop.stable(math.sqrt(K * following)):
             return K, omega
     return math.inf, math.nan
@@ -121,69 +127,150 @@ def gain_crossings(loop: LoopFamily) -> list[tuple[float, float]]:
     """Every (K, omega) with 1 = K h(omega), K > 0.
 
     Two crossings closer than the grid appear as a dip of Im h without a change of sign, so the
-    search also minimises every dip.
+    search also minimises every dip. Poles and zeros of h on the border of stability are no
+    crossings: the loop has them at K = 0 and at infinity.
 
     Args:
         loop: the loop for every gain.
     """
 
-    def phase_sine(x: float) -> float:
-        z = loop.h(np.array([math.exp(x)]))[0]
-        return z.imag / abs(z)
+    def phase_sine(x: np.ndarray) -> np.ndarray:
+        z = loop.h(np.exp(x))
+        size = np.abs(z)
+        return np.divide(z.imag, size, out=np.zeros(len(x)), where=(size > 0.0) & (size < np.inf))
 
     z = loop.h(loop.grid)
     if not np.any(z):  # the compensator has no input
         return []
-    omega = _zeros(phase_sine, np.log(loop.grid), z.imag / np.abs(z), z.real > 0.0)
-    omega += loop.ends
-    with np.errstate(divide="ignore"):
-        K = 1.0 / loop.h(np.array(omega)).real if omega else np.empty(0)
-    return [(float(k), float(w)) for k, w in zip(K, omega, strict=True) if 0.0 < k < math.inf]
+    grid, z = loop.grid[z != 0.0], z[z != 0.0]
+    beyond = np.append(loop.poles, math.inf)  # at a pole h changes its sign without a zero
+    piece = np.searchsorted(beyond, grid)
+    found: list[float] = []
+    for i in range(len(beyond)):
+        x, y = np.log(grid[piece == i]), z[piece == i]
+        found += _zeros(phase_sine, x, y.imag / np.abs(y), y.real > 0.0)
+    omega = np.array([*found, *loop.ends], dtype=float)
+    size = loop.h(omega).real
+    kept = size > loop.rounding(omega)
+    for pole in loop.poles:
+        kept &= np.abs(omega - pole) > SAME_FREQUENCY * pole
+    return list(zip((1.0 / size[kept]).tolist(), omega[kept].tolist(), strict=True))
 
 
 def unit_crossings(loop: LoopFamily, K: float) -> list[float]:
-    """Every frequency of the grid's range at which |K h| = 1 [rad/s], found as `gain_crossings`.
+    """Every frequency up to the end of the grid at which |K h| = 1 [rad/s].
+
+    Below the grid |h| is a power of the frequency: the search goes on to where it is past 1.
 
     Args:
         loop: the loop for every gain.
         K: compensator gain, > 0.
     """
 
-    def level(x: float) -> float:
-        return math.log(K * abs(loop.h(np.array([math.exp(x)]))[0]))
+    def level(x: np.ndarray) -> np.ndarray:
+        with np.errstate(divide="ignore"):  # a zero or a pole on the border
+            return np.log(K * np.abs(loop.h(np.exp(x))))
 
-    size = np.abs(loop.h(loop.grid))
-    if not np.all(size):
+    x = np.log(loop.grid)
+    y = level(x)
+    if not np.any(np.isfinite(y)):
         return []
-    return _zeros(level, np.log(loop.grid), np.log(K * size), np.full(len(size), True))
+    x, y = x[np.isfinite(y)], y[np.isfinite(y)]
+    more = [x[0]]
+    while more[-1] > LOWEST and y[0] * (slope := _slope(level, more[-1])) > 0.0:
+        more.append(more[-1] - max(1.0, 1.1 * y[0] / slope))
+        ahead = level(np.array(more[-1:]))[0]
+        if not math.isfinite(ahead) or ahead * y[0] <= 0.0:
+            break
+    below = np.array(more[:0:-1])
+    x, y = np.concatenate((below, x)), np.concatenate((level(below), y))
+    return _zeros(level, x, y, np.full(len(x), True))
+
+
+def _slope(f: Callable[[np.ndarray], np.ndarray], x: float) -> float:
+    """The slope of a power law f, an integer."""
+    low, high = f(np.array([x - 1.0, x]))
+    return float(round(high - low)) if math.isfinite(low) else 0.0
 
 
 def _zeros(
-    f: Callable[[float], float], x: np.ndarray, y: np.ndarray, where: np.ndarray
+    f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, y: np.ndarray, where: np.ndarray
 ) -> list[float]:
     """exp of the zeros of f between points x, with y = f(x), next to a point of the mask."""
-    from scipy.optimize import brentq, minimize_scalar
-
-    y[y == 0.0] = 1e-300  # a grid point on a crossing is found from one side
-    spans = [
-        (x[i], x[i + 1]) for i in np.flatnonzero((y[:-1] * y[1:] < 0.0) & (where[:-1] | where[1:]))
-    ]
+    y = np.where(y == 0.0, 1e-300, y)  # a grid point on a crossing is found from one side
+    i = np.flatnonzero((y[:-1] * y[1:] < 0.0) & (where[:-1] | where[1:]))
+    low, high = [x[i]], [x[i + 1]]
     dip = (np.abs(y[1:-1]) <= np.minimum(np.abs(y[:-2]), np.abs(y[2:]))) & (y[:-2] * y[1:-1] > 0.0)
-    for i in np.flatnonzero(dip & (y[1:-1] * y[2:] > 0.0) & where[1:-1]) + 1:
-        sign = math.copysign(1.0, y[i])
-        bottom = minimize_scalar(
-            lambda x, s=sign: s * f(x), bounds=(x[i - 1], x[i + 1]), method="bounded"
+    i = np.flatnonzero(dip & (y[1:-1] * y[2:] > 0.0) & where[1:-1]) + 1
+    if len(i):
+        sign = np.sign(y[i])
+        bottom = _bottoms(lambda x: sign * f(x), x[i - 1], x[i + 1])
+        through = sign * f(bottom) < 0.0
+        i, bottom = i[through], bottom[through]
+        low, high = [*low, x[i - 1], bottom], [*high, bottom, x[i + 1]]
+    return np.exp(_bracketed(f, np.concatenate(low), np.concatenate(high))).tolist()
+
+
+def _bottoms(
+    f: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """Where f is least between low and high, each element for itself, by golden sections."""
+    at = np.array([high - GOLDEN * (high - low), low + GOLDEN * (high - low)])
+    y = np.array([f(at[0]), f(at[1])])
+    for _ in range(34):  # to 1e-7 of the width
+        left = y[0] < y[1]
+        low, high = np.where(left, low, at[0]), np.where(left, at[1], high)
+        new = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
+        at = np.where(left, [new, at[0]], [at[1], new])
+        value = f(new)
+        y = np.where(left, [value, y[0]], [y[1], value])
+    return 0.5 * (low + high)
+
+
+def _bracketed(
+    f: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """The zeros of f between low and high, all at once (Chandrupatla 1997).
+
+    Where f has one sign at both ends, up to rounding, the zero is the end nearer to it.
+    """
+    out = np.array(low)
+    active: Any = np.arange(len(low))
+    a, b, c, t = high, low, low, np.full(len(low), 0.5)
+    fa, fb = (f(a), f(b)) if len(a) else (a, b)
+    fc = fb
+    for _ in range(200):
+        least = np.abs(fa) < np.abs(fb)
+        best, width = np.where(least, a, b), np.abs(b - a)
+        tolerance = 4.0 * 2.0**-52 * np.maximum(np.abs(best), 1.0)
+        out[active] = best
+        go = (width > tolerance) & (fa * fb < 0.0)
+        if not np.any(go):
+            break
+        active, a, b, c, fa, fb, fc, t, width, tolerance = (
+            v[go] for v in (active, a, b, c, fa, fb, fc, t, width, tolerance)
         )
-        if bottom.fun < 0.0:  # type: ignore[union-attr]
-            spans += [(x[i - 1], bottom.x), (bottom.x, x[i + 1])]  # type: ignore[union-attr]
+        nearest = 0.5 * tolerance / width
+        new = a + np.clip(t, nearest, 1.0 - nearest) * (b - a)
+        value = f(new)
+        same = (value > 0.0) == (fa > 0.0)
+        c, fc = np.where(same, a, b), np.where(same, fa, fb)
+        b, fb = np.where(same, b, a), np.where(same, fb, fa)
+        a, fa = new, value
+        t = _inverse_quadratic((a, b, c), (fa, fb, fc))
+    return out
 
-    def zero(a: float, c: float) -> float:
-        fa, fc = f(a), f(c)
-        if fa * fc > 0.0:  # one is a zero up to rounding: arrays and scalars round differently
-            return a if abs(fa) < abs(fc) else c
-        return brentq(f, a, c, xtol=1e-15, rtol=1e-14)  # type: ignore[return-value]
 
-    return [math.exp(zero(a, c)) for a, c in spans]
+def _inverse_quadratic(x: tuple[np.ndarray, ...], y: tuple[np.ndarray, ...]) -> np.ndarray:
+    """Share of the way from x[0] to x[1] of the next point; half where no parabola fits."""
+    (a, b, c), (fa, fb, fc) = x, y
+    with np.errstate(divide="ignore", invalid="ignore"):
+        xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
+        share = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (
+            fc - fb
+        )
+        fits = (phi * phi < xi) & ((1.0 - phi) ** 2 < 1.0 - xi) & np.isfinite(share)
+    return np.where(fits, share, 0.5)
 
 
 def frequency_grid(low: float, high: float, resonances: np.ndarray) -> np.ndarray:
@@ -212,81 +299,77 @@ def delayed_loop(loop: LinearLoop) -> LoopFamily:
     Args:
         loop: the loop, in continuous time, its K ignored.
     """
-    parts, delay = linear_loop.delayed_polynomials(loop), loop.delay
+    delay, parts = loop.delay, linear_loop.delayed_polynomials(loop, rational)
     while all(p.coef[0] == 0.0 for p in parts):  # the integrator that moves the handle
-        parts = tuple(p // roots.VARIABLE for p in parts)
-    physical, motors, driven = parts
-    own, straight, more = (p.coef[physical.degree() :] for p in parts)
+        parts = tuple(rational(p.coef[1:]) for p in parts)
+    exact, (physical, motors, driven) = parts, map(exact_roots.approximate, parts)
+    own, straight, more = (p.coef[physical.degree() :] for p in (physical, motors, driven))
     straight, more = (float(np.sum(x) / own[0]) for x in (straight, more))
-    order = roots.multiplicity_of_zero(physical + motors)
-    neutral, most = bool(straight or more), math.inf
+    most = math.inf
     if abs(straight) >= 1.0:
         most = 0.0
     elif more:
         most = (1.0 - math.copysign(straight, straight * more)) / abs(more)
-    resonances = np.concatenate([roots.roots(p) for p in (physical, physical + motors, driven)])
-    resonances = resonances[np.abs(resonances) > 0.0]
-    size = np.abs(resonances)
+    resonances = np.concatenate(
+        [exact_roots.approximate_roots(p) for p in (exact[0], exact[0] + exact[1], exact[2])]
+    )
 
     def h(omega: np.ndarray) -> np.ndarray:
         s = 1j * omega
         late = np.exp(-s * delay)
-        return -driven(s) * late / (physical(s) + motors(s) * late)
+        with np.errstate(divide="ignore", invalid="ignore"):  # on a pole
+            return -driven(s) * late / (physical(s) + motors(s) * late)
 
-    def right(K: float) -> float:
-        """Number of poles right of the axis, for K = 0 those of h, none of which lies at 0."""
-        acting, share = motors + K * driven, 0.5 * (1.0 + abs(straight + K * more))
-        a, high = float(np.exp(np.mean(np.log(size)))), (100.0 if neutral else 1.0) * size.max()
-        bound = Polynomial(np.abs(acting.coef))
-        while bound(high) > share * abs(physical(1j * high)):
-            high *= 2.0
-        turns = np.linspace(0.0, high, min(100 + int(4.0 * delay * high), 100_000))
+    def rounding(omega: np.ndarray) -> np.ndarray:
+        s = 1j * omega
+        bound = exact_roots.ROUNDING * Polynomial(np.abs(driven.coef))(omega)
+        return bound / np.abs(physical(s) + motors(s) * np.exp(-s * delay))
 
-        def F(omega: np.ndarray) -> np.ndarray:
-            s = 1j * omega
-            return (physical(s) + acting(s) * np.exp(-s * delay)) / (s + a) ** physical.degree()
-
-        # Each zero right of the axis turns F by -pi between 0 and infinity; beyond 1e3 high hardly
-        # anything is left, and what is, turns it by less than a quarter.
-        end = high if neutral else 1e3 * high
-        omega = np.union1d(turns, frequency_grid(1e-3 * size.min(), end, resonances))
-        at_zero = order if K == 0.0 else 0
-        if at_zero:  # s^order/(s + a)^order turns F by a quarter each
-            omega[0] = 1e-6 * omega[1]
-        left = np.angle(F(omega[-1:])[0])
-        return -(phase_change(F, omega) - left) / np.pi - 0.5 * at_zero
+    def right(K: float) -> int:
+        if K:
+            now, later = exact[0], exact[1] + rational([K]) * exact[2]
+            return late_roots.roots_right(now, later, delay)
+        alone = late_roots.roots_right(*linear_loop.delayed_servo(loop, rational), delay)
+        return alone + exact_roots.count_right(loop.compensator.fraction[1])
 
     def stable(K: float) -> bool:
-        return K < most and bool(abs(right(K)) < 0.5)
+        return K < most and right(K) == 0
 
-    low, top = 1e-3 * size.min(), max(40.0 / delay, 2.0 * np.abs(resonances.imag).max())
-    top = max(top, 10.0 * size.max()) if neutral else top  # where |h| is nearly constant
-    turns = np.linspace(low, top, min(int(4.0 * delay * top), 100_000))
-    grid = np.union1d(turns, frequency_grid(low, top, resonances))
+    poles = compensator_poles(loop)
+    grid = _late_grid(resonances, delay, bool(straight or more))
+    grid = _around(grid, poles)
     rest = physical.coef[0] + motors.coef[0]
     ends = (0.0,) if rest and driven.coef[0] / rest < 0.0 else ()
-    return LoopFamily(h, grid, stable, ends, most, order, lambda: round(right(0.0)))
+    order = roots.multiplicity_of_zero(exact[0] + exact[1])
+    return LoopFamily(h, grid, stable, ends, most, order, right, poles, rounding)
 
 
-def phase_change(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> float:
-    """Change of arg f along x [rad]; points are inserted until no step changes it by more than 0.5.
+def compensator_poles(loop: LinearLoop) -> tuple[float, ...]:
+    """Frequencies of the poles of C on the imaginary axis within rounding [rad/s].
 
     Args:
-        f: complex function, (n,) to (n,).
-        x: ascending, shape (n,).
-
-    Returns:
-        NaN if that needs over a million points: so long a delay makes any loop unstable.
+        loop: the loop.
     """
-    z = f(x)
-    while len(x) < 1_000_000:
-        wide = np.flatnonzero(np.abs(np.angle(z[1:] / z[:-1])) > 0.5)
-        middle = 0.5 * (x[wide] + x[wide + 1])
-        new = (middle > x[wide]) & (middle < x[wide + 1])
-        if not np.any(new):
-            return float(np.sum(np.angle(z[1:] / z[:-1])))
-        x, z = np.insert(x, wide[new] + 1, middle[new]), np.insert(z, wide[new] + 1, f(middle[new]))
-    return math.nan
+    found = exact_roots.axis_roots(loop.compensator.fraction[1])
+    return tuple(exact_roots.square_root(x) for x, _ in found)
+
+
+def _around(grid: np.ndarray, poles: tuple[float, ...]) -> np.ndarray:
+    """The grid without its points on poles of h, and with points beside them."""
+    for pole in poles:
+        grid = grid[np.abs(grid - pole) > SAME_FREQUENCY * pole]
+        beside = pole * np.array([1.0 - 2.0 * SAME_FREQUENCY, 1.0 + 2.0 * SAME_FREQUENCY])
+        grid = np.union1d(grid, beside[(beside > grid[0]) & (beside < grid[-1])])
+    return grid
+
+
+def _late_grid(resonances: np.ndarray, delay: float, neutral: bool) -> np.ndarray:
+    """Frequencies that follow a late h; neutral: up to where |h| is nearly constant."""
+    size = np.abs(resonances)
+    low, top = 1e-3 * size.min(), max(40.0 / delay, 2.0 * np.abs(resonances.imag).max())
+    top = max(top, 10.0 * size.max()) if neutral else top
+    turns = np.linspace(low, top, min(int(4.0 * delay * top), MOST_TURNS))
+    return np.union1d(turns, frequency_grid(low, top, resonances))
 
 
 def sampled_loop(loop: LinearLoop) -> LoopFamily:
@@ -305,30 +388,86 @@ def sampled_loop(loop: LinearLoop) -> LoopFamily:
     less, beta, gamma, free, integrators, unseen = _acting_map(loop)
     t, Ts, n = loop.environment, loop.Ts, len(less)
     assert Ts is not None
+    waiting = linear_loop.whole_samples(loop.delay, Ts)[0]
+
+    def states(omega: np.ndarray) -> np.ndarray:
+        # exp(j omega Ts) - 1, without the loss of digits at slow frequencies
+        parts = np.split(np.expm1(1j * omega * Ts), range(256, len(omega), 256))
+        return np.concatenate([_driven(less, beta, waiting, z1) for z1 in parts])
 
     def h(omega: np.ndarray) -> np.ndarray:
-        out = np.empty(len(omega), dtype=complex)
-        for i in range(0, len(omega), 256):
-            # exp(j omega Ts) - 1, without the loss of digits at slow frequencies
-            z1 = np.expm1(1j * omega[i : i + 256] * Ts)
-            resolvent = z1[:, None, None] * np.eye(n) - less
-            out[i : i + 256] = np.linalg.solve(resolvent, beta[:, None])[:, :, 0] @ gamma
-        return out
+        return states(omega) @ gamma
+
+    def rounding(omega: np.ndarray) -> np.ndarray:
+        return exact_roots.ROUNDING * (np.abs(states(omega)) @ np.abs(gamma))
 
     def stable(K: float) -> bool:
         return _within_circle(less, beta, gamma, K)
 
+    def right(K: float) -> int:
+        if K:
+            return _outside(less + max(K, LEAST_GAIN) * np.outer(beta, gamma))
+        return _outside(_without_compensator(loop)) + exact_roots.count_right(
+            loop.compensator.fraction[1]
+        )
+
     z1 = eigenvalues(free).astype(complex)
-    poles = np.log1p(z1[np.abs(1.0 + z1) > 1e-6]) / Ts
-    resonances = np.concatenate((poles, roots.nonzero_roots(t)))
+    resonances = np.log1p(z1[np.abs(1.0 + z1) > 1e-6]) / Ts
+    physical, motors = linear_loop.delayed_servo(loop, rational)
+    resonances = np.concatenate(
+        (resonances, exact_roots.approximate_roots(physical + motors), roots.nonzero_roots(t))
+    )
+    resonances = resonances[resonances != 0.0]
     top = np.pi / Ts
     low = min(1e-2 * np.abs(resonances).min(), 0.1 * top)
     near = frequency_grid(low, top * (1.0 - 1e-9), resonances.imag)
-    grid = np.union1d(np.linspace(low, top, 20 * n)[:-1], near)
-    still = not integrators and h(np.zeros(1))[0].real > 0.0
-    outside = int(np.sum(2.0 * z1.real + np.abs(z1) ** 2 > 0.0))
+    poles = compensator_poles(loop)
+    grid = _around(np.union1d(np.linspace(low, top, 20 * n)[:-1], near), poles)
+    still = integrators == unseen and h(np.zeros(1))[0].real > 0.0
     ends = (0.0, top) if still else (top,)
-    return LoopFamily(h, grid, stable, ends, math.inf, integrators - unseen, lambda: outside)
+    order = integrators - unseen
+    return LoopFamily(h, grid, stable, ends, math.inf, order, right, poles, rounding)
+
+
+def _driven(less: np.ndarray, beta: np.ndarray, waiting: int, z1: np.ndarray) -> np.ndarray:
+    """The states (z1 - less)^-1 beta, shape (m, n), at z1 = z - 1, shape (m,).
+
+    Each of the last states, which are forces that wait, follows from those before: what is left to
+    solve has the order of the loop without them.
+    """
+    m, n, a = len(z1), len(less), len(less) - waiting
+    share = np.zeros((m, n, a + 1), dtype=complex)  # of the first a states, and a constant
+    share[:, np.arange(a), np.arange(a)] = 1.0
+    for j in range(a, n):
+        share[:, j] = less[j, j - 1] * share[:, j - 1]
+        if j > a:
+            share[:, j, :a] += less[j, :a]
+        else:
+            share[:, j, : a - 1] += less[j, : a - 1]
+        share[:, j, a] += beta[j]
+        share[:, j] /= (z1 - less[j, j])[:, None]
+    into = less[:a] @ share
+    left = z1[:, None, None] * np.eye(a) - into[:, :, :a]
+    right = (into[:, :, a] + beta[:a])[:, :, None]
+    try:
+        first = np.linalg.solve(left, right)
+    except np.linalg.LinAlgError:  # on a pole: beside it, by less than its rounding
+        beside = np.abs(z1)[:, None, None] * 2.0**-50 * np.eye(a)
+        first = np.linalg.solve(left + beside, right)
+    return (share[:, :, :a] @ first)[:, :, 0] + share[:, :, a]
+
+
+def _outside(less: np.ndarray) -> int:
+    """Number of eigenvalues of 1 + less outside the unit circle."""
+    z1 = eigenvalues(less)
+    return int(np.sum(2.0 * z1.real + np.abs(z1) ** 2 > 0.0))
+
+
+def _without_compensator(loop: LinearLoop) -> np.ndarray:
+    """The sampled loop without C and G, as a difference: handle and motors."""
+    less = linear_loop.sampled_differences(loop)[0]
+    kept = np.delete(np.arange(len(less)), np.arange(2, 4 + loop.compensator.order))
+    return less[np.ix_(kept, kept)]
 
 
 def _within_circle(less: np.ndarray, beta: np.ndarray, gamma: np.ndarray, K: float) -> bool:
@@ -397,6 +536,8 @@ def _from_rest(
 def eigenvalues(a: np.ndarray) -> np.ndarray:
     """Eigenvalues, small ones as accurate as large ones: the small are computed from the inverse.
 
+    Of a matrix that is singular in floats the smallest are 0, within its rounding.
+
     Args:
         a: matrix, shape (n, n).
     """
@@ -404,6 +545,10 @@ def eigenvalues(a: np.ndarray) -> np.ndarray:
     z = z[np.argsort(np.abs(z))]
     small = int(np.sum(np.abs(z) < SMALL_ANGLE * np.abs(z[-1])))
     if small:
-        large = np.linalg.eigvals(np.linalg.inv(a))
+        try:
+            large = np.linalg.eigvals(np.linalg.inv(a))
+        except np.linalg.LinAlgError:
+            return z
+        z = z.astype(np.result_type(z, large))  # a pair that floats took for two real ones
         z[:small] = 1.0 / large[np.argsort(-np.abs(large))][:small]
     return z

@@ -21,8 +21,9 @@ def gain_limit(loop: Loop) -> float:
     """Largest compensator gain K up to which the loop of one axis is stable at the nominal pose.
 
     Every gain between 0 and the limit is stable. In continuous time without delay the limit is the
-    first crossing of the closed-loop polynomial (Eq. 8); otherwise see `sampled_loop` (sampled) and
-    `delayed_loop` (continuous, with delayed motors).
+    first crossing of the closed-loop polynomial (Eq. 8), in exact arithmetic; a pole or zero of the
+    open loop on the imaginary axis within rounding is no crossing. Otherwise see `sampled_loop`
+    (sampled) and `delayed_loop` (continuous, with delayed motors).
 
     Args:
         loop: the loop, its K ignored; or axis, b, operator, and other parts by name.

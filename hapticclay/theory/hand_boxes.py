@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -20,7 +21,8 @@ from ..errors import (
     numbers_of,
 )
 from ..model.operator import Operator
-from . import gain_crossings, linear_loop, roots
+from . import exact_roots, gain_crossings, linear_loop, roots
+from .exact_roots import axis_parts, rational, value
 from .loops import Loop, of_loop
 from .roots import first_failure
 from .stability_margins import LINEAR, Verdict
@@ -104,21 +106,32 @@ def critical_hand(loop: Loop, box: Box) -> tuple[Operator, float] | None:
     Returns:
         (hand, frequency [rad/s]), or None if no hand of the box puts a pole there.
     """
-    A = linear_loop.characteristic(replace(loop, operator=None))
-    E = linear_loop.device_admittance(loop)[0]
+    denominator, passive, driven = linear_loop.loop_polynomials(
+        replace(loop, operator=None), rational
+    )
+    K = rational([loop.gain])
+    A = denominator + passive + K * driven
+    unit = replace(loop, b=0.0, k=0.0, operator=Operator(0.0, 0.0, 1.0))
+    _, passive, driven = linear_loop.loop_polynomials(unit, rational)
+    E = passive + K * driven
     for edge in _critical_ends(A, E, box):
         return edge
-    AE = roots.cross_spectrum(-A, E).coef
-    R, X = Polynomial(AE.real[::2]), Polynomial(AE.imag[1::2])
-    Q = roots.squared_magnitude(E)  # -A/E = R/Q + j omega X/Q
+    (Ae, Ao), (Ee, Eo), omega2 = axis_parts(A), axis_parts(E), rational([0, 1])
+    R, X = -(Ae * Ee + omega2 * Ao * Eo), Ae * Eo - Ao * Ee
+    Q = Ee * Ee + omega2 * Eo * Eo  # -A/E = R/Q + j omega X/Q
     (m0, m1), (d0, d1), (k0, k1) = box.mass, box.damper, box.spring
-    tests = [X - d0 * Q, d1 * Q - X, R - Polynomial([k0, -m1]) * Q, Polynomial([k1, -m0]) * Q - R]
-    edges = np.unique(np.concatenate([roots.positive_roots(t) for t in tests]))
-    sizes = [Polynomial(np.abs(t.coef)) for t in tests]
-    for x in np.concatenate((edges, 0.5 * (edges[1:] + edges[:-1]))).tolist():
-        # Intersections with an edge of the box, to 1e-9 of the terms that cancel there.
-        if all(t(x) >= -1e-9 * size(x) for t, size in zip(tests, sizes, strict=True)):
-            return _member(box, float(R(x) / Q(x)), float(X(x) / Q(x)), x)
+    dampers = X - rational([d0]) * Q, rational([d1]) * Q - X
+    reals = R - rational([k0, -m1]) * Q, rational([k1, -m0]) * Q - R
+    edges = []
+    for on, others in ((dampers, reals), (reals, dampers)):  # exactly zero at its own roots
+        for x in sorted({x for t in on for x in exact_roots.positive_roots(t)}):
+            edges.append(x)
+            if all(value(t, x) >= 0 for t in others):
+                return _member(box, R, X, Q, x)
+    edges.sort()
+    for x in (0.5 * (low + high) for low, high in itertools.pairwise(map(float, edges))):
+        if all(value(t, Fraction(x)) >= 0 for t in (*dampers, *reals)):
+            return _member(box, R, X, Q, Fraction(x))
     return None
 
 
@@ -133,13 +146,17 @@ def _critical_ends(A: Polynomial, E: Polynomial, box: Box) -> Iterator[tuple[Ope
                 yield Operator(**lows | {field: float(needed)}), at
 
 
-def _member(box: Box, real: float, damper: float, x: float) -> tuple[Operator, float]:
-    """The hand of the box whose value at omega^2 = x is real + j omega damper."""
-    lowest = max(box.mass[0], (box.spring[0] - real) / x)
-    highest = min(box.mass[1], (box.spring[1] - real) / x)
+def _member(
+    box: Box, R: Polynomial, X: Polynomial, Q: Polynomial, x: Fraction
+) -> tuple[Operator, float]:
+    """The hand of the box whose value at omega^2 = x is R/Q + j omega X/Q."""
+    real, damper = float(value(R, x) / value(Q, x)), float(value(X, x) / value(Q, x))
+    x2 = float(x)
+    lowest = max(box.mass[0], (box.spring[0] - real) / x2)
+    highest = min(box.mass[1], (box.spring[1] - real) / x2)
     mass = min(max(0.5 * (lowest + highest), box.mass[0]), box.mass[1])
-    spring = min(max(real + mass * x, box.spring[0]), box.spring[1])
-    return Operator(mass, min(max(damper, box.damper[0]), box.damper[1]), spring), math.sqrt(x)
+    spring = min(max(real + mass * x2, box.spring[0]), box.spring[1])
+    return Operator(mass, min(max(damper, box.damper[0]), box.damper[1]), spring), math.sqrt(x2)
 
 
 def rigid_limit(loop: Loop) -> tuple[float, float]:
@@ -155,9 +172,8 @@ def rigid_limit(loop: Loop) -> tuple[float, float]:
     Returns:
         (K, omega [rad/s]).
     """
-    driven = linear_loop.device_admittance(replace(loop, K=1.0))[0]
-    passive = linear_loop.device_admittance(replace(loop, K=0.0))[0]
-    return roots.first_crossing(passive, driven - passive)
+    unit = replace(loop, b=0.0, k=0.0, operator=Operator(0.0, 0.0, 1.0))
+    return roots.first_crossing(*linear_loop.loop_polynomials(unit, rational)[1:])
 
 
 @of_loop("K", "b", "box", timing=True)
@@ -204,6 +220,8 @@ def _exact_worst_case(loop: Loop, box: Box) -> tuple[float, float, Operator | No
 
     found = [(*gain_crossings.critical_gain(replace(loop, operator=th)), th) for th in corners]
     limit, omega, worst = min(found, key=lambda x: x[0])
+    if len(corners) == 1:
+        return limit, omega, worst
     top = min(limit, 1e6)
     if limit == 0.0 or (limit == math.inf and stable(top)):
         return limit, math.nan, worst

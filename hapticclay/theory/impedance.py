@@ -249,8 +249,8 @@ def _sampled_response(loop: Loop, omega: np.ndarray) -> tuple[np.ndarray, np.nda
     damper, spring = th.damper + physical * b, th.spring + physical * k
     arm = held_arm(total, damper, spring, Ts, loop.delay, omega)
     # compensator and reference model, to the net force
-    A, B = controller.held_compensator(loop.servo, loop.compensator, loop.gain, Ts)
-    ahead = np.expm1(s * Ts)[:, None, None] * np.eye(n + 2) - (A - np.eye(n + 2))
+    D, B = linear_loop.held_change(loop, loop.gain)
+    ahead = np.expm1(s * Ts)[:, None, None] * np.eye(n + 2) - D
     states = np.linalg.solve(ahead, np.broadcast_to(B[:, None], (len(s), n + 2, 1)))[:, :, 0]
     through = controller.controller_matrices(loop.servo, loop.compensator, loop.gain)[1][-1]
     law, delta = controller.feedback_vector(loop.servo), loop.compensator.state_space()[2]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
@@ -26,6 +26,7 @@ from ..model.operator import NO_HAND, Operator
 from ..model.spring import STIFFNESS_MAX
 from ..scene.scenario import Render
 from . import roots
+from .exact_roots import rational
 
 FASTEST = 1e9  # [m/s] of a steady velocity
 
@@ -198,7 +199,9 @@ def reduced(compensator: Compensator) -> Compensator:
 # ---- polynomials ---------------------------------------------------------------------------------
 
 
-def loop_polynomials(loop: LinearLoop) -> tuple[Polynomial, Polynomial, Polynomial]:
+def loop_polynomials(
+    loop: LinearLoop, polynomial: Callable[[Any], Polynomial] = Polynomial
+) -> tuple[Polynomial, Polynomial, Polynomial]:
     """Parts of the closed-loop polynomial: denominator + passive + K driven.
 
     The first is the common denominator of G, C and Sh, so the loop's transfer function
@@ -206,17 +209,23 @@ def loop_polynomials(loop: LinearLoop) -> tuple[Polynomial, Polynomial, Polynomi
 
     Args:
         loop: the loop, in continuous time without delay; its K is ignored.
+        polynomial: makes polynomials of coefficients; `exact_roots.rational` makes all of them, and
+            their products, exact.
 
     Returns:
         (denominator, passive, driven).
     """
-    s, cg, t = loop.servo.S, _forward_denominator(loop), loop.environment
-    servo = Polynomial([s.stiffness, s.damping, 1.0])
-    forward = loop.servo.G.gain * (loop.compensator.fraction[0] * servo * t)
-    return cg * servo, s.gain * (cg * t), forward
+    s, cg = loop.servo.S, _forward_denominator(loop, polynomial)
+    t = polynomial(loop.environment.coef)
+    servo = polynomial([s.stiffness, s.damping, 1.0])
+    num = polynomial(loop.compensator.fraction[0].coef)
+    forward = polynomial([loop.servo.G.gain]) * (num * servo * t)
+    return cg * servo, polynomial([s.gain]) * (cg * t), forward
 
 
-def delayed_polynomials(loop: LinearLoop) -> tuple[Polynomial, Polynomial, Polynomial]:
+def delayed_polynomials(
+    loop: LinearLoop, polynomial: Callable[[Any], Polynomial] = Polynomial
+) -> tuple[Polynomial, Polynomial, Polynomial]:
     """Parts of the closed-loop polynomial with delayed motors: physical + late (motors + K driven).
 
     With late = exp(-s delay), W the mobility of the bare handle, Wn the gain of Sh (the same
@@ -229,24 +238,44 @@ def delayed_polynomials(loop: LinearLoop) -> tuple[Polynomial, Polynomial, Polyn
 
     Args:
         loop: the loop, in continuous time; its K is ignored.
+        polynomial: as in `loop_polynomials`.
 
     Returns:
         (physical, motors, driven).
     """
-    s, th, cg = loop.servo.S, loop.hand, _forward_denominator(loop)
+    physical, motors = delayed_servo(loop, polynomial)
+    cg = _forward_denominator(loop, polynomial)
+    return cg * physical, cg * motors, loop_polynomials(loop, polynomial)[2]
+
+
+def delayed_servo(
+    loop: LinearLoop, polynomial: Callable[[Any], Polynomial] = Polynomial
+) -> tuple[Polynomial, Polynomial]:
+    """Parts of the closed-loop polynomial without compensator: physical + late motors.
+
+    Args:
+        loop: the loop, in continuous time; its K is ignored.
+        polynomial: as in `loop_polynomials`.
+
+    Returns:
+        (physical, motors).
+    """
+    s, th = loop.servo.S, loop.hand
     k, b = (loop.k, loop.b) if loop.render == "physical" else (0.0, 0.0)  # physical
     W = s.gain if loop.mobility is None else loop.mobility
-    physical = cg * Polynomial([W * (th.spring + k), W * (th.damper + b), 1.0 + W * th.mass])
-    motors = cg * Polynomial([s.stiffness + W * (loop.k - k), s.damping + W * (loop.b - b)])
+    physical = polynomial([W * (th.spring + k), W * (th.damper + b), 1.0 + W * th.mass])
+    motors = polynomial([s.stiffness + W * (loop.k - k), s.damping + W * (loop.b - b)])
     if loop.mobility is not None:
-        motors = motors + (s.gain - W) * (cg * loop.environment)
-    return physical, motors, loop_polynomials(loop)[2]
+        motors = motors + polynomial([s.gain - W]) * polynomial(loop.environment.coef)
+    return physical, motors
 
 
-def _forward_denominator(loop: LinearLoop) -> Polynomial:
+def _forward_denominator(
+    loop: LinearLoop, polynomial: Callable[[Any], Polynomial] = Polynomial
+) -> Polynomial:
     """Denominator of G C."""
-    g = loop.servo.G
-    return loop.compensator.fraction[1] * Polynomial([g.stiffness, g.damping, 1.0])
+    g, den = loop.servo.G, loop.compensator.fraction[1]
+    return polynomial(den.coef) * polynomial([g.stiffness, g.damping, 1.0])
 
 
 def characteristic(loop: LinearLoop) -> Polynomial:
@@ -284,12 +313,15 @@ def device_impedance(loop: LinearLoop) -> tuple[Polynomial, Polynomial]:
 
 
 def stable(loop: LinearLoop) -> bool:
-    """Return True if no closed-loop pole lies right of the imaginary axis.
+    """Return True if every closed-loop pole lies left of the imaginary axis, but free motion at 0.
+
+    The answer is exact.
 
     Args:
         loop: the loop, in continuous time without delay.
     """
-    return roots.hurwitz(characteristic(loop))
+    denominator, passive, driven = loop_polynomials(loop, rational)
+    return roots.hurwitz(denominator + passive + rational([loop.gain]) * driven)
 
 
 # ---- state spaces --------------------------------------------------------------------------------
@@ -392,8 +424,7 @@ def sampled_differences(
         less[place] += new @ u
     for j, loop in enumerate(loops):
         own = slice(at[j] + 2, at[j + 1])
-        A, B = controller.held_compensator(loop.servo, loop.compensator, 1.0, Ts)
-        less[own, own], beta[own, j] = A - np.eye(len(B)), B
+        less[own, own], beta[own, j] = held_change(loop, 1.0)
         through = controller.controller_matrices(loop.servo, loop.compensator, 1.0)[1][-1]
         if through:  # of C, in y'' and so in u at once
             beta[newest : newest + n, j] = through * inertia[:, j]
@@ -496,8 +527,34 @@ def _moved_together(force: np.ndarray, w: np.ndarray, t: float) -> tuple[np.ndar
     a = np.zeros((3 * n, 3 * n))
     a[:n, n : 2 * n] = np.eye(n)
     a[n : 2 * n] = np.hstack((w @ force, w))
-    change = controller.matrix_exponential(t * a) - np.eye(3 * n)
+    change = _exponential_less_one(t * a)
     return change[: 2 * n, : 2 * n], change[: 2 * n, 2 * n :]
+
+
+def held_change(loop: LinearLoop, K: float) -> tuple[np.ndarray, np.ndarray]:
+    """Compensator and reference model over a sample under held net force: z+ = z + D z + B f.
+
+    Args:
+        loop: the loop, sampled.
+        K: gain of the compensator.
+
+    Returns:
+        D, shape (n, n), without the loss of digits of a difference, and B, shape (n,).
+    """
+    assert loop.Ts is not None
+    A, B = controller.controller_matrices(loop.servo, loop.compensator, K)
+    n = len(B)
+    change = _exponential_less_one(loop.Ts * np.block([[A, B[:, None]], [np.zeros((1, n + 1))]]))
+    return change[:n, :n], change[:n, n]
+
+
+def _exponential_less_one(a: np.ndarray) -> np.ndarray:
+    """exp(a) - 1; of a small matrix as a (1 + a/2 + ...), the second factor by an exponential."""
+    n = len(a)
+    if np.abs(a).sum(axis=1).max() > 1.0:  # the product would cancel, the difference does not
+        return controller.matrix_exponential(a) - np.eye(n)
+    larger = np.block([[a, np.eye(n)], [np.zeros((n, 2 * n))]])
+    return a @ controller.matrix_exponential(larger)[:n, n:]
 
 
 def held_motion(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.ndarray]:

@@ -13,9 +13,13 @@ from numpy.polynomial import Polynomial
 
 from ..arguments import checked
 from ..errors import number
+from ..scene.virtual_wall import Device, VirtualWall
 from . import linear_loop, roots
 from .loops import Loop, of_loop
 from .stability_margins import LINEAR, Verdict
+from .wall_limits import passivity_index
+
+FREQUENCIES = 20_001  # of a sampled test
 
 
 @of_loop("K", "b")
@@ -52,7 +56,7 @@ def passivity(loop: Loop) -> Verdict:
 
 
 def colgate_schenkel(
-    H: Callable[[np.ndarray], np.ndarray], Ts: float, damping: float, n: int = 20_001
+    H: Callable[[np.ndarray], np.ndarray], Ts: float, damping: float, n: int = FREQUENCIES
 ) -> Verdict:
     """Passivity of a sampled virtual object behind a physical damper.
 
@@ -74,7 +78,12 @@ def colgate_schenkel(
     theta = np.linspace(0.0, np.pi, n)[1:]
     response = -np.expm1(-1j * theta) * H(np.exp(1j * theta))
     need = 0.25 * Ts / np.sin(0.5 * theta) ** 2 * response.real
-    i, omega = int(np.argmax(need)), theta / Ts
+    return _sampled_verdict(need, damping, theta / Ts)
+
+
+def _sampled_verdict(need: np.ndarray, damping: float, omega: np.ndarray) -> Verdict:
+    """The verdict on a physical damper, from the one needed at each frequency."""
+    i = int(np.argmax(need))
     return Verdict(
         bool(damping > need[i]),
         damping - float(need[i]),
@@ -83,25 +92,33 @@ def colgate_schenkel(
             "a mass and a physical damper, nothing else, behind the handle",
             "position sampled, force held",
         ),
-        f"Colgate and Schenkel's test at {n - 1} frequencies up to pi/Ts: sampled",
+        f"Colgate and Schenkel's test at {len(omega)} frequencies up to pi/Ts: sampled",
         "damping to spare [N.s/m]",
         tuple((float(omega[i]), float(omega[j])) for i, j in roots.runs_of_true(need >= damping)),
     )
 
 
 @checked
-def clay_passivity(b: float, Ts: float, damping: float = 0.0, stiffness: float = 0.0) -> Verdict:
+def clay_passivity(
+    b: float, Ts: float, damping: float = 0.0, stiffness: float = 0.0, delay: float = 0.0
+) -> Verdict:
     """Passivity of held clay alone, its velocity a backward difference.
 
-    Servo and compensator are not modelled. The condition is damping > stiffness Ts/2 + b, the
-    second term at the Nyquist frequency (Colgate, Schenkel 1997). The handle has no physical
-    damper, so held clay alone is never passive; clay with render="physical" is.
+    Servo and compensator are not modelled. Without delay the condition is damping > stiffness Ts/2
+    + b, the second term at the Nyquist frequency (Colgate, Schenkel 1997); with one it is that of
+    `passivity_index`. The handle has no physical damper, so held clay alone is never passive; clay
+    with render="physical" is.
 
     Args:
         b: clay [N.s/m].
         Ts: control sample [s].
         damping: physical damping of the handle [N.s/m].
         stiffness: stiffness of a wall beside the clay [N/m].
+        delay: from a sample to the force computed from it [s], 0 to 100 Ts.
     """
     b, k = number("b", b, 0.0, unit="N.s/m"), number("stiffness", stiffness, 0.0, unit="N/m")
-    return colgate_schenkel(lambda z: k + b * (1.0 - 1.0 / z) / Ts, Ts, damping)
+    if not number("delay", delay, 0.0, unit="s"):
+        return colgate_schenkel(lambda z: k + b * (1.0 - 1.0 / z) / Ts, Ts, damping)
+    wall = VirtualWall(K=k, B=b, device=Device(damper=damping), Ts=Ts, delay=delay)
+    omega = np.linspace(0.0, np.pi, FREQUENCIES)[1:] / Ts
+    return _sampled_verdict(damping - passivity_index(wall, omega), damping, omega)

@@ -40,6 +40,7 @@ class Loop(LinearLoop):
     """
 
     @classmethod
+    @checked
     def of(cls, scenario: Scenario, axis: str, b: float | None = None) -> Loop:
         """The loop of one axis of a scenario, at the nominal pose of its arm.
 

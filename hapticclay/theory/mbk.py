@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 
 from ..arguments import checked, named
+from ..display import brief
 from ..errors import ParameterError, choice, number
 from ..model.compensator import Compensator
 from ..scene.virtual_wall import VirtualWall
@@ -52,6 +53,9 @@ class Region:
         low: least stable value of the part on the vertical axis, shape (n,).
         high: largest stable value, shape (n,).
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     plane: str
     wall: VirtualWall
@@ -227,6 +231,9 @@ class DynamicRange:
         share: share of the limit that is rendered, because at the limit itself motion does not
             decay.
     """
+
+    def __repr__(self) -> str:
+        return brief(self)
 
     omega: np.ndarray
     free: np.ndarray

@@ -8,12 +8,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from . import exact_roots
+from .exact_roots import axis_parts, exact, square_root, value, within_rounding
+
 VARIABLE = Polynomial([0.0, 1.0])  # s itself
+ROUNDED = 1e-14  # a sum below this share of its terms is their rounding
+NEARLY_REAL = 1e-3  # imaginary part of a double root that rounding has split, as a share of it
+SCAN_DENSITY = 24.0  # points of a scan per decade of omega^2, ...
+SCAN_BEYOND = 6.0  # which extends by so many decades on either side of all roots, ...
+REFINED = 8  # times that a minimum is looked for on a grid 20 times as fine
+NOISE = 1e-12  # relative differences of values up to this are rounding
+SCAN_NEAR = np.linspace(-5.0, 5.0, 21)  # and closes in on a root, in units of its imaginary part
+LEAST, MOST = 1e-300, 1e300  # between these a K is a number
+SAME = 1e-12  # of their size: roots that cross at such K leave no room between them
 
 
 def roots(p: Polynomial) -> np.ndarray:
@@ -47,10 +61,12 @@ def positive_roots(p: Polynomial) -> np.ndarray:
 def hurwitz(p: Polynomial) -> bool:
     """Return True if every root of p other than zero lies left of the imaginary axis.
 
+    The answer is exact.
+
     Args:
-        p: polynomial.
+        p: polynomial, of floats or rational.
     """
-    return bool(np.all(nonzero_roots(p).real < 0.0))
+    return not np.any(p.coef) or exact_roots.roots_right(p) == (0, 0)
 
 
 def multiplicity_of_zero(p: Polynomial) -> int:
@@ -106,43 +122,80 @@ def crossings(A: Polynomial, B: Polynomial) -> list[tuple[float, float]]:
 
     The result is exact. On the imaginary axis A + K B vanishes, so Im(A B*) = 0. The positive roots
     of this polynomial in omega give every K at which a pair of roots can cross. A single root can
-    cross at 0 and at infinity. Roots that stay at zero do not count.
+    cross at 0 and at infinity. Roots that stay at zero do not count. Roots of A and of B on the
+    axis within rounding do not count either: the loop has them at K = 0 and at infinity.
 
     Args:
-        A: polynomial.
+        A: polynomial, of floats or rational.
         B: polynomial, of no higher degree.
 
     Returns:
         (K, omega [rad/s]), K ascending.
     """
-    AB = cross_spectrum(A, B)
-    omega = positive_roots(Polynomial(AB.coef.imag))
-    with np.errstate(divide="ignore", invalid="ignore"):  # B(j omega) = 0: no K places a pole there
-        K = -AB(omega).real / np.abs(on_axis(B)(omega)) ** 2
-        n = multiplicity_of_zero(A)
-        ends = [-A.coef[n] / B.coef[n] if n == multiplicity_of_zero(B) else math.nan]
-        ends += [-A.coef[-1] / B.coef[-1] if A.degree() == B.degree() else math.nan]
-    K, omega = np.concatenate((K, ends)), np.concatenate((omega, [0.0, math.inf]))
-    return [(float(K[i]), float(omega[i])) for i in np.argsort(K) if 0.0 < K[i] < math.inf]
+    return [(x.K, x.omega) for x in _every_crossing(A, B) if not x.end]
+
+
+@dataclass(frozen=True)
+class _Crossing:
+    """A root of A + K B on the axis; end is -1 for one of A, 1 for one of B, within rounding."""
+
+    K: float
+    omega: float
+    end: int = 0
+
+
+def _every_crossing(A: Polynomial, B: Polynomial) -> list[_Crossing]:
+    """The crossings with K > 0 at a root of A, between, and at a root of B, K ascending."""
+    A, B = exact(A).trim(), exact(B).trim()
+    (Ae, Ao), (Be, Bo) = axis_parts(A), axis_parts(B)
+    across = -(Ae * Be + Polynomial([Fraction(0), Fraction(1)]) * Ao * Bo)
+    size2 = Be * Be + Polynomial([Fraction(0), Fraction(1)]) * Bo * Bo
+    found = []
+    for x in exact_roots.positive_roots(Ao * Be - Ae * Bo):
+        if value(size2, x):  # else B(j omega) = 0: no K places a pole there
+            end = -1 if within_rounding(A, x) else int(within_rounding(B, x))
+            found.append((value(across, x) / value(size2, x), square_root(x), end))
+    n = multiplicity_of_zero(A)
+    if n == multiplicity_of_zero(B):
+        found.append((-A.coef[n] / B.coef[n], 0.0, 0))
+    if A.degree() == B.degree():
+        found.append((-A.coef[-1] / B.coef[-1], math.inf, 0))
+    within = [(float(K), *at) for K, *at in found if LEAST < K < MOST]
+    return [_Crossing(*x) for x in sorted(within)]
 
 
 def first_crossing(A: Polynomial, B: Polynomial) -> tuple[float, float]:
     """Smallest K > 0 at which a root of A + K B leaves the left half plane, and its frequency.
 
     Args:
-        A: polynomial.
+        A: polynomial, of floats or rational.
         B: polynomial, of no higher degree.
 
     Returns:
         (K, omega [rad/s]); (inf, nan) if no root crosses, (0, nan) if one lies right of the axis at
         small K.
     """
-    found = crossings(A, B)
-    if not hurwitz(A + (0.5 * found[0][0] if found else 1.0) * B):
+    A, B = exact(A), exact(B)
+
+    def stable(low: float, high: float) -> bool:
+        """Whether the loop is, between two successive crossings."""
+        if high == math.inf:
+            K = 2.0 * low if low else 1.0
+        else:
+            K = math.sqrt(low) * math.sqrt(high) if low else 0.5 * high
+        return hurwitz(A + Fraction(K) * B)
+
+    found = _every_crossing(A, B)
+    low = max((x.K for x in found if x.end < 0), default=0.0)
+    found = [x for x in found if x.end >= 0 and x.K > low]
+    gains = [*(x.K for x in found), math.inf]
+    if not stable(low, gains[0]):
         return 0.0, math.nan
-    for K, omega in found:
-        if not hurwitz(A + (1.0 + 1e-6) * K * B):
-            return K, omega
+    for x, after in zip(found, gains[1:], strict=True):
+        if x.end:
+            break
+        if after > (1.0 + SAME) * x.K and not stable(x.K, after):
+            return x.K, x.omega
     return math.inf, math.nan
 
 
@@ -156,15 +209,147 @@ def least_ratio(R: Polynomial, Q: Polynomial) -> tuple[float, float]:
     Returns:
         (value, omega [rad/s]).
     """
-    R, Q = R.trim(), Q.trim()
-    x = np.concatenate(([0.0], positive_roots(R.deriv() * Q - R * Q.deriv())))
+    unit = _typical_size(R, Q)
+    R, Q = _in_unit(R, unit), _in_unit(Q, unit)
+    found = np.concatenate((nonzero_roots(R), nonzero_roots(Q)))
+    value, x = _least_value(lambda x: _ratio(R, Q, x), R, Q, found)
+    return value, math.sqrt(unit * x)
+
+
+def peak_ratio(p: Polynomial, q: Polynomial) -> tuple[float, float]:
+    """Largest |p/q| on the imaginary axis, 0 and infinity included, and its frequency.
+
+    The values come from p and q themselves: their squares lose half of the digits at a lightly
+    damped root of q.
+
+    Args:
+        p: polynomial with real coefficients.
+        q: polynomial with real coefficients.
+
+    Returns:
+        (value, omega [rad/s]).
+    """
+    unit = _typical_size(p, q)
+    p, q = _in_unit(p, unit), _in_unit(q, unit)
+    P, Q = on_axis(p), on_axis(q)
+    found = -(np.concatenate((nonzero_roots(p), nonzero_roots(q))).astype(complex) ** 2)
+    value, x = _least_value(
+        lambda x: -np.abs(_ratio(P, Q, np.sqrt(x))),
+        -squared_magnitude(p),
+        squared_magnitude(q),
+        found,
+    )
+    return -value, unit * math.sqrt(x)
+
+
+def _typical_size(*polynomials: Polynomial) -> float:
+    """Geometric mean of the roots' magnitudes; in this unit powers neither overflow nor vanish."""
+    size = np.abs(np.concatenate([nonzero_roots(p) for p in polynomials]))
+    size = size[(size > 0.0) & np.isfinite(size)]
+    return float(np.exp(np.mean(np.log(size)))) if len(size) else 1.0
+
+
+def _in_unit(p: Polynomial, unit: float) -> Polynomial:
+    """p as a polynomial in its variable over a unit."""
+    p = p.trim()
+    return Polynomial(np.multiply(p.coef, unit ** np.arange(len(p.coef))))
+
+
+def _ratio(p: Polynomial, q: Polynomial, x: np.ndarray) -> np.ndarray:
+    """p/q at x >= 0, infinity included; infinity where both vanish."""
+    n = max(p.degree(), q.degree()) + 1
+    far = x > 1.0  # there in powers of 1/x
+
+    def value(y: Polynomial) -> np.ndarray:
+        back = Polynomial(np.pad(y.coef, (0, n - len(y.coef)))[::-1])
+        return np.where(far, back(1.0 / np.where(far, x, 1.0)), y(np.where(far, 1.0, x)))
+
     with np.errstate(divide="ignore", invalid="ignore"):
-        value = np.nan_to_num(R(x) / Q(x), nan=math.inf, posinf=math.inf, neginf=-math.inf)
-    excess = R.degree() - Q.degree()
-    end = R.coef[-1] / Q.coef[-1] if excess == 0 else math.copysign(math.inf, R.coef[-1])
-    end = 0.0 if excess < 0 else end
-    i = int(np.argmin(value))
-    return (float(value[i]), math.sqrt(x[i])) if value[i] <= end else (float(end), math.inf)
+        out = value(p) / value(q)
+    return np.where(np.isnan(out), math.inf, out)
+
+
+def _least_value(
+    value: Callable[[np.ndarray], np.ndarray], R: Polynomial, Q: Polynomial, found: np.ndarray
+) -> tuple[float, float]:
+    """Least value of a function with the extremes of R/Q over x >= 0, and its place.
+
+    The roots of R and Q are passed, because those of a square are less accurate.
+
+    The extremes are the roots of the slope R'Q - RQ'. Its coefficients can cancel, of R and Q of
+    equal degree the highest always do, and the roots are then those of rounding errors. So they
+    only join a scan, dense around every root of R and Q, and the least value found is refined.
+    """
+    slope = _difference(R.deriv(), Q, R, Q.deriv())
+    ends = np.array([0.0, math.inf])
+    at_ends, x = value(ends), np.union1d(_scan(found), _polished(slope))
+    y = value(x)
+    best, place = refined_minimum(value, x, y, int(np.argmin(y)))
+    i = int(np.argmin(at_ends))
+    end = float(at_ends[i])
+    # near an end the values differ from that of the end by their rounding
+    if best < (end - NOISE * abs(end) if math.isfinite(end) else end):
+        return best, place
+    return end, float(ends[i])
+
+
+def refined_minimum(
+    f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, y: np.ndarray, i: int
+) -> tuple[float, float]:
+    """A minimum of f, and its place, from the values y at ascending x around the least, y[i].
+
+    The function may be infinite; the search then ends at the border of where it is finite.
+
+    Args:
+        f: function of arrays, shape (n,) to (n,).
+        x: shape (n,).
+        y: f(x), shape (n,).
+        i: index of a y that is no larger than its neighbours.
+    """
+    for _ in range(REFINED):
+        if math.isinf(y[i]):
+            break
+        rises = np.flatnonzero(y > y[i] + NOISE * abs(y[i]))  # two places may differ by rounding
+        low, high = rises[rises < i].max(initial=0), rises[rises > i].min(initial=len(x) - 1)
+        x = np.union1d(np.linspace(x[low], x[high], 41), x[i])
+        y = f(x)
+        i = int(np.argmin(y))
+    return float(y[i]), float(x[i])
+
+
+def _difference(a: Polynomial, b: Polynomial, c: Polynomial, d: Polynomial) -> Polynomial:
+    """a b - c d, without the coefficients that are rounding errors."""
+    size = Polynomial(np.abs(a.coef)) * Polynomial(np.abs(b.coef))
+    size += Polynomial(np.abs(c.coef)) * Polynomial(np.abs(d.coef))
+    out = (a * b - c * d).coef
+    n = max(len(out), len(size.coef))
+    out, size = (np.pad(x, (0, n - len(x))) for x in (out, size.coef))
+    return Polynomial(np.where(np.abs(out) > ROUNDED * size, out, 0.0))
+
+
+def _polished(p: Polynomial) -> np.ndarray:
+    """Positive real roots of a polynomial, after two steps of Newton's method."""
+    x = nonzero_roots(p)
+    x = x.real[(np.abs(x.imag) <= NEARLY_REAL * np.abs(x)) & (x.real > 0.0)]
+    slope = p.deriv()
+    with np.errstate(all="ignore"):
+        for _ in range(2):
+            step = x - p(x) / slope(x)
+            x = np.where(np.isfinite(step) & (step > 0.0), step, x)
+    return x
+
+
+def _scan(found: np.ndarray) -> np.ndarray:
+    """x > 0, ascending: evenly spaced in the logarithm, and dense where a root is near the axis."""
+    size = np.abs(found)
+    found, size = (x[(size > 0.0) & np.isfinite(size)] for x in (found, size))
+    low, high = size.min(initial=1.0), size.max(initial=1.0)
+    decades = math.log10(high / low) + 2.0 * SCAN_BEYOND
+    ends = low * 10.0**-SCAN_BEYOND, high * 10.0**SCAN_BEYOND
+    even = np.geomspace(*ends, 2 + int(SCAN_DENSITY * decades))
+    near = (found.real[:, None] + np.abs(found.imag)[:, None] * SCAN_NEAR).ravel()
+    near = np.concatenate((near, size))
+    return np.unique(np.concatenate((even, near[(near > ends[0]) & (near < ends[1])])))
 
 
 def positive_bands(p: Polynomial) -> tuple[tuple[float, float], ...]:

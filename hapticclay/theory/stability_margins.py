@@ -6,28 +6,28 @@ polynomials: exact. An uncertain hand is a box of Th; the loop is judged over th
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..arguments import named
-from ..display import html_table
+from ..display import brief, html_table
 from ..errors import (
     ParameterError,
     array_of,
     choice,
     integer,
 )
-from . import gain_crossings, linear_loop, roots
+from . import exact_roots, gain_crossings, linear_loop, roots
+from .exact_roots import rational
 from .loops import Loop, of_loop
 
 BREAKS = ("force", "compensator")
-ON_AXIS = 1e-9  # poles this near the axis, as a share of their size, count as on it
-ARC = 1e-6  # radius of the arc around one, as a share of its frequency
+DIPS = 20  # dips of |1 + L| that are refined, the deepest ones on the grid
 LINEAR = "one axis at the nominal pose, linear, motors within their torque limits"
 
 
@@ -118,6 +118,9 @@ class Nyquist:
         P: poles of L right of the axis.
     """
 
+    def __repr__(self) -> str:
+        return brief(self)
+
     omega: np.ndarray
     L: np.ndarray
     N: int
@@ -142,15 +145,23 @@ def open_loop(loop: Loop, *, at: str = "force") -> tuple[Polynomial, Polynomial]
     Raises:
         ParameterError: a value is out of its bounds.
     """
-    blank, passive, driven = linear_loop.loop_polynomials(loop)
-    driven = loop.gain * driven
+    return _opened(loop, at)
+
+
+def _opened(
+    loop: Loop, at: str, polynomial: Callable[[Any], Polynomial] = Polynomial
+) -> tuple[Polynomial, Polynomial]:
+    """As `open_loop`, by polynomials of another kind: see `linear_loop.loop_polynomials`."""
+    blank, passive, driven = linear_loop.loop_polynomials(loop, polynomial)
+    driven = polynomial([loop.gain]) * driven
     if choice("at", at, BREAKS) == "force":
         n, d = passive + driven, blank
     else:
         n, d = driven, blank + passive
-    while n.coef[0] == 0.0 == d.coef[0]:
-        n, d = n // roots.VARIABLE, d // roots.VARIABLE
-    return n, d
+    shared = 0
+    while shared < min(len(n.coef), len(d.coef)) - 1 and n.coef[shared] == 0.0 == d.coef[shared]:
+        shared += 1
+    return polynomial(n.coef[shared:]), polynomial(d.coef[shared:])
 
 
 @of_loop("K", "b", "operator", timing=True)
@@ -169,54 +180,33 @@ def nyquist(loop: Loop, *, at: str = "force") -> Nyquist:
     """
     if _is_timed(loop, at):
         return _response_nyquist(gain_crossings.loop_family(loop), loop.gain)
-    n, d = open_loop(loop, at=at)
-    size = np.abs(np.concatenate((roots.nonzero_roots(n), roots.nonzero_roots(d))))
-    omega = gain_crossings.frequency_grid(1e-2 * size.min(), 1e2 * size.max(), np.empty(0))
-    return Nyquist(omega, n(1j * omega) / d(1j * omega), *encirclements(n, d))
+    n, d = _opened(loop, at, rational)
+    N, P = encirclements(n, d)
+    low, high = np.array([exact_roots.root_sizes(p) for p in (n, d) if np.any(p.coef)]).T
+    omega = gain_crossings.frequency_grid(1e-2 * low.min(), 1e2 * high.max(), np.empty(0))
+    s = 1j * omega
+    return Nyquist(omega, exact_roots.approximate(n)(s) / exact_roots.approximate(d)(s), N, P)
 
 
 def encirclements(n: Polynomial, d: Polynomial) -> tuple[int, int]:
-    """N and P of the loop n/d, counted along its curve, not from the closed-loop poles.
+    """N and P of the loop n/d, without its closed-loop poles.
 
-    The contour passes poles on the axis on their right, in arcs so small that |L| is large all over
-    them; such an arc turns L by -pi for each such pole. Beyond the largest frequency L is constant.
+    The contour passes poles on the axis on their right. The phase of 1 + L = (n + d)/d turns by
+    half a turn along the axis for each root of n + d on the left and of d on the right, by minus
+    half a turn for each of n + d on the right and of d on the left. The turns are counted exactly,
+    in rational arithmetic, so curves pass -1, and resonances are as sharp, as they will.
 
     Args:
-        n: numerator, of no higher degree than d.
+        n: numerator, of no higher degree than d, of floats or rational.
         d: denominator.
 
     Returns:
-        (N, clockwise encirclements of -1; P, roots of d right of the axis).
+        (N, clockwise encirclements of -1; P, roots of d right of the axis; those on it within
+        rounding do not count).
     """
-    n, d = n.trim(), d.trim()
-    poles, zeros = roots.nonzero_roots(d), roots.nonzero_roots(n)
-    on = np.abs(poles.real) <= ON_AXIS * np.abs(poles)
-    P = int(np.sum((poles.real > 0.0) & ~on))
-    if not np.any(n.coef):
-        return 0, P
-    order = roots.multiplicity_of_zero(d) - roots.multiplicity_of_zero(n)
-    size = np.abs(np.concatenate((poles, zeros, [] if len(poles) + len(zeros) else [1.0])))
-    low, high = 1e-3 * size.min(), 1e6 * size.max()
-
-    def magnitude(s: complex) -> float:
-        return float(np.abs(n(s) / d(s)))
-
-    while order > 0 and magnitude(low) < 1e3:
-        low *= 0.1
-    while order < 0 and magnitude(low) > 1e-3:
-        low *= 0.1
-    while n.degree() < d.degree() and magnitude(1j * high) > 1e-3:
-        high *= 10.0
-    omega = gain_crossings.frequency_grid(low, high, np.concatenate((poles, zeros)))
-    if order <= 0:
-        omega = np.concatenate(([1e-9 * low], omega))
-    arcs = np.sort(np.abs(poles[on & (poles.imag > 0.0)]))
-    turned = -math.pi * len(arcs)
-    for start, end in itertools.pairwise((0.0, *arcs.tolist(), math.inf)):
-        gap = ARC if start < math.inf else 0.0
-        piece = omega[(omega > start * (1.0 + gap)) & (omega < end * (1.0 - gap))]
-        turned += gain_crossings.phase_change(lambda w: 1.0 + n(1j * w) / d(1j * w), piece)
-    return round((max(order, 0) * math.pi - 2.0 * turned) / (2.0 * math.pi)), P
+    n, d = exact_roots.exact(n), exact_roots.exact(d)
+    P = exact_roots.count_right(d)
+    return (exact_roots.roots_right(n + d)[0] - P if np.any(n.coef) else 0), P
 
 
 @of_loop("K", "b", "operator", timing=True)
@@ -236,31 +226,22 @@ def margins(loop: Loop, *, at: str = "compensator") -> Margins:
     """
     if _is_timed(loop, at):
         return _response_margins(gain_crossings.loop_family(loop), loop.gain)
-    n, d = (p.trim() for p in open_loop(loop, at=at))
+    n, d = (p.trim() for p in _opened(loop, at, rational))
     if not roots.hurwitz(n + d):
         return NO_MARGINS
-    nd = roots.cross_spectrum(n, d)
-    omega = roots.positive_roots(Polynomial(nd.coef.imag))
-    with np.errstate(divide="ignore"):
-        factor = -(np.abs(roots.on_axis(d)(omega)) ** 2) / nd(omega).real
-        ends = [-d.coef[0] / n.coef[0]]  # L is real at 0 and, if it does not roll off, at infinity
-        ends += [-d.coef[-1] / n.coef[-1]] if n.degree() == d.degree() else []
-    factor = np.concatenate((factor, ends))
-    omega = np.concatenate((omega, [0.0, math.inf][: len(ends)]))
+    factor, omega = np.array(roots.crossings(d, n)).reshape(-1, 2).T
     more, more_at = _extreme(factor, omega, factor > 1.0, np.argmin, math.inf)
     less, less_at = _extreme(factor, omega, (factor > 0.0) & (factor < 1.0), np.argmax, 0.0)
-    n2, d2 = roots.squared_magnitude(n), roots.squared_magnitude(d)
-    omega = np.sqrt(roots.positive_roots(n2 - d2))
-    lag = np.angle(nd(omega)) + np.pi  # phase of L ahead of -1, 0 to 2 pi
+    omega, lag = exact_roots.unit_crossings(n, d)
     every = lag > -1.0
     turn = np.minimum(lag, 2.0 * np.pi - lag)
     phase, phase_at = _extreme(turn, omega, every, np.argmin, math.inf)
     delay, delay_at = _extreme(lag / omega, omega, every, np.argmin, math.inf)
     if n.degree() == d.degree() and abs(n.coef[-1]) >= abs(d.coef[-1]):
         delay, delay_at = 0.0, math.inf  # L does not roll off: any delay makes it encircle -1
-    far, near = roots.squared_magnitude(d - n), roots.squared_magnitude(d + n)
-    worst, disk_at = roots.least_ratio(-far, near)
-    disk = 2.0 / math.sqrt(-worst)
+    n, d = exact_roots.approximate(n), exact_roots.approximate(d)
+    worst, disk_at = roots.peak_ratio(d - n, d + n)
+    disk = 2.0 / worst
     return Margins(
         True, (less, more), phase, delay, disk, (less_at, more_at), phase_at, delay_at, disk_at
     )
@@ -275,35 +256,17 @@ def _is_timed(loop: Loop, at: str) -> bool:
 
 
 def _response_nyquist(family: gain_crossings.LoopFamily, K: float) -> Nyquist:
-    """The curve of L = -K h, counted as in `encirclements`."""
+    """The curve of L = -K h, and its count N = Z - P: of late loops by the argument principle."""
     if K >= family.most:
         bound = f"must be < {family.most:g}: above, poles without number lie on the right"
         raise ParameterError("K", K, bound)
-
-    def back(omega: np.ndarray) -> np.ndarray:
-        return 1.0 - K * family.h(omega)
-
-    omega, low = family.grid, float(family.grid[0])
-    while family.order and K and abs(back(np.array([low]))[0]) < 1e3:
-        low *= 0.1
-    last = [w for w in family.ends if w > omega[-1]]  # the Nyquist frequency
-    if not last:  # L rolls off, or its absolute value stays below 1
-        top = float(omega[-1])
-        while abs(back(np.array([top]))[0] - 1.0) > max(0.5, 0.5 * (1.0 + K / family.most)):
-            top *= 2.0
-        omega = np.append(omega, top) if top > omega[-1] else omega
-    path = np.concatenate(([low] if low < omega[0] else [], omega, last))
-    turned = gain_crossings.phase_change(back, path)
-    if not last:
-        turned -= np.angle(back(path[-1:])[0])
-    N = round((family.order * (K > 0.0) * math.pi - 2.0 * turned) / (2.0 * math.pi))
-    return Nyquist(family.grid, -K * family.h(family.grid), N, family.right())
+    P = family.right(0.0)
+    N = family.right(K) - P if K and np.any(family.h(family.grid)) else 0
+    return Nyquist(family.grid, -K * family.h(family.grid), N, P)
 
 
 def _response_margins(family: gain_crossings.LoopFamily, K: float) -> Margins:
     """Margins of L = -K h."""
-    from scipy.optimize import minimize_scalar
-
     if not family.stable(K):
         return NO_MARGINS
     found = [*gain_crossings.gain_crossings(family), (family.most, math.inf)]
@@ -317,24 +280,36 @@ def _response_margins(family: gain_crossings.LoopFamily, K: float) -> Margins:
     phase, phase_at = _extreme(turn, omega, every, np.argmin, math.inf)
     delay, delay_at = _extreme(lag / omega, omega, every, np.argmin, math.inf)
 
-    def far(omega: np.ndarray) -> np.ndarray:
-        L = -K * family.h(omega)
-        return np.abs((1.0 - L) / (1.0 + L))
-
-    grid = np.append(family.grid, family.ends)
-    size = far(grid)
-    i = int(np.argmax(size[: len(family.grid)]))
-    worst, disk_at = float(size.max()), float(grid[np.argmax(size)])
-    around = family.grid[max(i - 1, 0)], family.grid[min(i + 1, len(family.grid) - 1)]
-    best = minimize_scalar(
-        lambda x: -far(np.array([x]))[0], bounds=around, method="bounded", options={"xatol": 1e-12}
-    )
-    if -best.fun > worst:  # type: ignore[union-attr]
-        worst, disk_at = -float(best.fun), float(best.x)  # type: ignore[union-attr]
+    disk, disk_at = _response_disk(family, K, [w for _, w in found])
     return Margins(
-        True, (less, more), phase, delay, 2.0 / worst, (less_at, more_at), phase_at, delay_at,
-        disk_at,
-    )  # fmt: skip
+        True, (less, more), phase, delay, disk, (less_at, more_at), phase_at, delay_at, disk_at
+    )
+
+
+def _response_disk(
+    family: gain_crossings.LoopFamily, K: float, crossed: Sequence[float]
+) -> tuple[float, float]:
+    """The disk margin of L = -K h, and its frequency.
+
+    Near a frequency at which a pole can cross the axis, |1 + L| may dip between two points of any
+    grid. So those frequencies are points of it, and the deepest dips are refined.
+    """
+
+    def near(omega: np.ndarray) -> np.ndarray:
+        L = -K * family.h(omega)
+        return np.abs((1.0 + L) / (1.0 - L))
+
+    inner = [w for w in crossed if family.grid[0] < w < math.inf]
+    omega = np.unique(np.concatenate((family.grid, family.ends, inner)))
+    size = near(omega)
+    around = np.concatenate(([math.inf], size, [math.inf]))
+    dips = np.flatnonzero((size <= around[:-2]) & (size <= around[2:]))
+    places = dips[np.argsort(size[dips])][:DIPS].tolist()
+    least, at = min(roots.refined_minimum(near, omega, size, i) for i in places)
+    if family.most < math.inf:  # L does not roll off: it comes as near to -1 again and again
+        far = abs(1.0 - K / family.most) / (1.0 + K / family.most)
+        least, at = min((least, at), (far, math.inf))
+    return 2.0 * least, at
 
 
 def _extreme(
@@ -396,12 +371,12 @@ def small_gain(loop: Loop, *, equation: int = 13) -> Verdict:
     n2, d2 = roots.squared_magnitude(n), roots.squared_magnitude(d)
     how = "extreme of a ratio of polynomials: exact. "
     if equation == 9:
-        worst, omega = roots.least_ratio(roots.squared_magnitude(n + d), d2)
-        margin = math.sqrt(max(worst, 0.0))
+        peak, omega = roots.peak_ratio(d, n + d)
+        margin = 1.0 / peak
         how += "Necessary for stability, not sufficient"
-        return Verdict(worst > 0.0, margin, omega, (LINEAR,), how, "least |1 + L|")
-    worst, omega = roots.least_ratio(-n2, d2)
-    margin = 1.0 / math.sqrt(-worst) if worst else math.inf
+        return Verdict(margin > 0.0, margin, omega, (LINEAR,), how, "least |1 + L|")
+    peak, omega = roots.peak_ratio(n, d)
+    margin = 1.0 / peak if peak else math.inf
     how += "Sufficient for stability, not necessary"
     fails = roots.positive_bands(n2 - d2)
     measures = "least right side over left side"

@@ -333,6 +333,28 @@ def colgate_schenkel_limit(wall: VirtualWall) -> float:
 
 
 @checked
+def passive_damping_limit(wall: VirtualWall) -> float:
+    """Largest B at which a wall of damping alone is passive [N.s/m], by `passivity_index`.
+
+    The damper that it needs is proportional to B.
+
+    Args:
+        wall: device and timing; K, B, M, hand, friction and quantum are ignored.
+
+    Returns:
+        B; 0 without a damper, and where B acts on an exact velocity.
+    """
+    unit = replace(wall, K=0.0, B=1.0, M=0.0)
+
+    def spare(turn: np.ndarray) -> np.ndarray:
+        return passivity_index(unit, turn / wall.Ts)
+
+    turn, b = _turns(unit), wall.device.damper
+    needed = b - _lowest(spare, turn, spare(turn))
+    return b / needed if needed > 0.0 else math.inf
+
+
+@checked
 def passivity_index(wall: VirtualWall, omega: Any) -> np.ndarray:
     """Excess physical damping at each frequency: the wall is passive if it is never negative.
 

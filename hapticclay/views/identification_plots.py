@@ -39,7 +39,7 @@ class PlottedBlock(NamedTuple):
     """Labels of an identified block.
 
     Attributes:
-        figure: file name, after the figure of the paper.
+        figure: file name for the simulated arm, after the figure of the paper.
         symbol: in titles.
         unit: of its magnitude.
         equations: of the paper, on x and y.
@@ -138,10 +138,7 @@ def _response_column(axes: Sequence[Axes], result: Identified, paper: bool | Non
     coherence.xaxis.set_major_formatter("{x:g}")
     coherence.xaxis.set_minor_formatter(NullFormatter())
     phase.yaxis.set_major_locator(MultipleLocator(45.0))
-    block = BLOCKS[what]
-    equation = block.equations[AXES.index(result.axis)]
-    after = f" ({equation})" if beside else ""
-    set_title(magnitude, f"{block.symbol}, {result.axis} axis{after}", panel=True)
+    set_title(magnitude, *_title(result, beside), panel=True)
     text = "\n".join(
         unit_text(f"{c.name} {format_coefficient(c)} {c.unit}") for c in result.coefficients
     )
@@ -149,6 +146,16 @@ def _response_column(axes: Sequence[Axes], result: Identified, paper: bool | Non
     magnitude.text(
         0.04, s=text, transform=magnitude.transAxes, fontsize=points(8), color=GREY, **where
     )
+
+
+def _title(result: Identified, beside: bool) -> list[str]:
+    """Block, axis and equation; of measured columns the file, which no axis of the arm is in."""
+    block = BLOCKS[result.what]
+    equation = f" ({block.equations[AXES.index(result.axis)]})" if beside else ""
+    if result.scenario is not None:
+        return [f"{block.symbol}, {result.axis} axis{equation}"]
+    where = f", {result.axis} axis{equation}" if beside else ""
+    return [f"{block.symbol}{where}", result.source.replace("$", r"\$")]
 
 
 def _decibel(H: np.ndarray) -> np.ndarray:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import os
+import warnings
 
 import numpy as np
 
 from ..arguments import checked
+from ..display import one_line
 from ..errors import ParameterError
+from ..files import read_bytes
 
+MOST_VALUES = 5 * 10**7  # pixels times colors
 LUMA = (0.299, 0.587, 0.114)  # brightness of red, green and blue (ITU-R BT.601)
 
 
@@ -28,9 +33,15 @@ def gray_image(path: str | os.PathLike[str]) -> np.ndarray:
     import imageio.v3 as iio
 
     try:
-        image = np.asarray(iio.imread(os.fspath(path), plugin="pillow"))
-    except (OSError, ValueError, TypeError) as error:
-        what = " ".join(str(error).split()) or type(error).__name__
+        content = read_bytes(path)
+        with warnings.catch_warnings(action="ignore"):  # of large images, by Pillow
+            size = math.prod(iio.improps(content, plugin="pillow").shape)
+        if size > MOST_VALUES:
+            raise ValueError(f"it has {size:.3g} values, more than {MOST_VALUES:.3g}")
+        image = np.asarray(iio.imread(content, plugin="pillow"))
+    except Exception as error:  # Pillow raises errors of many kinds for a damaged file
+        told = getattr(error, "strerror", None) or " ".join(str(error).split())
+        what = one_line(told, 200) or type(error).__name__
         raise ParameterError("image", str(path), f"must be an image file ({what})") from None
     if image.dtype.kind not in "ub" or image.ndim not in (2, 3):
         raise ParameterError("image", str(path), "must hold pixels of whole numbers")

@@ -79,9 +79,17 @@ def live_verdict(
     if above:
         text += f"; here {', '.join(above)}"
     elif limit:
-        each = ("none" if most == math.inf else f"{most:.3g}" for most in limit)
-        text += f"; limit of K here: {'none' if limit == (math.inf, math.inf) else ', '.join(each)}"
+        text += _limits_told(limit, text == "stable")
     return LiveVerdict(text, bool(onset and swings))
+
+
+def _limits_told(limit: tuple[float, float], stable: bool) -> str:
+    """The limits of K that there are, for the end of a verdict."""
+    known = {axis: most for axis, most in zip(AXES, limit, strict=True) if most < math.inf}
+    if not known:  # beside an oscillation it would be no comfort
+        return "; no limit of K here" if stable else ""
+    axis = "" if len(known) == len(AXES) else next(iter(known))
+    return f"; limit of K{axis} here: {', '.join(f'{most:.3g}' for most in known.values())}"
 
 
 def live_gain_limits(scenario: Scenario, b: tuple[float, float]) -> tuple[float, float]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import hmac
 import html
 import logging
 import math
@@ -13,14 +12,13 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from http import HTTPStatus
-from ipaddress import ip_address
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 
-from ..errors import ParameterError, integer
+from ..errors import ParameterError
 from ..model.constants import AXES
+from ..ports.guard import LOCAL, REFUSED, Guard, listening, url_host
 from .frame import Frame
 from .live_verdict import clay_here
 from .player import Player
@@ -89,20 +87,19 @@ class Page:
             bound = "must be installed: pip install 'hapticclay[web]'"
             raise ParameterError("web", "viser", bound) from None
         self.session, self.player = session, Player(session)
-        port = integer("port", port, 0, 65535)
-        self.guard = Guard(host, "" if host in LOCAL else secrets.token_urlsafe(16))
-        listening = _listening(host, port)
-        self.port = listening.getsockname()[1]
+        self.guard = PageGuard(host, "" if host in LOCAL else secrets.token_urlsafe(16))
+        listens = listening(host, port)
+        self.port = listens.getsockname()[1]
         self._console = rich.get_console()
         self._quiet, self._console.quiet = self._console.quiet, True  # viser would print its own
-        with _guarded(listening, self.guard):
+        with _guarded(listens, self.guard):
             self.server = viser.ViserServer(LOCAL[0], self.port, label=TAB_TITLE, verbose=False)
         if self.server.get_port() != self.port:  # it listens elsewhere, unguarded
-            listening.close()
+            listens.close()
             self._stop()
             raise RuntimeError(f"viser {viser.__version__} cannot be guarded")
         token = f"/?token={self.guard.token}" if self.guard.token else ""
-        self.url = f"http://{_url_host(host)}:{self.port}{token}"
+        self.url = f"http://{url_host(host)}:{self.port}{token}"
         self.stage = Stage(session.scenario, session.tool)
         self._shown = 1  # frames that have cut the clay
         self._clay_time = self._plot_time = -math.inf  # of their last updates [s]
@@ -390,83 +387,42 @@ def _by_position(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return grid, out
 
 
-LOCAL = ("127.0.0.1", "localhost", "::1")
 COOKIE = "hapticclay"
-REFUSED = "hapticclay: open the address printed at the start; other names and pages are refused\n"
-NO_TOKEN = "hapticclay: the address lacks the token that was printed at the start\n"
 
 
 @dataclass(frozen=True)
-class Guard:
-    """Admits requests that name this machine and come from its own page.
-
-    A foreign page can make a browser send requests to this server, under our name or under its own
-    (DNS rebinding), but it cannot forge the Host and Origin headers. Where other machines can
-    connect, a token is required as well: first in the address (?token=), then in a cookie.
+class PageGuard(Guard):
+    """A guard for a browser: the token is first in the address (?token=), then in a cookie.
 
     Attributes:
         host: address that the page listens on.
         token: token required in each request; "" for none.
+        origins: pages of other servers that are admitted.
     """
 
-    host: str
-    token: str
-
     def refusal(self, connection: Any, request: Any) -> Any:
-        """Judges a request.
+        """As Guard.refusal; a token in the address is answered with the cookie.
 
         Args:
             connection: of websockets.
             request: of websockets.
-
-        Returns:
-            The response to a request that is not admitted, None otherwise.
         """
-        try:
-            query = parse_qs(urlsplit(request.path).query)
-            own = self._is_own(*(request.headers.get_all(name) for name in ("Host", "Origin")))
-        except ValueError:  # not an address
-            own, query = False, {}
-        if not own:
-            return connection.respond(HTTPStatus.FORBIDDEN, REFUSED)
+        why = self.reason(request)
+        if why == REFUSED or not self.token:
+            return super().refusal(connection, request)
         cookies = "; ".join(request.headers.get_all("Cookie")).split("; ")
-        if not self.token or any(self._matches(c, f"{COOKIE}={self.token}") for c in cookies):
+        if any(self.matches(c, f"{COOKIE}={self.token}") for c in cookies):
             return None
-        if not self._matches(query.get("token", [""])[0], self.token):
-            return connection.respond(HTTPStatus.FORBIDDEN, NO_TOKEN)
+        if why:
+            return super().refusal(connection, request)
         response = connection.respond(HTTPStatus.SEE_OTHER, "")
         response.headers["Location"] = "/"
         response.headers["Set-Cookie"] = f"{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
         return response
 
-    def _is_own(self, hosts: list[str], origins: list[str]) -> bool:
-        """Whether Host is a name of this machine and Origin, if there is one, the same."""
-        if len(hosts) != 1 or any(urlsplit(o).netloc.lower() != hosts[0].lower() for o in origins):
-            return False
-        name = urlsplit(f"//{hosts[0]}").hostname or ""
-        if name in LOCAL or not self.token:
-            return name in LOCAL
-        with contextlib.suppress(ValueError):
-            return bool(ip_address(name))  # a number is not a name that a foreign page could own
-        return name in (self.host.lower(), socket.gethostname().lower())
-
-    @staticmethod
-    def _matches(given: str, expected: str) -> bool:
-        return hmac.compare_digest(given.encode(errors="replace"), expected.encode())
-
-
-def _listening(host: str, port: int) -> socket.socket:
-    try:
-        family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        return socket.create_server((host, port), family=family)
-    except OSError as error:
-        why = error.strerror.lower() if error.strerror else str(error)
-        bound = f"cannot listen on {host} ({why}): try --port 0 for any free port"
-        raise ParameterError("port", port, bound) from None
-
 
 @contextlib.contextmanager
-def _guarded(listening: socket.socket, guard: Guard) -> Iterator[None]:
+def _guarded(listens: socket.socket, guard: PageGuard) -> Iterator[None]:
     """Makes the server that viser starts meanwhile listen on a socket, behind a guard.
 
     viser has no setting for either. If a later viser starts its server differently, it finds the
@@ -494,7 +450,7 @@ def _guarded(listening: socket.socket, guard: Guard) -> Iterator[None]:
                 response.headers["Content-Length"] = str(len(response.body))
             return response
 
-        options.update(sock=listening, process_request=answer, logger=quiet)
+        options.update(sock=listens, process_request=answer, logger=quiet)
         return serve(handler, **options)
 
     server.serve = guarded
@@ -502,15 +458,3 @@ def _guarded(listening: socket.socket, guard: Guard) -> Iterator[None]:
         yield
     finally:
         server.serve = serve
-
-
-def _url_host(host: str) -> str:
-    """The host of an address: for "all addresses" the address of this machine for others."""
-    if host in ("", "0.0.0.0", "::"):
-        try:
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
-                s.connect(("192.0.2.1", 9))  # selects a route without sending anything
-                host = s.getsockname()[0]
-        except OSError:
-            host = socket.gethostname()
-    return f"[{host}]" if ":" in host else host

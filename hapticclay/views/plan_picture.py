@@ -41,17 +41,20 @@ class PlanPicture:
 
     Args:
         window: whether to show it in a window, where matplotlib has a display.
+
+    Attributes:
+        unseen: why there is no window although one was asked for; "" otherwise.
     """
 
     def __init__(self, window: bool):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-        self._pyplot = _interactive() if window else None
+        self._pyplot, self.unseen = None, ""
         with style.styled("screen"):
-            if self._pyplot is not None:
-                self._figure = self._pyplot.figure(figsize=SIZE, dpi=DPI)
-            else:
+            if window:
+                self._pyplot, self._figure, self.unseen = _window()
+            if self._pyplot is None:
                 self._figure = Figure(figsize=SIZE, dpi=DPI)
                 FigureCanvasAgg(self._figure)
             self._axes = self._figure.subplots(1, 2)
@@ -83,17 +86,31 @@ class PlanPicture:
             self._pyplot = None
 
 
-def _interactive() -> Any:
-    """matplotlib.pyplot where it has a display to show windows on; else None."""
+def _window() -> tuple[Any, Any, str]:
+    """matplotlib.pyplot and a figure in a window; or None twice, and why there is none."""
+    if reason := _without_windows():
+        return None, None, reason
+    from matplotlib import pyplot
+
+    try:
+        figure = pyplot.figure(figsize=SIZE, dpi=DPI)
+    except Exception as error:  # of the window system: each backend has classes of its own
+        return None, None, f"no window opens: {' '.join(str(error).split())}"
+    if reason := _without_windows():  # pyplot took another backend
+        pyplot.close(figure)
+        return None, None, reason
+    return pyplot, figure, ""
+
+
+def _without_windows() -> str:
+    """Why matplotlib's present backend shows no windows; "" where it does."""
     import matplotlib
     from matplotlib.backends import BackendFilter, backend_registry
 
     names = backend_registry.list_builtin(BackendFilter.INTERACTIVE)
-    if matplotlib.get_backend().lower() not in {x.lower() for x in names}:
-        return None
-    from matplotlib import pyplot
-
-    return pyplot
+    backend = matplotlib.get_backend()
+    shows = backend.lower() in {x.lower() for x in names}
+    return "" if shows else f"matplotlib's backend {backend!r} has no windows"
 
 
 def _fill(ax: Any, plan: Plan, closer: bool) -> None:

@@ -180,7 +180,7 @@ def _added_up(record: Record) -> dict[str, float]:
     if not {"muscle", "hand_damper", "hand_stored", "motors", "clay"} <= set(e):
         return {}
     hand = e["muscle"] - e["hand_damper"] - e["hand_stored"]
-    return {"hand": hand, "motors": e["motors"], "clay": e["clay"]}
+    return {"hand": hand, "motors": e["motors"], "clay": e.get("rendered_clay", e["clay"])}
 
 
 def _with_picture(figure: Figure) -> Figure:
@@ -188,7 +188,8 @@ def _with_picture(figure: Figure) -> Figure:
 
     def picture() -> bytes:
         file = io.BytesIO()
-        figure.savefig(file, format="png")
+        with figure_style():
+            figure.savefig(file, format="png")
         return file.getvalue()
 
     figure._repr_png_ = picture  # type: ignore[attr-defined]

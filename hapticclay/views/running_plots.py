@@ -80,7 +80,8 @@ class RunningPlots:
         self._curves = []
         for ax, x, y, color in curves:
             known = np.flatnonzero(np.isfinite(y))
-            (line,) = ax.plot([], [], color=color, lw=stroke(1.4))
+            with figure_style():
+                (line,) = ax.plot([], [], color=color, lw=stroke(1.4))
             self._curves.append((line, known, x[known], y[known]))
 
     def draw(self, n: int) -> np.ndarray:
@@ -95,8 +96,9 @@ class RunningPlots:
         self._canvas.restore_region(self._axes)
         for line, known, x, y in self._curves:
             end = int(np.searchsorted(known, n))
-            line.set_data(x[:end], y[:end])
-            line.axes.draw_artist(line)
+            with figure_style():
+                line.set_data(x[:end], y[:end])
+                line.axes.draw_artist(line)
         return np.asarray(self._canvas.buffer_rgba())[..., :3]
 
 

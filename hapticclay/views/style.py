@@ -127,11 +127,9 @@ def styled(style: str) -> Iterator[Look]:
     Raises:
         ParameterError: there is no such style.
     """
-    import matplotlib
-
     before = _STYLE.set(choice("style", style, tuple(STYLES)))
     try:
-        with matplotlib.rc_context(STYLES[style].parameters):
+        with figure_style():
             yield STYLES[style]
     finally:
         _STYLE.reset(before)
@@ -309,15 +307,18 @@ def verdict_color(text: str, unstable: bool) -> str:
 
 
 def figure_style(**more: Any) -> Any:
-    """Returns the context in which figures are drawn.
+    """Returns the context in which figures are drawn: matplotlib's defaults, and ours on top.
+
+    Settings of the user (matplotlibrc, a style sheet) do not change them: the same run gives the
+    same files on every machine.
 
     Args:
         more: rcParams of matplotlib that override the style's, dots written as underscores.
     """
-    import matplotlib
+    from matplotlib import style
 
     parameters: Any = {**look().parameters, **{k.replace("_", ".", 1): v for k, v in more.items()}}
-    return matplotlib.rc_context(parameters)
+    return style.context(["default", parameters])
 
 
 def set_title(ax: Axes, *parts: str, panel: bool = False, **more: Any) -> None:

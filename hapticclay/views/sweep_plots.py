@@ -13,6 +13,7 @@ from matplotlib.patches import Patch, PathPatch, Rectangle
 from matplotlib.path import Path
 
 from ..errors import ParameterError, choice
+from ..model.constants import AXES
 from ..studies.sweep_rows import column_told
 from .style import (
     BLACK,
@@ -47,6 +48,8 @@ OUTCOME_COLORS = {  # from good to bad
     "unresolved": MID_GREY,
     "refused": BLACK,
 }
+HATCHES = {"x": UNSTABLE["hatch"], "y": "///"}  # where the linear loop of an axis is unstable
+RINGS = {"x": 3.0, "y": 5.0}  # ... around a point, area over that of the point
 MISSING = {  # why a run has no value: style of its cell and of its point
     "refused": dict(color=BLACK, hatch="", marker="X"),
     "no clay reached": dict(color=PALE_GREY, hatch="////", marker="x"),
@@ -137,7 +140,7 @@ def sweep_plot(
         if worst:
             handles = [Patch(facecolor=OUTCOME_COLORS[k], label=k) for k in kinds if k in raw]
         show = _hatch_unstable if draw is _draw_grid else _ring_unstable
-        handles += show(ax, data, least_margins(table))
+        handles += show(ax, data, unstable_runs(table, value))
         if not worst and np.isfinite(z).any():
             figure.colorbar(image, ax=ax, label=_column_label(value))
         if handles:
@@ -209,40 +212,58 @@ def _draw_grid(ax: Axes, data: Mapped, look: dict[str, Any]) -> tuple[Any, list[
     return image, handles
 
 
-def least_margins(table: Any) -> np.ndarray:
-    """Gain limit of the linear loop over K, the lesser of both axes, of each run; NaN for none.
+def unstable_runs(table: Any, value: str = "status") -> dict[str, np.ndarray]:
+    """Whether the linear loop of an axis is unstable in each run: gain limit over K below 1.
+
+    A column of one axis, such as speed_x, is told about that axis alone; others about both.
 
     Args:
         table: from `read_sweep`.
+        value: column that is shown.
+
+    Returns:
+        Shape (runs,) of each axis that is unstable in some run, by its name.
     """
-    names = [n for n in table.column_names if n.startswith("gain_margin_")]
-    if not names:
-        return np.full(table.num_rows, np.nan)
-    return np.fmin.reduce([np.array(table[n], dtype=float) for n in names])
+    out = {}
+    for axis in [a for a in AXES if value.endswith(f"_{a}")] or AXES:
+        name = f"gain_margin_{axis}"
+        if name in table.column_names:
+            out[axis] = np.array(table[name], dtype=float) < 1.0
+    return {axis: below for axis, below in out.items() if below.any()}
 
 
-def _hatch_unstable(ax: Axes, data: Mapped, margins: np.ndarray) -> list[Any]:
-    """Hatches cells that hold a run whose margin is below 1; returns a patch for the legend."""
+def _unstable_style(axis: str) -> dict[str, Any]:
+    return UNSTABLE | {"hatch": HATCHES[axis], "label": f"gain margin of {axis} < 1"}
+
+
+def _hatch_unstable(ax: Axes, data: Mapped, unstable: dict[str, np.ndarray]) -> list[Any]:
+    """Hatches cells that hold an unstable run, each axis in its way; returns legend patches."""
     gx, gy = np.unique(data.x), np.unique(data.y)
-    below = _cell_values(data._replace(z=np.where(margins < 1.0, 1.0, 0.0), worst=True), gx, gy)
-    j, i = np.nonzero(below == 1.0)
-    if not len(i):
-        return []
     ex, ey = _cell_edges(gx), _cell_edges(gy)
-    for column, row in zip(i.tolist(), j.tolist(), strict=True):
-        corner = (ex[column], ey[row])
-        size = ex[column + 1] - ex[column], ey[row + 1] - ey[row]
-        ax.add_patch(Rectangle(corner, *size, **UNSTABLE))
-    return [Patch(**UNSTABLE)]
+    for axis, below in unstable.items():
+        cells = _cell_values(data._replace(z=below.astype(float), worst=True), gx, gy)
+        for row, column in np.argwhere(cells == 1.0).tolist():
+            corner = (ex[column], ey[row])
+            size = ex[column + 1] - ex[column], ey[row + 1] - ey[row]
+            ax.add_patch(Rectangle(corner, *size, **_unstable_style(axis)))
+    return [Patch(**_unstable_style(axis)) for axis in unstable]
 
 
-def _ring_unstable(ax: Axes, data: Mapped, margins: np.ndarray) -> list[Any]:
-    """Rings points whose margin is below 1; returns a ring for the legend."""
-    below = margins < 1.0
-    if not below.any():
-        return []
-    style: Any = dict(facecolors="none", edgecolors=BLACK, linewidths=0.8, label=UNSTABLE["label"])
-    return [ax.scatter(data.x[below], data.y[below], s=3.0 * _point_size(data), **style)]
+def _ring_unstable(ax: Axes, data: Mapped, unstable: dict[str, np.ndarray]) -> list[Any]:
+    """Rings points of unstable runs, each axis in its size; returns rings for the legend."""
+    return [
+        ax.scatter(
+            data.x[below],
+            data.y[below],
+            s=RINGS[axis] * _point_size(data),
+            facecolors="none",
+            edgecolors=BLACK,
+            linewidths=0.8,
+            linestyles="-" if axis == AXES[0] else ":",
+            label=_unstable_style(axis)["label"],
+        )
+        for axis, below in unstable.items()
+    ]
 
 
 def _point_size(data: Mapped) -> float:

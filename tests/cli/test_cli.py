@@ -126,7 +126,8 @@ def test_instability_is_a_result_with_advice(capsys, tmp_path):
             ["--growth = 'foo': must be a number or one of 30/s, 0.15/s, 0.15/sample, none\n"],
         ),
         (["run", "constant", "--force", "inf", "0"], ["force[x] = inf"]),
-        (["run", "constant", "--gain", "1"], ["--gain = '1': must be 2 numbers"]),
+        (["run", "constant", "--gain"], ["--gain = '': must be 2 numbers"]),
+        (["run", "constant", "--gain", "a"], ["--gain = 'a': must be 2 numbers"]),
         (["run", "constant", "--gain", "1", "a"], ["--gain = '1 a': must be 2 numbers"]),
         (["run", "constant", "--gain", "1", "1", "7"], ["unexpected argument '7' of run constant"]),
         (["run", "constant", "--gain", "0", "1"], ["gain[x] = 0.0"]),
@@ -373,7 +374,9 @@ def test_a_closed_output_is_no_traceback(tmp_path):
 def test_a_file_that_is_no_record_is_called_so(capsys, tmp_path):
     (tmp_path / "notes.txt").write_text("x")
     code, _, err = run(capsys, "video", str(tmp_path / "notes.txt"))
-    assert code == 2 and err.endswith("must be a saved record (it is no .npz file)\n")
+    assert code == 2 and "must be a scenario file, .toml or .json, or the folder of a record" in err
+    code, _, err = run(capsys, "info", str(tmp_path / "notes.txt"))
+    assert code == 2 and "must be a saved record (give its folder, or its record.npz" in err
 
 
 def test_results_are_shown_even_if_they_cannot_be_kept(capsys, tmp_path, monkeypatch):

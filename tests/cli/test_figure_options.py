@@ -100,7 +100,7 @@ def test_every_command_that_draws_has_the_options():
     (["--dpi", "1"], "dpi = 1.0: must be a finite number >= 10"),
     (["--dpi", "many"], "must be a number"),
 ])  # fmt: skip
-@pytest.mark.parametrize("command", [["run", "constant"], ["stability"]])
+@pytest.mark.parametrize("command", [["run", "constant"], ["stability", "--map", "gain-pose"]])
 def test_wrong_words_are_refused_before_any_work(command, words, told, capsys):
     assert app.main([*command, *words]) == 2
     assert told in capsys.readouterr().err

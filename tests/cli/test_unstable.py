@@ -46,3 +46,6 @@ def test_a_map_of_a_sweep_hatches_margins_below_1(tmp_path):
         ax = sweep_plots.sweep_plot(table, value).axes[0]
         hatched = [p for p in ax.patches if isinstance(p, Rectangle) and p.get_hatch()]
         assert 0 < len(hatched) == below < len(table)
+        assert {p.get_label() for p in hatched} == {"gain margin of y < 1"}
+    ax = sweep_plots.sweep_plot(table, "speed_x").axes[0]  # x is stable in each of the runs
+    assert not [p for p in ax.patches if "gain margin" in str(p.get_label())]

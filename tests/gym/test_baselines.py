@@ -1,7 +1,9 @@
 """Baselines: what they know is right, and better knowledge earns more."""
 
 import functools
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,13 +11,66 @@ from scipy.integrate import solve_ivp
 
 import hapticclay as hc
 from hapticclay.cli import app
-from hapticclay.gym import adaptive_gain, baselines, probe_clay
+from hapticclay.gym import adaptive_gain, baselines, probe_clay, scores
 
 
 def test_the_robust_gain_is_below_that_of_each_published_hand():
     """A hundred hands from the population, whose corners it is made of."""
     for hand in hc.studies.POPULATIONS["published range"].sample(100, seed=0):
         assert baselines.robust_gain(40.0) <= baselines.oracle_gain(40.0, hand) * (1 + 1e-12)
+
+
+SEARCHED = json.loads((Path(__file__).parents[2] / "docs" / "gym_scores.json").read_text())
+
+
+@pytest.mark.parametrize("family", scores.FAMILIES)
+def test_scores_0_and_1_are_the_best_of_all_shares_that_were_searched(family):
+    """By the returns of each episode, not by the means that the search kept."""
+    found = SEARCHED["families"][family]
+    means = {
+        x: math.fsum(r) / len(r) for x, r in zip(found["shares"], found["returns"], strict=True)
+    }
+    best = max(means, key=means.__getitem__)
+    policy = baselines.BASELINES[scores.ID][family]
+    assert policy == scores.FAMILIES[family](best) and found["share"] == best
+    assert {round(best + 0.01 * k, 2) for k in (-2, -1, 1, 2)} <= means.keys()
+    assert min(means) < 0.75 < 1.15 < max(means)  # no end of the search is near the best
+    assert all(len(r) == len(scores.SEEDS) == SEARCHED["seeds"] for r in found["returns"])
+
+
+@pytest.mark.parametrize("family, share", [("best fixed gain", 1.08), ("best oracle", 0.84)])
+def test_returns_of_the_search_are_those_of_its_episodes(family, share):
+    """Of one seed, in Python; the file holds four decimals, so half of the last."""
+    found = SEARCHED["families"][family]
+    again = scores.search(family, [share], [3], around=0, engine="python")
+    told = found["returns"][found["shares"].index(share)][3]
+    assert again.totals == pytest.approx(told, abs=5.1e-5) and again.best == share
+
+
+def test_no_fixed_gain_that_was_searched_scores_above_0_nor_oracle_above_1():
+    """The gain of 1.2 times the robust one, 1.08 of the limit, is score 0 itself."""
+    means = {
+        (name, x): float(np.mean(r))
+        for name, found in SEARCHED["families"].items()
+        for x, r in zip(found["shares"], found["returns"], strict=True)
+    }
+    zero, one = (
+        means[name, SEARCHED["families"][name]["share"]] for name in scores.ANCHORS[scores.ID]
+    )
+    told = {f"{name} {x}": mean for (name, x), mean in means.items()}
+    score = scores.scores_of(scores.ID, {"best fixed gain": zero, "best oracle": one, **told})
+    assert score["best fixed gain"] == 0.0 and score["best oracle"] == 1.0
+    assert max(x for name, x in score.items() if "fixed" in name) == 0.0
+    assert max(score.values()) == 1.0
+    assert score["best fixed gain 0.9"] < -1.0
+
+
+def test_scores_need_the_returns_of_both_anchors():
+    with pytest.raises(hc.ParameterError, match="best oracle"):
+        scores.scores_of(scores.ID, {"best fixed gain": -10.0})
+    assert scores.scores_of("CutLine-v0", {"random": 1.0}) == {}
+    with pytest.raises(hc.ParameterError, match="best oracle"):
+        scores.search("oracle")
 
 
 def test_a_hand_is_identified_from_its_own_equation():
@@ -68,9 +123,9 @@ def test_the_pd_law_follows_the_line_where_random_actions_do_not(monkeypatch, ca
     line = ["gym", "baselines", "CutLine-v0", "--seeds", "2", "--engine", "python"]
     assert app.main(line) == 0
     rows = capsys.readouterr().out.splitlines()
-    for name, scores in found.items():
+    for name, seen in found.items():
         (row,) = [row for row in rows if name in row]
-        assert f"{scores.total.mean():.2f}" in row
+        assert f"{seen.total.mean():.2f}" in row
     assert found["PD along the line"].info["is_success"].all()
     assert not found["random"].info["is_success"].any()
 

@@ -1,7 +1,13 @@
 """Single environments: the checkers of Gymnasium, seeds, options, bounds, ends, pictures."""
 
+import copy
+import functools
 import json
 import math
+import os
+import pickle
+import subprocess
+import sys
 
 import gymnasium
 import numpy as np
@@ -9,7 +15,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import hapticclay as hc
-import hapticclay.gym  # noqa: F401, registers
+import hapticclay.gym
 from hapticclay.gym import draws, registry, task
 from hapticclay.gym.quantities import Quantity, box_of
 
@@ -26,6 +32,7 @@ def some_actions(env, n, seed=0):
     return rng.uniform(-0.5, 0.5, (n, *env.action_space.shape)).astype(np.float32)
 
 
+@pytest.mark.filterwarnings("ignore:.*shows nothing here")  # tests have no display
 @pytest.mark.parametrize("id", IDS)
 def test_gymnasiums_checker_finds_nothing(id):
     """Warnings are errors in these tests."""
@@ -94,7 +101,7 @@ def test_what_is_drawn_lies_in_its_range(id):
 def test_a_log_uniform_draw_has_a_uniform_logarithm():
     """Quartiles of 4000 draws: their standard error is 0.007 in the share, four of it allowed."""
     rng, r = np.random.default_rng(0), draws.HAND["spring"]
-    x = [draws.draw({"k": r}, rng, None)["k"] for _ in range(4000)]
+    x = [draws.draw({"k": r}, rng, {})["k"] for _ in range(4000)]
     share = np.log(np.array(x) / r.low) / math.log(r.high / r.low)
     for q in (0.25, 0.5, 0.75):
         assert np.mean(share < q) == pytest.approx(q, abs=0.028)
@@ -103,25 +110,53 @@ def test_a_log_uniform_draw_has_a_uniform_logarithm():
 @pytest.mark.parametrize(
     "kw, field",
     [
+        ({"ranges": 3}, "ranges"),
+        ({"ranges": "mass"}, "ranges"),
+        ({"ranges": [("mass", [1, 2])]}, "ranges"),
+        ({"ranges": False}, "ranges"),
+        ({"ranges": {"mass": 0.3}}, "ranges.mass"),
+        ({"ranges": {"mass": [0.3, None]}}, "ranges.mass"),
+        ({"ranges": {"mass": ["3 N", "4 N"]}}, "ranges.mass"),
         ({"ranges": {"mas": [0, 1]}}, "ranges"),
         ({"ranges": {"mass": [1, 0.5]}}, "ranges.mass"),
         ({"ranges": {"mass": [-1, 0.5]}}, "ranges.mass"),
-        ({"shape": "circle"}, "shape"),
-        ({"engine": "fast"}, "engine"),
-        ({"render_mode": "rgb"}, "render_mode"),
+        *(({"engine": x}, "engine") for x in (None, 3, "fast", ["auto"])),
+        ({"render_mode": "fast"}, "render_mode"),
+        ({"given": {}}, "given"),
+        ({"rangs": {}}, "rangs"),
     ],
 )
-def test_bad_arguments_are_refused_by_name(kw, field):
+@pytest.mark.filterwarnings("ignore:.*render_mode")  # Gymnasium's own words about it
+@pytest.mark.parametrize("made_by", ["single", "make", "make_vec"])
+@pytest.mark.parametrize("id", IDS)
+def test_bad_arguments_are_refused_by_name(id, made_by, kw, field):
+    """By each environment, and in the ways that Gymnasium makes it."""
+    entry = registry.ENTRIES[id.partition("/")[2]]
+    makers = {
+        "single": getattr(hapticclay.gym, entry.name),
+        "make": functools.partial(gymnasium.make, id),
+        "make_vec": functools.partial(gymnasium.make_vec, id),
+    }
     with pytest.raises(hc.ParameterError) as told:
-        registry_class(CUT)(**kw)
+        makers[made_by](**kw)
     assert told.value.field.startswith(field)
 
 
-def registry_class(id):
-    from hapticclay.gym import CutLine
+@pytest.mark.parametrize("mode", [3, "", ["human"], "fast"])
+def test_render_modes_are_refused_by_name(mode):
+    from hapticclay.gym.cut_line import CutLineVector
 
-    assert id == CUT
-    return CutLine
+    for kind in (hapticclay.gym.CutLine, CutLineVector):
+        with pytest.raises(hc.ParameterError, match="rgb_array"):
+            kind(render_mode=mode)
+
+
+@pytest.mark.parametrize("shape", ["circle", 3, None, ["arc"]])
+def test_shapes_are_refused_by_name(shape):
+    with pytest.raises(hc.ParameterError, match="straight, arc, corner"):
+        hapticclay.gym.CutLine(shape=shape)
+    with pytest.raises(hc.ParameterError, match="unexpected argument of PareEdge"):
+        gymnasium.make("hapticclay/PareEdge-v0", shape=shape)
 
 
 def test_bad_options_and_actions_are_refused():
@@ -137,16 +172,127 @@ def test_bad_options_and_actions_are_refused():
 
 def test_a_step_before_a_reset_is_refused():
     with pytest.raises(RuntimeError, match="reset"):
-        registry_class(CUT)(engine="python").step(np.zeros(2))
+        hapticclay.gym.CutLine(engine="python").step(np.zeros(2))
 
 
-@pytest.mark.parametrize("action", [np.full(2, np.nan), np.full(2, np.inf), np.full(2, -1e30)])
-def test_actions_that_are_no_numbers_or_too_large_stay_within_bounds(action):
-    env = made().unwrapped
-    env.reset(seed=0)
+@pytest.mark.parametrize("action", [np.full(2, -1e30), np.full(2, np.float32(3e38)), [5, -7]])
+def test_actions_beyond_their_space_are_those_at_its_bounds(action):
+    env, other = made().unwrapped, made().unwrapped
+    env.reset(seed=0), other.reset(seed=0)
     x, reward, *_ = env.step(action)
-    assert np.isfinite(x).all() and math.isfinite(reward)
+    y, same, *_ = other.step(np.clip(action, -1.0, 1.0).astype(np.float32))
+    assert x.tobytes() == y.tobytes() and reward == same
     assert env.observation_space.contains(x)
+
+
+NO_ACTIONS = [  # of two numbers
+    [math.nan, 0.0], [0.0, math.inf], [-math.inf, 0.0], np.full(2, np.nan, np.float32), None, "ab",
+    ["0.5", "1"], [None, None], [True, False], [1j, 0], 0.5, [[0.0, 0.0]], [[1, 2], [3]],
+    np.zeros(2, object), [10**400, 0], {"a": 1}, np.array([1, 2], "M8[s]"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("action", NO_ACTIONS, ids=str)
+def test_what_is_no_action_is_refused_and_the_episode_goes_on_as_if_not_given(action):
+    """Single, and as the rows of a vector."""
+    env, other = made().unwrapped, made().unwrapped
+    many = gymnasium.make_vec(CUT, num_envs=2, engine="python").unwrapped
+    for e in (env, other, many):
+        e.reset(seed=0)
+    with pytest.raises(hc.ParameterError) as told:
+        env.step(action)
+    assert told.value.field.startswith("action")
+    with pytest.raises(hc.ParameterError) as told:
+        many.step([action, action])
+    assert told.value.field.startswith("actions")
+    good = np.full(2, 0.3, np.float32)
+    x = env.step(good)[0]
+    assert x.tobytes() == other.step(good)[0].tobytes() == many.step([good, good])[0][0].tobytes()
+
+
+@pytest.mark.parametrize("seed", [1.5, "a", -1, True, [1], np.array(2.5), 2**128, math.nan])
+def test_what_is_no_seed_is_refused(seed):
+    env, many = made().unwrapped, gymnasium.make_vec(CUT, num_envs=2, engine="python").unwrapped
+    for e in (env, many):
+        with pytest.raises(hc.ParameterError) as told:
+            e.reset(seed=seed)
+        assert told.value.field.startswith("seed")
+
+
+def test_seeds_of_numpy_and_those_that_gymnasium_draws_are_seeds():
+    env = made().unwrapped
+    first = env.reset(seed=3)[1]
+    assert env.reset(seed=np.int64(3))[1] == first
+    drawn = made().unwrapped
+    _, info = drawn.reset()
+    assert env.reset(seed=drawn.np_random_seed)[1] == info
+
+
+NO_OPTIONS = [3, "b", [("b", 1.0)], (), False, {3: 1.0}, {"b": None}, {"b": [1.0]}, {"b": "60 kg"}]
+
+
+@pytest.mark.parametrize("options", NO_OPTIONS, ids=str)
+def test_refused_options_draw_nothing(options):
+    """The next episode is that of the seed's stream, as if there had been no refusal."""
+    env, other = made().unwrapped, made().unwrapped
+    env.reset(seed=0), other.reset(seed=0)
+    with pytest.raises(hc.ParameterError) as told:
+        env.reset(seed=5, options=options)
+    assert told.value.field.startswith("options")
+    assert env.reset()[1] == other.reset()[1]
+
+
+def test_values_with_units_are_options_and_ends_of_ranges():
+    env = made(ranges={"mass": ["300 g", "0.3 kg"]}).unwrapped
+    info = env.reset(seed=0, options={"b": "60 N.s/m", "offset": "1 mm"})[1]
+    assert (info["mass"], info["b"], info["offset"]) == (0.3, 60.0, 1e-3)
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_copies_and_pickles_go_on_as_the_original(id):
+    env = made(id, render_mode="rgb_array").unwrapped
+    env.reset(seed=1)
+    actions = some_actions(env, 4)
+    env.step(actions[0])
+    found = []
+    for e in (pickle.loads(pickle.dumps(env)), copy.deepcopy(env), env):
+        rows = [e.step(action)[0] for action in actions[1:]] + [e.reset()[0]]
+        found.append(np.array(rows).tobytes())
+        assert e.render().std() > 0.0
+        e.close()
+    assert found[0] == found[1] == found[2]
+
+
+def test_closed_twice_and_reset_again():
+    env = made(render_mode="rgb_array").unwrapped
+    first = env.reset(seed=2)[0]
+    env.close(), env.close()
+    for use in (lambda: env.step(np.zeros(2)), env.render):
+        with pytest.raises(RuntimeError, match="reset"):
+            use()
+    assert env.reset(seed=2)[0].tobytes() == first.tobytes()
+    env.close()
+
+
+@pytest.mark.parametrize("backend", ["agg", "tkagg"])
+def test_without_a_display_human_mode_says_once_that_it_shows_nothing(backend):
+    """In a process of its own: matplotlib chooses its backend once."""
+    code = f"""
+import gymnasium, numpy as np, hapticclay.gym
+env = gymnasium.make("{CUT}", engine="python", render_mode="human")
+for seed in range(2):
+    env.reset(seed=seed)
+    env.step(np.zeros(2, np.float32))
+    assert env.render() is None
+    env.unwrapped.close()
+"""
+    hidden = {"DISPLAY", "WAYLAND_DISPLAY", "MPLBACKEND"}
+    around = {k: v for k, v in os.environ.items() if k not in hidden} | {"MPLBACKEND": backend}
+    found = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=around
+    )
+    lines = [x for x in found.stderr.splitlines() if "WARN" in x]
+    assert len(lines) == 1 and "'human' shows nothing here" in lines[0]
 
 
 def test_a_loop_beyond_its_gain_limit_ends_the_episode_within_a_period():

@@ -1,6 +1,5 @@
 """Pages of the environments: tables are those of the spaces, snippets run; benchmarks; command."""
 
-import gc
 import re
 import subprocess
 import sys
@@ -10,7 +9,6 @@ import gymnasium
 import pytest
 
 from benchmarks import gym_baselines, gym_extremes, gym_speed
-from hapticclay.cli import app
 from hapticclay.gym import baselines, registry
 
 ROOT = Path(__file__).parents[2]
@@ -53,20 +51,6 @@ def test_snippets_of_the_page_of_the_suite_say_what_they_print():
     code = "\n".join(re.findall(r"```python\n(.*?)```", text, re.S))
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.splitlines() == re.findall(r"print\(.*\)  # (.*)", code) != []
-
-
-@pytest.mark.filterwarnings("ignore:Implicitly cleaning up:ResourceWarning")  # Minari's own folder
-def test_the_command_records_a_data_set(tmp_path, monkeypatch, capsys):
-    minari = pytest.importorskip("minari")
-    pytest.importorskip("jax")  # which its writing of data sets needs
-    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
-    line = "gym dataset ProbeClay-v0 --episodes 2 --engine python --name hapticclay/test/a-v0"
-    monkeypatch.setattr("hapticclay.gym.dataset.SCORED", 2)
-    assert app.main(line.split()) == 0
-    found = minari.load_dataset("hapticclay/test/a-v0")
-    assert found.total_episodes == 2
-    assert all(len(x.actions) <= 150 for x in found.iterate_episodes())
-    gc.collect()  # while its warning is expected
 
 
 def test_extreme_episodes_are_finite(tmp_path):

@@ -1,5 +1,8 @@
 """Many copies: each is the single environment of its seed, and that is a run of `simulate`."""
 
+import copy
+import pickle
+
 import gymnasium
 import numpy as np
 import pytest
@@ -147,3 +150,81 @@ def test_actions_of_another_shape_are_refused():
     env.reset(seed=0)
     with pytest.raises(hc.ParameterError, match="shape"):
         env.step(np.zeros((N, 3)))
+
+
+@pytest.mark.parametrize("seed", [[1, 2], [1, "a", 2], [1.5, 2, 3], {1, 2, 3}, "abc", 2**128 - 2])
+def test_what_is_no_seed_of_three_copies_is_refused(seed):
+    env = vector().unwrapped
+    with pytest.raises(hc.ParameterError) as told:
+        env.reset(seed=seed)
+    assert told.value.field.startswith("seed")
+
+
+def test_seeds_may_be_an_array_or_a_range():
+    env = vector().unwrapped
+    expected = env.reset(seed=4)[0].tobytes()
+    for seed in (np.array([4, 5, 6]), range(4, 7), (4, 5, 6), np.int32(4), np.array(4)):
+        assert env.reset(seed=seed)[0].tobytes() == expected
+
+
+def test_each_copy_takes_options_of_its_own():
+    """As single environments do."""
+    options = [{"mass": 0.3}, None, {"mass": 0.4, "b": 50.0}]
+    x, _ = vector().reset(seed=7, options=options)
+    for i, given in enumerate(options):
+        env = gymnasium.make(CUT, engine="python")
+        assert env.reset(seed=7 + i, options=given)[0].tobytes() == x[i].tobytes()
+
+
+NO_OPTIONS = [
+    3, "b", [{}], [{}, {}, 3], [{}, {}, {"reset_mask": [True]}], {"b": [1.0] * 3},
+    {"reset_mask": "abc"}, {"reset_mask": [1, 0, 1]}, {"reset_mask": [[True], [True, False]]},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("options", NO_OPTIONS, ids=str)
+def test_refused_options_draw_nothing(options):
+    env, other = vector().unwrapped, vector().unwrapped
+    env.reset(seed=0), other.reset(seed=0)
+    with pytest.raises(hc.ParameterError) as told:
+        env.reset(seed=9, options=options)
+    assert told.value.field.startswith(("options", "reset_mask"))
+    assert env.reset()[0].tobytes() == other.reset()[0].tobytes()
+
+
+def test_before_a_reset_and_after_a_close_there_is_no_episode():
+    env = vector(render_mode="rgb_array").unwrapped
+    uses = (lambda: env.step(np.zeros((N, 2))), env.render, lambda: env.info_of(0))
+    for _ in range(2):
+        for use in uses:
+            with pytest.raises(RuntimeError, match="reset"):
+                use()
+        with pytest.raises(hc.ParameterError, match="reset_mask"):
+            env.reset(options={"reset_mask": np.array([True, False, True])})
+        first = env.reset(seed=1)[0]
+        env.step(np.zeros((N, 2)))
+        env.close(), env.close()
+    assert env.reset(seed=1)[0].tobytes() == first.tobytes()
+    env.close()
+
+
+def test_a_vector_says_that_it_cannot_be_copied():
+    env = vector().unwrapped
+    env.reset(seed=0)
+    for use in (pickle.dumps, copy.deepcopy):
+        with pytest.raises(TypeError, match="make another"):
+            use(env)
+
+
+def test_wrappers_of_gymnasium_take_it():
+    import gymnasium.wrappers.vector as wrappers
+
+    env = wrappers.RecordEpisodeStatistics(vector(max_episode_steps=3))
+    env = wrappers.RescaleAction(wrappers.NormalizeObservation(env), np.float32(-2), np.float32(2))
+    env.reset(seed=0)
+    for _ in range(4):
+        x, *_, infos = env.step(env.action_space.sample())
+        if "episode" in infos:
+            assert (infos["episode"]["l"] == 3).all()
+    assert np.isfinite(x).all()
+    env.close(), env.close()

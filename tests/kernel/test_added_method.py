@@ -2,12 +2,12 @@
 
 from tests.kernel.edited import missing_in, run_edited
 
-PACE = '''    if m.method == FINE:
+PACE = """    if m.method == FINE:
         return after / max(1.0, 1.0 * round(4.0 * after / m.dt))
     return after
 
 
-def bound('''
+def bound("""
 EDITS = {  # the fast method with four steps a sample: by file, what stands, and what then
     "scene/scenario.py": [('Literal["fast", "accurate"]', 'Literal["fast", "accurate", "fine"]')],
     "model/support.py": [
@@ -37,7 +37,8 @@ import dataclasses
 import numpy as np
 import hapticclay as hc
 
-s = hc.constant_cut(operator=hc.Operator(), force=(2.0, 0.3), clay=(0.005, 0.02), t_max=0.4, dt=1e-3)
+hand = dict(operator=hc.Operator(), force=(2.0, 0.3))
+s = hc.constant_cut(**hand, clay=(0.005, 0.02), t_max=0.4, dt=1e-3)
 coarse, fine, short = (
     hc.simulate(dataclasses.replace(s, integrator=x, dt=dt), engine="python")
     for x, dt in (("fast", 1e-3), ("fine", 1e-3), ("fast", 2.5e-4))

@@ -62,9 +62,7 @@ def some_profile(draw, along, hard, **more):
     edges = draw(some_edges())
     b = st.just(0.0) | between(1.0, 1e6 if hard else 200.0)
     each = {"values": b} | more
-    fields = {
-        name: tuple(draw(x) for _ in range(len(edges) + 1)) for name, x in each.items()
-    }
+    fields = {name: tuple(draw(x) for _ in range(len(edges) + 1)) for name, x in each.items()}
     return Profile(edges, fields.pop("values"), along, **fields)
 
 
@@ -112,7 +110,8 @@ def some_clay(draw, law, method):
         more |= dict(Fy=st.just(0.0) | between(0.1, 2.0))
     x = draw(some_profile(along[0], hard, **more))
     y = draw(st.just(dataclasses.replace(x)) | some_profile(along[1], hard, **more))
-    both = law == "yield" and (x.Fy, x.K, x.n, x.edges, x.along) == (y.Fy, y.K, y.n, y.edges, y.along)
+    alike = all(getattr(x, k) == getattr(y, k) for k in ("Fy", "K", "n", "edges", "along"))
+    both = law == "yield" and alike
     groove = draw(some_groove) if law == "groove" else None
     return Clay(x, y, angle, isotropic=both and draw(maybe), groove=groove)
 
@@ -124,8 +123,9 @@ def some_hardware(draw, held, guarded):
         jitter=between(1e-6, 8e-5), dropout_probability=evenly(0.01, 0.3),
         encoder=st.integers(1000, 100_000), adc_bits=st.integers(8, 16),
         force_noise=between(1e-3, 0.1), force_filter=between(50.0, 1000.0),
-        filter_order=st.integers(1, 2), dac_bits=st.integers(8, 16), dac_range=st.just((30.0, 20.0)),
-        delay=between(1e-4, 2e-3), friction=pair(between(1e-3, 0.05)), seed=st.integers(0, 99),
+        filter_order=st.integers(1, 2), dac_bits=st.integers(8, 16),
+        dac_range=st.just((30.0, 20.0)), delay=between(1e-4, 2e-3),
+        friction=pair(between(1e-3, 0.05)), seed=st.integers(0, 99),
     )  # fmt: skip
     if held and guarded:
         parts |= dict(

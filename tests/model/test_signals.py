@@ -12,6 +12,7 @@ from scipy.integrate import quad
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
+from hapticclay.formulas import pieces as formula
 from hapticclay.model import pieces
 from hapticclay.model.signals import Multisine
 
@@ -173,11 +174,11 @@ def test_sums_and_the_loops_table_say_the_same(cases, t, h):
     wave = -2.0 * hc.Multisine((1.0, 0.5), seed=3)
     want = sum([case[0].mean(t, h) for case in cases], wave.mean(t, h))
     np.testing.assert_allclose(signal.mean(t, h), want, rtol=1e-12, atol=1e-12)
-    table = pieces.loop_table(signal.cosines, signal.pieces(0.0, 4.096, 1e-3), 1e-9)
+    table = pieces.loop_table(signal.cosines, signal.pieces(0.0, 4.096, 1e-3), 1e-9).ravel()
     # (2 pi 30 Hz 0.5 ms)^4/2000 of 20 in a value, next to none in a mean
-    np.testing.assert_allclose(pieces.mean_of_table(table, t, h), want, rtol=1e-9, atol=1e-8)
+    np.testing.assert_allclose(formula.mean_of_table(table, t, h), want, rtol=1e-9, atol=1e-8)
     if all(abs(t - x) > 1e-6 for case in cases for x in case[2]):
-        value = pieces.mean_of_table(table, t, 0.0)
+        value = formula.mean_of_table(table, t, 0.0)
         np.testing.assert_allclose(value, signal(t), rtol=1e-6, atol=2e-6)
 
 
@@ -238,13 +239,13 @@ def test_what_is_no_signal_is_refused_by_name(make, field, told):
     [
         ("t,f_x,fy\n0,1,2\n", {}, "columns", "did you mean 'f_x'"),
         ("t,fx,fy\n0,1,2\n0.1,abc,2\n", {}, "column fx", "line 3 of f.csv"),
-        ("t,fx,fy\n0,1\n", {}, "column fy", "line 2 of f.csv"),
+        ("t,fx,fy\n0,1\n", {}, "path", "line 2: must have 3 cells"),
         ("t,fx,fy\n0,1,inf\n", {}, "column fy", "line 2 of f.csv"),
-        ("", {}, "path", "column names"),
+        ("", {}, "path", "name its columns"),
         ("t,fx,fy\n", {}, "path", "line of numbers"),
         ("t,fx,fy\n1,0,0\n0,0,0\n", {}, "samples.t[1]", "ascend"),
         ("t,fx,fy\n0,1,2\n", dict(columns=("t", "fx")), "columns", "three"),
-        ("0,1,2\n", {}, "columns", "must be one of 0, 1, 2"),
+        ("0,1,2\n", {}, "path", "must name its columns"),
     ],
 )
 def test_bad_files_are_refused_with_place_and_name(tmp_path, text, kw, field, told):

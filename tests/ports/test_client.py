@@ -7,6 +7,8 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import serve as listen
 
@@ -14,11 +16,12 @@ import hapticclay as hc
 from hapticclay.cli.app import main
 from hapticclay.errors import ParameterError
 from hapticclay.model.constants import NOMINAL
-from hapticclay.ports import Coupled, Limits, Trajectory, connect, render, serve
-from hapticclay.ports.client import MOST_MISSED, allowed
+from hapticclay.ports import Coupled, DeviceClient, Limits, Trajectory, connect, render, serve
+from hapticclay.ports.client import MOST_MISSED
 from hapticclay.ports.client_log import ClientLog, Exchanged
 from hapticclay.ports.coupled import SETTLING, DeviceHand
 from hapticclay.ports.inverse import Cursor, Frame, frame_text
+from hapticclay.ports.limits import ForceLimiter, allowed
 from hapticclay.ports.service import REST
 from tests.ports.conftest import SCENE
 
@@ -28,7 +31,7 @@ BY_MESSAGE = Limits(period=PERIOD, ramp=0.0)
 
 @contextmanager
 def device(answer):
-    """A device that answers the k-th message with answer(k, force): a text, or None for none."""
+    """A device that answers the k-th message with answer(k, force): a text, several, or None."""
     sent, threads = [], []
 
     def talk(socket):
@@ -37,8 +40,8 @@ def device(answer):
             force = json.loads(data)["inverse3"][0]["commands"]["set_cursor_force"]["values"]
             sent.append((force["x"], force["y"], force["z"]))
             text = answer(len(sent), sent[-1])
-            if text is not None:
-                socket.send(text)
+            for each in [text] if isinstance(text, str) else text or ():
+                socket.send(each)
 
     def run(socket):
         threads.append(threading.current_thread())
@@ -59,11 +62,18 @@ def device(answer):
 STILL = frame_text(Frame("04EA", Cursor(REST)))
 
 
+def at(x, v=0.0):
+    """The frame of a device at a place [m], with a velocity [m/s]."""
+    return frame_text(Frame("04EA", Cursor((float(x), 0.0, 0.0), (float(v), 0.0, 0.0))))
+
+
 def test_a_force_is_shortened_and_grows():
     assert allowed((3.0, 4.0, 0.0), 1.0, 1.0) == pytest.approx((0.6, 0.8, 0.0), rel=1e-15)
     assert allowed((3.0, 4.0, 0.0), 10.0, 0.25) == (0.75, 1.0, 0.0)
     for bad in (math.nan, math.inf):
         assert allowed((bad, 0.0, 0.0), 10.0, 1.0) == (0.0, 0.0, 0.0)
+    huge = 1.7e308  # the length overflows, the direction is known
+    assert allowed((huge, -huge, 0.0), 2.0, 1.0) == pytest.approx((2**0.5, -(2**0.5), 0.0))
 
 
 def test_exchanges_with_our_own_device():
@@ -108,8 +118,6 @@ def test_no_force_after_a_lost_sample(answer):
     with device(lambda k, f: reply.get(k, STILL)) as (url, sent), connect(url, limits) as client:
         seen = [client.exchange((1.0, 0.0, 0.0)) for _ in range(6)]
         assert seen[4] is not None and seen[5] is None and client.log.missed == 1
-        if answer is None:  # it comes after all, and must not shift those behind it
-            client._waiting -= 1
         for _ in range(8):
             client.exchange((1.0, 0.0, 0.0))
     assert sent[5][0] > 0.9 and sent[6] == (0.0, 0.0, 0.0)
@@ -118,20 +126,73 @@ def test_no_force_after_a_lost_sample(answer):
 
 def test_an_answer_that_comes_late_shifts_nothing():
     """Both answers are read before the next exchange: none is one behind for ever."""
-    places = {k: frame_text(Frame("04EA", Cursor((float(k), 0.0, 0.0)))) for k in range(1, 9)}
-    held = []
 
     def answer(k, force):
-        if k == 3:
-            return held.append(places[3])
-        return places[k]
+        return {3: None, 4: [at(3), at(4)]}.get(k, at(k))
 
-    limits = Limits(period=0.01, patience=0.03)
+    limits = Limits(period=0.01, patience=0.1)
     with device(answer) as (url, _), connect(url, limits) as client:
-        seen = [client.exchange() for _ in range(3)]
+        seen = [client.exchange() for _ in range(9)]
         assert seen[2] is None
-        client._waiting -= 1  # that answer never comes
-        assert client.exchange().position[0] == 4.0
+        assert [s.position[0] for s in seen[3:]] == [4.0, 5.0, 6.0, 7.0, 8.0, 9.0]
+        assert client.log.missed == client.log.skipped == 1
+
+
+@pytest.mark.parametrize("silent", [{1}, {3}, {3, 4, 5}, {2, 4, 6}])
+def test_a_message_that_is_never_answered_is_one_lost_sample(silent):
+    limits = Limits(period=0.01, patience=0.05)
+    with (
+        device(lambda k, f: None if k in silent else at(k)) as (url, _),
+        connect(url, limits) as client,
+    ):
+        seen = [client.exchange() for _ in range(10)]
+        lost = [k for k, sample in enumerate(seen, 1) if sample is None]
+        assert set(lost) == silent and client.log.missed == len(silent) and not client.lost
+        assert all(s.position[0] == k for k, s in enumerate(seen, 1) if s is not None)
+
+
+class Stream:
+    """A device that sends its places on its own, 0, 1, 2, ..., and answers nothing."""
+
+    def __init__(self):
+        self.sent, self.stop = 0, threading.Event()
+
+    def talk(self, socket):
+        try:
+            socket.send(frame_text(Frame("04EA", Cursor(REST), full=True)))
+            while not self.stop.wait(5e-4):
+                self.sent += 1
+                socket.send(at(1e-3 * self.sent))
+        except ConnectionClosed:
+            pass
+
+    @contextmanager
+    def served(self):
+        with listen(self.talk, "127.0.0.1", 0) as server:
+            thread = threading.Thread(target=server.serve_forever, daemon=True)
+            thread.start()
+            yield f"ws://127.0.0.1:{server.socket.getsockname()[1]}"
+            self.stop.set()
+            server.shutdown()
+            thread.join()
+
+
+def test_a_stream_is_read_at_its_newest_frame():
+    """Far faster than the exchanges: each sample left the device after the exchange began."""
+    stream = Stream()
+    with stream.served() as url:
+        client = DeviceClient(url, Limits(rate=25.0, patience=1.0))
+        for _ in range(25):
+            before = stream.sent
+            sample = client.exchange()
+            assert round(1e3 * sample.position[0]) >= before - 1  # one may be on its way
+        used, total = len(client.log), stream.sent
+        assert client.log.missed == 0 and total > 5 * used
+        # all frames are counted, but for those on their way at the last exchange
+        assert 0 <= total - used - client.log.skipped < 50
+        assert client.log.timing().skipped == client.log.skipped
+        client.close()  # waits for nothing that was sent before
+        assert stream.sent - total < 5000
 
 
 def test_a_device_that_is_gone_is_an_outcome():
@@ -140,6 +201,131 @@ def test_a_device_that_is_gone_is_an_outcome():
         server.close()
         found = [client.exchange((1.0, 0.0, 0.0)) for _ in range(3)]
         assert found == [None] * 3 and client.lost
+
+
+# ---- what protects the hand ----------------------------------------------------------------------
+
+
+def test_a_jump_turns_the_force_within_its_rate_of_change():
+    """From -3 N to 3 N in even steps of slew_rate Ts = 0.5 N: the place jumps by 1 m."""
+    limits = Limits(period=1e-3, ramp=0.0)
+    places = [at(0.05 + 1e-6 * k if k < 70 else -0.95 + 1e-6 * k) for k in range(200)]
+    with device(lambda k, f: places[k]) as (url, sent), connect(url, limits) as client:
+        hand = DeviceHand(client, Coupled(), (0.0, 0.0))
+        for _ in range(60):
+            hand.exchange((-0.05, 0.0), (0.0, 0.0))
+    x = [f[0] for f in sent[:-1]]
+    (turn,) = [k for k in range(1, len(x)) if x[k - 1] == pytest.approx(-3.0) and x[k] > -2.9]
+    assert x[turn : turn + 14] == pytest.approx([min(3.0, -2.5 + 0.5 * k) for k in range(14)])
+
+
+FORCES = st.tuples(*[st.floats(-8.0, 8.0) | st.sampled_from([0.0, math.nan, 1e308])] * 3)
+STEPS = st.tuples(FORCES, st.floats(0.0, 0.1), st.booleans(), st.floats(0.0, 1e-3))
+
+
+@given(st.lists(STEPS, max_size=12), st.floats(0.0, 0.2), st.floats(1.0, 1e4))
+def test_no_force_leaves_its_limits(steps, ramp, slew_rate):
+    """Whatever is asked at whatever times: length, rate of change, and zero after each gap."""
+    limits = Limits(2.0, ramp, slew_rate=slew_rate, frozen=None)
+    limiter, t, before = ForceLimiter(limits), 0.0, (0.0, 0.0, 0.0)
+    for force, passed, lost, x in steps:
+        t += passed
+        sent = limiter.apply(force, t, lost)
+        limiter.see((x, 0.0, 0.0), t)
+        assert math.hypot(*sent) <= 2.0 * (1 + 1e-12)
+        if any(sent):
+            change = math.dist(sent, before)
+            first = limits.Ts if before == (0.0, 0.0, 0.0) else 0.0  # of the first message
+            assert change <= min(2.0, slew_rate * (passed + first)) + 1e-12
+        if lost or (ramp and passed > limits.Ts + limits.patience):
+            assert sent == (0.0, 0.0, 0.0)
+        before = sent
+
+
+def test_the_force_grows_from_nothing_after_a_pause():
+    """A pause of the program, in which the device lets go: forces count up from zero again."""
+    limits = Limits(rate=100.0, ramp=0.2, slew_rate=1e6)
+    limiter, sent = ForceLimiter(limits), []
+    times = [0.01 * k for k in range(41)] + [1.0 + 0.01 * k for k in range(31)]
+    for k, t in enumerate(times):
+        limiter.see((1e-6 * k, 0.0, 0.0), t)
+        sent.append(limiter.apply((9.0, 0.0, 0.0), t)[0])
+    grown = [3.0 * min(1.0, 0.05 * k) for k in range(41)]
+    assert sent[:41] == pytest.approx(grown, abs=1e-12)
+    assert sent[41:] == pytest.approx(grown[:31], abs=1e-12)
+
+
+def test_a_client_that_pauses_sends_nothing_at_first():
+    limits = Limits(rate=200.0, ramp=0.02, patience=0.05)
+    with device(lambda k, f: at(1e-6 * k)) as (url, sent), connect(url, limits) as client:
+        for _ in range(20):
+            client.exchange((1.0, 0.0, 0.0))
+        before = len(sent)
+        threading.Event().wait(0.3)
+        client.exchange((1.0, 0.0, 0.0))
+        assert sent[before - 1][0] == 1.0 and sent[before] == (0.0, 0.0, 0.0)
+
+
+def test_a_frozen_position_gets_no_force():
+    """The place stays from message 20 on: after 0.1 s of force there is none, until it moves."""
+    limits = Limits(period=0.01, ramp=0.05, frozen=0.1)
+    with (
+        device(lambda k, f: at(1e-5 * (k if k < 20 else 20 if k < 50 else k))) as (url, sent),
+        connect(url, limits) as client,
+    ):
+        for _ in range(70):
+            client.exchange((1.0, 0.0, 0.0))
+        x = np.array([f[0] for f in sent[:70]])
+        withheld = client.log.withheld
+    assert np.all(x[6:30] == 1.0)
+    assert np.all(x[30:50] == 0.0) and withheld == 20  # ten messages at that place had a force
+    assert x[50:57] == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.0], abs=1e-9)
+
+
+def test_a_device_at_rest_without_force_is_not_frozen():
+    """It may rest as long as it likes; a later push reaches it, and one that ends begins anew."""
+    limits = Limits(period=0.01, ramp=0.0, frozen=0.1)
+    pushes = [0.0] * 40 + [1.0] * 15 + [0.0] + [1.0] * 5
+    with device(lambda k, f: STILL) as (url, sent), connect(url, limits) as client:
+        for push in pushes:
+            client.exchange((push, 0.0, 0.0))
+    expected = [0.0] * 40 + [1.0] * 10 + [0.0] * 6 + [1.0] * 5
+    assert [f[0] for f in sent[: len(pushes)]] == expected
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        at(0.08).replace("0.08", "1e308"),
+        at(0.08).replace("0.08", "NaN"),
+        at(0.08, 0.25).replace("0.25", "1e308"),
+        at(0.08, 0.25).replace("0.25", "-2e3"),
+        at(0.08, 0.25).replace("0.25", "1" + 400 * "0"),
+        at(0.08).replace('"device_id": "04EA"', '"device_id": "%s"' % (300 * "A")),  # noqa: UP031
+    ],
+)
+def test_a_frame_beyond_all_bounds_is_a_lost_sample(bad):
+    limits = Limits(period=0.01, ramp=0.0)
+    with (
+        device(lambda k, f: bad if k == 4 else at(1e-4 * k)) as (url, sent),
+        connect(url, limits) as client,
+    ):
+        seen = [client.exchange((1.0, 0.0, 0.0)) for _ in range(8)]
+    assert [s is None for s in seen] == [k == 4 for k in range(1, 9)]
+    assert sent[4] == (0.0, 0.0, 0.0) and sent[3][0] > 0.0
+
+
+@pytest.mark.parametrize("velocity", ["1e308", "999.0", "-1e3"])
+def test_a_session_outlives_any_velocity_that_a_device_reports(velocity):
+    """One wild number is a lost sample, or a violent pull: the record is there in either case."""
+
+    def answer(k, force):
+        return at(1e-5 * k, 0.25).replace("0.25", velocity if k == 80 else "1e-3")
+
+    with device(answer) as (url, _):
+        found = render(hc.constant_cut(b=30.0), url, 1.0, limits=Limits(period=0.01))
+    assert len(found.record.t) > 1 and np.isfinite(found.record.p).all()
+    assert found.timing.missed == (velocity == "1e308")
 
 
 def test_a_device_that_says_nothing_any_more_is_given_up():

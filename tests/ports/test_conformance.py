@@ -13,7 +13,7 @@ from websockets.exceptions import ConnectionClosed
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model.arm import inverse_kinematics, jacobian, joint_torques
+from hapticclay.formulas.arm import inverse_kinematics, jacobian, joint_torques
 from hapticclay.model.constants import NOMINAL
 from hapticclay.ports import ButtonScript, Inverse3, Trajectory, serve
 from hapticclay.ports.driven_arm import TARGET_STIFFNESS
@@ -313,7 +313,7 @@ def test_the_watchdog_takes_a_stale_force_away(served):
 
 def test_other_machines_need_the_token():
     with serve(SCENE, host="0.0.0.0", period=PERIOD) as server:
-        bare, _, token = server.url.replace("ws://0.0.0.0", "http://127.0.0.1").partition("/?")
+        bare, _, token = (f"http://127.0.0.1:{server.port}", "", server.url.partition("/?")[2])
         with pytest.raises(urllib.error.HTTPError) as refused:
             urllib.request.urlopen(bare + "/version")
         with refused.value as answer:
@@ -328,6 +328,12 @@ def test_other_machines_need_the_token():
         ({"clock": "sand"}, "clock"),
         ({"period": 0.0}, "period"),
         ({"port": 70_000}, "port"),
+        ({"host": "a..b"}, "host"),
+        ({"host": "no.such.host.invalid"}, "host"),
+        ({"host": "192.0.2.1"}, "host"),  # of another machine
+        ({"host": "x\0y"}, "host"),
+        ({"host": 70 * "x"}, "host"),
+        ({"host": 7}, "host"),
     ],
 )
 def test_bad_options_are_refused(options, field):
@@ -338,7 +344,17 @@ def test_bad_options_are_refused(options, field):
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("device_id", "04eg"), ("grip_id", ""), ("plane", "yz"), ("largest_force", -1.0)],
+    [
+        ("device_id", "04eg"),
+        ("grip_id", ""),
+        ("plane", "yz"),
+        ("largest_force", -1.0),
+        ("origins", ("null",)),
+        ("origins", ("localhost:8000",)),
+        ("origins", ("http://localhost:8000/page",)),
+        ("origins", (7,)),
+        ("origins", "http://localhost:8000"),
+    ],
 )
 def test_bad_names_are_refused(field, value):
     with pytest.raises(ParameterError) as error:
@@ -357,5 +373,5 @@ def test_a_taken_port_is_told():
         other.bind(("127.0.0.1", 0))
         other.listen()
         port = other.getsockname()[1]
-        with pytest.raises(ParameterError, match="must be free"), serve(SCENE, port=port):
+        with pytest.raises(ParameterError, match="cannot listen on"), serve(SCENE, port=port):
             pass

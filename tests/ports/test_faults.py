@@ -1,16 +1,20 @@
 """Clients that vanish, send rubbish or do not read: the arm goes limp, the others go on."""
 
 import contextlib
+import json
+import math
 import random
 import socket
 import threading
 import time
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from websockets.exceptions import ConnectionClosed
 
 from benchmarks import device_faults
-from hapticclay.ports import serve
+from hapticclay.ports import Inverse3, serve
 from hapticclay.ports.device import SimulatedDevice
 from hapticclay.ports.rows import CHUNK, Rows
 from hapticclay.ports.service import MOST_LOGS, Service
@@ -137,3 +141,123 @@ def test_a_server_that_closes_ends_its_clients(served):
     with pytest.raises(ConnectionClosed):
         c.send("{}")
     assert not server.service.device.force[0]
+
+
+# ---- numbers beyond all bounds -------------------------------------------------------------------
+
+NUMBERS = st.sampled_from(
+    ["1.7e308", "-1.7e308", "1e400", "NaN", "-Infinity", "1" + 400 * "0", "1e7", "999999", "-9e2"]
+) | st.floats().map(repr)
+INVERSE = ("set_cursor_force", "set_cursor_position", "set_angular_torques")
+ROS = ("servo_cf", "servo_cp", "phantom/force_feedback")
+
+
+def inverse_text(command, numbers):
+    """A message of the Inverse service with two entries, whose forces add up."""
+    x, y, z = numbers
+    body = '{"values":{"x":%s,"y":%s,"z":%s,"a0":%s,"a1":%s}}' % (x, y, z, x, y)  # noqa: UP031
+    entry = f'{{"device_id":"04EA","commands":{{"{command}":{body}}}}}'
+    return f'{{"inverse3":[{entry},{entry}]}}'
+
+
+def ros_text(topic, numbers):
+    """A message of rosbridge."""
+    v = '{"x":%s,"y":%s,"z":%s}' % numbers  # noqa: UP031
+    msg = f'{{"wrench":{{"force":{v}}},"pose":{{"position":{v}}},"force":{v}}}'
+    return f'{{"op":"publish","topic":"/a/{topic}","throttle_rate":{numbers[0]},"msg":{msg}}}'
+
+
+@pytest.mark.parametrize(("protocol", "words"), [("inverse", INVERSE), ("rosbridge", ROS)])
+@settings(max_examples=8, deadline=None)
+@given(data=st.data())
+def test_no_number_of_a_message_ends_the_device(protocol, words, data):
+    """Two clients: whatever one commands, the device goes on and the other reads numbers."""
+    shown = Inverse3(protocol=protocol)
+    service = Service(SimulatedDevice(SCENE, period=0.005), clock="tick", inverse3=shown)
+    wild, other = (service.connect()[0] for _ in range(2))
+    write = inverse_text if protocol == "inverse" else ros_text
+    if protocol == "rosbridge":
+        for topic in ("measured_cp", "measured_cv", "measured_js", "phantom/state"):
+            service.answer(other, json.dumps({"op": "subscribe", "topic": f"/{topic}"}))
+    for _ in range(3):
+        numbers = data.draw(st.tuples(NUMBERS, NUMBERS, NUMBERS))
+        text = write(data.draw(st.sampled_from(words)), numbers)
+        seen = service.answer(wild, text) + service.answer(other, "{}") + service.due(other)
+        for answer in seen:
+            json.loads(answer, parse_constant=lambda name: pytest.fail(f"{name} was sent"))
+        device = service.device
+        assert not device.ended and math.hypot(*device.force) <= 10.0 * (1 + 1e-12)
+        assert math.hypot(*device.torques) < 10.0 * 3.0 * (SCENE.arm.l1 + SCENE.arm.l2)
+    assert service.device.t > 0.0 and math.isfinite(sum(service.device.sensed.position))
+
+
+def test_what_is_beyond_a_bound_is_counted(served):
+    server, client = served(period=0.005)
+    c = client()
+    for command in INVERSE:
+        c.send(inverse_text(command, ("1e300", "0", "0")))
+    found = dict(server.service.notices)
+    assert found == {
+        "force is beyond 1e+06 N": 1,
+        "position is beyond 1000 m": 1,
+        "torque is beyond 1e+06 N.m": 1,
+    }
+
+
+def test_torques_are_limited_to_those_of_the_largest_force(served):
+    """The lever of a force is the stretched arm at most; the ratio of the joints stays."""
+    _, client = served(period=0.005, inverse3=Inverse3(largest_force=2.0))
+    c = client()
+    body = {"torques": {"a0": 300.0, "a1": -60.0}}
+    entry = {"device_id": "04EA", "commands": {"set_angular_torques": body}}
+    torques = c.state(json.dumps({"inverse3": [entry]}))["current_angular_torques"]
+    l1, l2 = SCENE.arm.l1, SCENE.arm.l2
+    expected = min(2.0 * (l1 + l2), 2.0 * l2 * 5.0)
+    assert torques["a0"] == pytest.approx(expected, rel=1e-12)
+    assert torques["a1"] == pytest.approx(-0.2 * expected, rel=1e-12)
+
+
+# ---- texts that a client makes the service keep --------------------------------------------------
+
+
+def test_no_client_fills_the_memory_with_ids():
+    """Ids, topics, types, profiles of any length, and subscriptions of any number: all bounded."""
+    shown = Inverse3(protocol="rosbridge")
+    service = Service(SimulatedDevice(SCENE, period=0.005), clock="tick", inverse3=shown)
+    number, _ = service.connect()
+    long, kept = 60_000 * "x", 0
+    before = memory_of(service)
+    for k in range(550):
+        names = [f"id {k}", 10**300 + k, k / 7]
+        for name in names if k > 20 else [*names, f"{k}{long}", [long]]:
+            words = {"op": "subscribe", "id": name, "topic": "/a/measured_cp"}
+            (answer, *_) = service.answer(number, json.dumps(words))
+            kept += json.loads(answer)["op"] == "publish"
+        if k < 5:
+            for key in ("op", "topic", "type", "compression"):
+                words = {"op": "subscribe", "topic": "/a/measured_cp", key: long}
+                (answer,) = service.answer(number, json.dumps(words))
+                assert json.loads(answer)["level"] == "error" and len(answer) < 500
+    assert kept == 500 and memory_of(service) - before < 500_000
+    inverse = Service(SimulatedDevice(SCENE, period=0.005), clock="tick")
+    number, _ = inverse.connect()
+    before = memory_of(inverse)
+    for k in range(100):
+        name = f"{k}{long[:15_000]}"
+        session = {"configure": {"profile": {"name": name}}, name: 1}
+        entry = {"device_id": name, name: 1, "commands": {name: 1}}
+        inverse.answer(number, json.dumps({"session": session, "inverse3": [entry]}))
+    assert memory_of(inverse) - before < 500_000
+
+
+def memory_of(service):
+    """Characters of all that a service holds for its clients."""
+    return len(repr((service.notices, [vars(s) for s in service._sessions.values()])))
+
+
+def test_a_notice_holds_no_control_characters(served, caplog):
+    server, client = served(period=0.005)
+    client().send(json.dumps({"\x1b[2J\ud800\nnext line": 1}))
+    (notice,) = server.service.notices
+    assert notice.isprintable() and "next line" in notice
+    assert all(r.getMessage().isprintable() for r in caplog.records)

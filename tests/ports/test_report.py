@@ -46,7 +46,7 @@ def swinging(K, B, back, normal=(0.6, 0.8), n=120, noise=0.0):
     )
 
 
-@pytest.mark.parametrize("back", [1, 2, 3])
+@pytest.mark.parametrize("back", [1, 2, 3, 4, 6, 11])
 @pytest.mark.parametrize("B", [0.0, 6.0])
 def test_a_known_wall_is_found(back, B):
     r = loop_report(swinging(640.0, B, back), SCENE)
@@ -57,6 +57,75 @@ def test_a_known_wall_is_found(back, B):
     assert r.rate == pytest.approx(1.0 / (1.01 * PERIOD), rel=1e-6)
     assert r.normal == pytest.approx((0.6, 0.8), abs=1e-9)
     assert r.explained == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_delay_beyond_those_tried_is_said_to_be_longer():
+    """Of 120 messages the search goes back over 30; a wall that is 35 late is not told exactly."""
+    r = loop_report(swinging(640.0, 6.0, 35), SCENE)
+    assert r.verdict == "not told" or r.longest_delay == math.inf, r
+    n = 400  # a spring alone, of a swing so slow that many ages explain it
+    t = PERIOD * np.arange(n)
+    e = swinging(640.0, 0.0, 4, n=n)
+    depth, speed = 2e-3 * np.sin(2.0 * t), 4e-3 * np.cos(2.0 * t)
+    rng = np.random.default_rng(2)
+    force = np.where(t < 4 * PERIOD, 0.0, -640.0 * np.roll(depth, 4))
+    plane = np.outer(force + 0.01 * rng.standard_normal(n), (0.6, 0.8))
+    e = dataclasses.replace(
+        e,
+        position=np.outer(depth, (0.6, 0.8)),
+        velocity=np.outer(speed, (0.6, 0.8)),
+        asked=np.column_stack([plane, np.zeros(n)]),
+        applied=plane,
+    )
+    slow = loop_report(e, SCENE)
+    assert slow.delay < 3 * PERIOD + 3e-4 + 1e-9 < slow.longest_delay
+    assert "samples late" in slow.headline()
+    assert "or more" in slow.headline() or "do not tell which" in slow.headline()
+
+
+@pytest.mark.parametrize("back", [1, 4, 9])
+def test_the_delay_of_noisy_forces_is_found(back):
+    """Noise of 0.05 N beside forces of 2 N; ages differ by 5 ms of a swing at 15 Hz, or 0.5 N."""
+    r = loop_report(swinging(640.0, 4.0, back, n=400, noise=0.05), SCENE)
+    assert r.delay == pytest.approx((back - 1) * PERIOD + 3e-4, abs=1e-9) == r.longest_delay
+    assert pytest.approx(640.0, rel=0.02) == r.K
+
+
+def test_the_rate_needed_is_the_lowest_one():
+    """A wall that holds is told how slow its program may be, and that one is at the border."""
+    r = loop_report(swinging(60.0, 0.0, 1), SCENE)
+    assert r.verdict == "holds" and 0.0 < r.rate_needed < 1.0 / r.period
+    handle = Handle.of(SCENE, normal=r.normal)
+    at = 1.0 / r.rate_needed
+    # the pose is that of the mean place, within 3 mm of the start: (p/l1)^2, 2e-4
+    assert rendered_stiffness_limit(handle, 0.0, at, r.age * at) == pytest.approx(r.K, rel=0.01)
+    assert "would do" in r.headline()
+    soft = loop_report(swinging(5.0, 0.0, 1), SCENE)
+    assert soft.rate_needed == 0.0 and "at any rate" in soft.headline()
+
+
+@pytest.mark.parametrize(
+    ("moved", "words"), [(0.3, ("skipped control samples", "--clock tick")), (1.0, ("faster",))]
+)
+def test_messages_without_simulated_time_between_them_are_explained(moved, words):
+    """Three of four messages find the arm where it was: late computer, or hasty program."""
+    e = swinging(640.0, 0.0, 1, n=400)
+    began = 4.0 * PERIOD * np.floor(np.arange(400) / 4.0)
+    r = loop_report(
+        dataclasses.replace(
+            e, began=moved * began, sampled=moved * began, received=PERIOD * np.arange(400.0)
+        ),
+        SCENE,
+    )
+    assert r.verdict == "not told" and r.period == 0.0
+    assert all(x in r.headline() for x in words) and "200 Hz" in r.headline()
+
+
+def test_a_report_prints_as_a_line():
+    r = loop_report(swinging(640.0, 4.0, 2), SCENE)
+    text = str(r)
+    assert text.startswith("<LoopReport: rendered 640 N/m") and "\n" not in text
+    assert len(text) < 250 and "limit for this hand" in text
 
 
 def test_the_standard_error_holds():

@@ -46,7 +46,7 @@ from hapticclay.model import operator
         (dict(clay=0.1), "clay"),
         (dict(length=0.5), "length"),
         (dict(length=-0.1), "length"),
-        (dict(length=None), "length"),
+        (dict(length="far"), "length"),
         (dict(start=(0.5, 0.5)), "start"),
         (dict(start=(math.nan, 0.0)), "start[x]"),
         (dict(origin=(0.0, 0.0)), "start"),

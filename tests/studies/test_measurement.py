@@ -283,7 +283,9 @@ def test_files_as_others_write_them(tmp_path):
     [
         ("time [ms],force (kN),pos [um]", (1e-3, 1e3, 1e-6)),
         ("t,command (mm),pos [cm]", (1.0, 1e-3, 1e-2)),
-        ("t [s],input [raw],output [1]", (1.0, 1.0, 1.0)),  # no units: as they are
+        ("t [s],input (2),output [1]", (1.0, 1.0, 1.0)),  # no units: as they are
+        ("t_ms,force / mN,x_mm", (1e-3, 1e-3, 1e-3)),
+        ("time (seconds),input [mN] raw,pos", (1.0, 1e-3, 1.0)),
     ],
 )
 def test_a_unit_in_the_name_of_a_column_is_converted(head, size, tmp_path):
@@ -308,7 +310,8 @@ def test_command_line(tmp_path, capsys):
     assert app.main([*words, "--band", "0.2", "12"]) == 0
     text, err = capsys.readouterr()
     assert err == "" and "rig.csv: whole record" in text and "stiffness [1/s^2]" in text
-    assert sorted(p.name for p in out.iterdir()) == ["fig5.png", "identify.json"]
+    assert sorted(p.name for p in out.iterdir()) == ["identify.json", "identify.png"]
+    assert "axis" not in text and "Sy" not in text  # one's own device has no axis of the arm
     saved = json.loads((out / "identify.json").read_text())
     (r,) = saved["results"]
     own = hc.studies.identify_data(data, "S", "y", band=(0.2, 12.0)).summary()
@@ -328,6 +331,10 @@ def test_plot_of_measured_columns():
     assert coherence.get_ylim()[0] < low.coherence.min() < 0.5  # nothing is cut off
     told = [x.get_text() for x in figure.legends[0].get_texts()]
     assert "measured, with 95 % bars" in told
+    titles = [ax.get_title(loc="left") for ax in figure.axes]
+    assert not any("axis" in x for x in titles) and "axis" not in low.headline()
+    beside = identification_plots.identification_plot([low], paper=True)
+    assert "G, x axis (Eq. 15)" in beside.axes[0].get_title(loc="left")  # of the equation
     figure.savefig("/dev/null", format="png")
 
 

@@ -25,7 +25,7 @@ from hapticclay.cli import sweep as sweep_command
 from hapticclay.errors import ParameterError
 from hapticclay.studies import sampling, sweep, sweep_rows, sweep_store
 from hapticclay.studies.sampling import Range, Sweep, parse_fixed, parse_grid
-from hapticclay.views import style, sweep_plots
+from hapticclay.views import sweep_plots
 
 GRID = "b=10:1000:3log gain.x=1:2:2"
 
@@ -249,7 +249,7 @@ def test_only_what_is_missing_is_done_and_the_result_is_the_same(tmp_path):
     sweep.run_sweep(small(), torn, workers=1)
     sweep_store.sweep_part(torn, 1).unlink()
     (torn / "data" / ".part-000001.parquet.abc").write_bytes(b"half a file")
-    assert sweep_store.missing_parts(small(), torn) == [1]
+    assert sweep_store.missing_parts(small(), torn) == [range(2, 4)]
     assert sweep.run_sweep(small(), torn, workers=1) == 2
     assert columns(sweep_store.read_sweep(torn)) == columns(sweep_store.read_sweep(whole))
 
@@ -342,7 +342,7 @@ def test_command_draws_maps_and_complains_in_one_line(tmp_path, capsys, monkeypa
     args = ["sweep", "--grid", GRID, "--fixed", "t_max=0.02", "--out", str(tmp_path)]
     assert app.main([*args, "--workers", "1"]) == 0
     assert "6 runs" in capsys.readouterr().out and (tmp_path / "status.png").stat().st_size > 5000
-    monkeypatch.setattr(sweep, "run_chunk", None)  # nothing is left to make, whatever the workers
+    monkeypatch.setattr(sweep, "run_part", None)  # nothing is left to make, whatever the workers
     assert app.main([*args, "--no-maps"]) == 0 and "6 runs" in capsys.readouterr().out
     for extra, word in (
         (["--grid", "b=1:2"], "b = "),
@@ -372,7 +372,10 @@ def test_maps(tmp_path):
         ax.get_xlabel() == "b [N.s/m]" and ax.get_xscale() == "log" and ax.get_yscale() == "linear"
     )
     shown = {t.get_text() for t in figure.legends[0].get_texts()}
-    assert shown == {*table["status"].to_pylist(), "gain margin < 1"}  # gain 1 on y, at b = 100
+    assert shown == {
+        *table["status"].to_pylist(),
+        "gain margin of y < 1",
+    }  # gain 1 on y, at b = 100
     sweep_plots.sweep_plot(table, "speed_x").savefig(tmp_path / "a.png")
     with pytest.raises(ParameterError, match="column"):
         sweep_plots.sweep_plot(table, "speedx")
@@ -619,8 +622,15 @@ def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
     assert set(sweep_plots.missing_reasons(free, "fe_over_v_x")) == {"no clay reached"}
 
 
-@pytest.mark.parametrize("value", ["status", "speed_x"])
-def test_a_sampled_map_rings_the_runs_whose_gain_margin_is_below_one(value):
+@pytest.mark.parametrize(
+    "value,ringed",
+    [
+        ("status", {"x": [10.0, 31.0], "y": [57.0, 88.0]}),
+        ("speed_x", {"x": [10.0, 31.0]}),  # a column of one axis, by its own verdict
+        ("speed_y", {"y": [57.0, 88.0]}),
+    ],
+)
+def test_a_sampled_map_rings_the_runs_whose_gain_margin_is_below_one(value, ringed):
     pa = pytest.importorskip("pyarrow")
     margins = np.array([0.5, 1.0, 0.999, 3.0, math.nan, math.nan])  # of x; of y below
     runs = {
@@ -629,18 +639,22 @@ def test_a_sampled_map_rings_the_runs_whose_gain_margin_is_below_one(value):
         "gain.x": np.array([0.3, 1.7, 2.2, 0.9, 5.1, 4.4]),
         "status": ["diverged", *["time limit"] * 4, "refused"],
         "gain_margin_x": margins,
-        "gain_margin_y": np.array([2.0, 2.0, 2.0, 0.1, 7.0, math.nan]),
+        "gain_margin_y": np.array([2.0, 2.0, 2.0, 0.1, 7.0, 0.9]),
         "speed_x": np.array([math.nan, 0.1, 0.2, 0.3, 0.4, math.nan]),
         "b_x": np.full(6, 90.0),
     }
+    runs |= {"speed_y": runs["speed_x"], "b_y": runs["b_x"]}
     figure = sweep_plots.sweep_plot(pa.table(runs), value)
     labels = [t.get_text() for t in figure.legends[0].get_texts()]
-    (rings,) = [c for c in figure.axes[0].collections if c.get_label() == style.UNSTABLE["label"]]
-    assert labels.count("gain margin < 1") == 1
-    np.testing.assert_array_equal(rings.get_offsets()[:, 0], [10.0, 31.0, 57.0])
+    for axis in "xy":
+        label = f"gain margin of {axis} < 1"
+        found = [c for c in figure.axes[0].collections if c.get_label() == label]
+        assert labels.count(label) == len(found) == (axis in ringed)
+        for rings in found:
+            np.testing.assert_array_equal(rings.get_offsets()[:, 0], ringed[axis])
     runs |= {"gain_margin_x": np.full(6, 1.0), "gain_margin_y": np.full(6, math.nan)}
     legend = sweep_plots.sweep_plot(pa.table(runs), value).legends[0]
-    assert "gain margin < 1" not in [t.get_text() for t in legend.get_texts()]
+    assert not any("gain margin" in t.get_text() for t in legend.get_texts())
 
 
 def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
@@ -700,49 +714,125 @@ def test_every_column_and_parameter_has_its_unit(tmp_path):
             sweep_plots.sweep_plot(table, text)
 
 
-@pytest.mark.parametrize(
-    "seconds,size", [(1e-9, 1024), (0.001, 1024), (0.01, 150), (0.2, 7), (1.5, 1), (40.0, 1)]
-)
-def test_a_chunk_holds_a_second_or_two_of_work(tmp_path, monkeypatch, seconds, size):
-    monkeypatch.setattr(sweep_store, "run_time", lambda plan: seconds)
-    plan = Sweep("constant", parse_grid("b=10:1000:60log gain.x=1:2:50"), {"t_max": 0.02})
-    with sweep_store.claimed(plan, tmp_path) as (begun, todo):
-        assert begun.chunk == size and len(todo) == -(-3000 // size)
-    assert json.loads((tmp_path / "sweep.json").read_text())["chunk"] == size
+def files_of(out):
+    return sorted((out / "data").glob("part-*"))
 
 
-@pytest.mark.parametrize("each,most", [(0.01, 16 + 2), (0.5, 2), (30.0, 1)])
-def test_the_time_of_a_run_is_that_with_machine_code_loaded(monkeypatch, each, most):
-    """On a made-up clock: the first run compiles for a minute before its own time begins."""
-    plan = Sweep("constant", parse_grid("b=10:1000:40log gain.x=1:2:25"), {"t_max": 0.01})
-    clock, made = [0.0], []
+def whole(plan, out):
+    """Whether the folder has each run once, in order."""
+    return sweep_store.read_sweep(out)["run"].to_pylist() == list(range(len(plan)))
 
-    def timed(plan, index, point):
-        clock[0] += each if made else 60.0 + each
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_files_are_few_however_long_a_run_takes(tmp_path, monkeypatch, workers):
+    """On a made-up clock, in one process: the first run seems to take minutes, as on a busy machine
+    or where it compiles; each other one 0.05 s or 5 s.
+
+    A file takes 1.5 s or 5 % of the time T spent so far, whichever is longer. So there are 20 files
+    in the first 30 s, and then ln(T/30 s)/ln(1.05).
+    """
+    free = Sweep("constant", parse_grid("b=5:1000:40log gain.x=0.2:8:40"), {"t_max": 0.003})
+    for each, most in ((0.05, 20 + 21 + 2), (5.0, 1 + math.log(1600 * 5.0 / 100.0, 1.05))):
+        clock, made = [0.0], []
+
+        def timed(plan, index, point, each=each, clock=clock, made=made):
+            clock[0] += each if made else 300.0
+            made.append(index)
+            return sweep_rows.result_row(index, list(plan.vary), point, None)
+
+        monkeypatch.setattr(sweep, "run_point", timed)
+        monkeypatch.setattr(sweep.time, "perf_counter", lambda clock=clock: clock[0])
+        out = tmp_path / f"{each}-{workers}"
+        assert sweep.run_sweep(free, out, workers=1) == 1600 == len(set(made))
+        assert whole(free, out) and len(files_of(out)) <= most
+
+
+def test_short_runs_are_few_files_of_two_processes(tmp_path):
+    """Some ten seconds of work for two: far fewer files than runs, and none of them lost."""
+    free = Sweep("constant", parse_grid("b=5:1000:20log gain.x=0.2:8:20"), {"t_max": 0.02})
+    assert sweep.run_sweep(free, tmp_path, workers=2) == 400
+    assert whole(free, tmp_path) and len(files_of(tmp_path)) <= 40
+    assert sweep.run_sweep(free, tmp_path, workers=2) == 0
+
+
+@given(st.data())
+def test_runs_handed_out_in_any_order_are_made_once(data):
+    """Tasks end in any order, after any share of their runs: each run is made, and made once."""
+    n, crew = data.draw(st.integers(1, 300)), data.draw(st.integers(1, 5))
+    plan = Sweep("constant", {"b": Range(1.0, 2.0 + n, n)})
+    cuts = sorted(data.draw(st.sets(st.integers(0, n), max_size=6)) | {0, n})
+    gaps = [range(a, b) for a, b in zip(cuts, cuts[1:], strict=False)][::2]
+    work, jobs, made = sweep.Work(plan, gaps, 1.0), [], []
+    while True:
+        while len(jobs) < crew and (runs := work.take(crew)):
+            jobs.append(runs)
+        if not jobs:
+            break
+        runs = jobs.pop(data.draw(st.integers(0, len(jobs) - 1)))
+        k = data.draw(st.integers(1, len(runs)))
+        made += runs[:k]
+        work.give_back(runs, k, data.draw(st.floats(1e-4, 1e3)))
+    assert sorted(made) == [i for gap in gaps for i in gap] and work.count == 0
+
+
+def test_ctrl_c_waits_for_one_run_and_loses_none(tmp_path, monkeypatch):
+    free, real, made = replace(small(), chunk=None), sweep_rows.run_point, []
+
+    def struck(plan, index, point):
+        if index == 3:
+            signal.raise_signal(signal.SIGINT)
         made.append(index)
-        return {"wall_time": each}
+        return real(plan, index, point)
 
-    monkeypatch.setattr(sweep_rows, "run_point", timed)
-    monkeypatch.setattr(sweep_rows.time, "perf_counter", lambda: clock[0])
-    assert sweep_rows.run_time(plan) == pytest.approx(each, rel=1e-9)
-    assert len(made) <= most  # the measurement costs little: of long runs, one
+    monkeypatch.setattr(sweep, "run_point", struck)
+    with pytest.raises(KeyboardInterrupt):
+        sweep.run_sweep(free, tmp_path, workers=1)
+    assert made == [0, 1, 2, 3] and sweep_store.missing_parts(free, tmp_path) == [range(4, 6)]
+    with pytest.warns(hc.Warning, match="4 of 6 runs are in"):
+        sweep_store.read_sweep(tmp_path)
+    monkeypatch.undo()
+    assert sweep.run_sweep(free, tmp_path, workers=1) == 2 and whole(free, tmp_path)
 
 
-def test_a_resumed_sweep_keeps_its_chunks(tmp_path, monkeypatch):
+@pytest.mark.parametrize("lost", [0, 1, 2])
+def test_a_lost_file_is_made_again_between_the_others(tmp_path, lost):
+    """Files of any size, as they remain after interruptions."""
     free = replace(small(), chunk=None)
-    times = iter([0.5, 1e-3])  # of a run: three in a chunk; later the machine seems faster
-    monkeypatch.setattr(sweep_store, "run_time", lambda plan: next(times))
-    sweep.run_sweep(free, tmp_path, workers=1)
-    assert len(list((tmp_path / "data").iterdir())) == 2
+    with sweep_store.claimed(free, tmp_path) as (plan, _):
+        for a, b in ((0, 1), (1, 4), (4, 6)):
+            sweep.run_part(plan, range(a, b), str(tmp_path))
+    same = columns(sweep_store.read_sweep(tmp_path))
+    gone = [(0, 1), (1, 4), (4, 6)][lost]
+    sweep_store.sweep_part(tmp_path, gone[0]).unlink()
+    assert sweep_store.missing_parts(free, tmp_path) == [range(*gone)]
+    assert sweep.run_sweep(free, tmp_path, workers=1) == gone[1] - gone[0]
+    assert columns(sweep_store.read_sweep(tmp_path)) == same
+
+
+def test_files_that_share_runs_are_refused_and_made_again(tmp_path, capsys):
+    """As a worker of a cluster would leave them that was thought dead."""
+    free = replace(small(), chunk=None)
+    with sweep_store.claimed(free, tmp_path) as (plan, _):
+        for a, b in ((0, 4), (2, 5), (5, 6)):
+            sweep.run_part(plan, range(a, b), str(tmp_path))
+    with pytest.raises(ParameterError, match="must have each run once"):
+        sweep_store.read_sweep(tmp_path)
+    assert sweep.run_sweep(free, tmp_path, workers=1) == 1 and whole(free, tmp_path)
+    assert "part-000002.parquet (has runs of another)" in capsys.readouterr().err
+
+
+def test_a_resumed_sweep_keeps_its_chunks(tmp_path):
+    free, given_ = replace(small(), chunk=None), replace(small(), chunk=4)
+    sweep.run_sweep(given_, tmp_path, workers=1)
     sweep_store.sweep_part(tmp_path, 1).unlink()
-    assert sweep.run_sweep(free, tmp_path, workers=1) == 3 and next(times) == 1e-3
-    given = replace(small(), chunk=3)  # the same sweep: nothing is left
-    assert sweep.run_sweep(given, tmp_path, workers=1) == 0
+    assert sweep.run_sweep(free, tmp_path, workers=1) == 2  # the chunk of the folder
+    assert sweep.run_sweep(given_, tmp_path, workers=1) == 0
     with pytest.raises(ParameterError, match="another sweep"):
         sweep.run_sweep(small(), tmp_path, workers=1)
-    (tmp_path / "sweep.json").write_text("[1]")
-    with pytest.raises(ParameterError, match="another sweep"):
-        sweep.run_sweep(free, tmp_path, workers=1)
+    for text in ("[1]", '{"chunk": true}', '{"chunk": "many"}', '{"chunk": -1}', "[" * 10**5):
+        (tmp_path / "sweep.json").write_text(text)
+        with pytest.raises(ParameterError, match="another sweep"):
+            sweep.run_sweep(free, tmp_path, workers=1)
 
 
 def test_results_are_the_same_bits_whatever_the_chunk(tmp_path, monkeypatch):
@@ -777,7 +867,7 @@ def test_ctrl_c_with_one_worker_finishes_the_chunk(tmp_path, monkeypatch, capsys
     monkeypatch.setattr(sweep, "run_point", struck)
     with pytest.raises(KeyboardInterrupt):
         sweep.run_sweep(small(), tmp_path, workers=1)
-    assert sweep_store.missing_parts(small(), tmp_path) == [2]
+    assert sweep_store.missing_parts(small(), tmp_path) == [range(4, 6)]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     monkeypatch.undo()
     sweep.run_sweep(small(), tmp_path, workers=1)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-STAND_INS = ("python3", "Xvfb", "xdotool", "chromium", "make", "ldconfig")
+STAND_INS = ("python3", "cc", "Xvfb", "xdotool", "chromium", "make", "ldconfig")
 LIBRARIES = "echo libEGL.so.1 libGL.so.1 libatomic.so.1"
 LOOK = (  # what `make` finds, and what it leaves behind
     'echo "$HOME" "$TMPDIR" "$(find "$HOME" "$TMPDIR" -mindepth 1 | wc -l)" "${XDG_CACHE_HOME-}" '

@@ -11,9 +11,10 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.cli import app
+from hapticclay.cli.words import check_words, ordered, with_units
+from hapticclay.kernel import engine
 from hapticclay.model import constants
 from hapticclay.simulation import record
-from hapticclay.stepping import engine
 from tests.public import NAMES, told_by, used_in
 from tests.snippets import printed_by
 
@@ -29,7 +30,6 @@ def test_readme_snippet_runs_and_prints_what_it_says(block, tmp_path):
     assert (tmp_path / "out" / "record.npz").is_file()
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("page", ["stability", "limit_cycles", "hardware", "design"])
 def test_stability_pages_say_what_their_snippets_print(page, tmp_path):
     text = (ROOT / "docs" / f"{page}.md").read_text()
@@ -79,7 +79,6 @@ def test_a_symptom_page_shows_its_cause_in_a_few_lines(page, tmp_path):
     assert text.index("**Cause.**") < text.index("## Show it") and "](" in text
 
 
-@pytest.mark.plain
 def test_the_groove_page_says_what_it_prints(tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "groove.md").read_text(), re.S)
     out = printed_by(code, tmp_path)
@@ -209,7 +208,7 @@ NAMED = [
 @pytest.mark.parametrize("name", NAMED)
 def test_a_function_that_the_table_of_the_step_names_exists(name):
     module, function = name.split(".")
-    found = importlib.import_module(f"hapticclay.stepping.{module}")
+    found = importlib.import_module(f"hapticclay.kernel.{module}")
     assert inspect.isfunction(getattr(found, function)), name
 
 
@@ -338,3 +337,39 @@ def test_links_within_the_documents_lead_somewhere(page):
         if heading:
             titles = re.findall(r"^#+ (.*)$", file.read_text(), re.M)
             assert heading in {re.sub(r"[^\w\- ]", "", t.lower()).replace(" ", "-") for t in titles}
+
+
+TEXTS = [*(x for x in PAGES if x.suffix == ".md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+
+
+def commands_in(text):
+    """Commands that a reader copies: lines of blocks, and words in backquotes."""
+    text = re.sub(r"\\\n\s*", "", text)  # a line that goes on
+    blocks = re.findall(r"^ {4}hapticclay (.+)$", text, re.M)
+    fences = re.findall(r"^```\w*\n(.*?)^```", text, re.M | re.S)
+    return blocks + [x for f in fences for x in re.findall(r"^hapticclay (.+)$", f, re.M)]
+
+
+@pytest.mark.parametrize("page", TEXTS, ids=[page.stem for page in TEXTS])
+def test_a_command_can_be_copied_as_it_stands(page):
+    """A shell ends it at its remark; the command line takes its words, and ignores none."""
+    for line in commands_in(page.read_text()):
+        assert line.isascii(), line
+        words = with_units(ordered(shlex.split(line, comments=True)))
+        check_words(words)
+
+
+@pytest.mark.parametrize("page", TEXTS, ids=[page.stem for page in TEXTS])
+def test_an_option_in_the_text_is_set_as_code(page):
+    """Elsewhere a page may turn its two hyphens into a dash."""
+    text = re.sub(r"^(```|~~~).*?^\1|<!--.*?-->", "", page.read_text(), flags=re.S | re.M)
+    text = re.sub(r"^ {4}.*$", "", text, flags=re.M)
+    text = re.sub(r"(`+)(?!`).+?(?<!`)\1(?!`)", "", text, flags=re.S)
+    assert re.findall(r"(?<![-\w|:])--[A-Za-z][\w-]*", text) == []
+
+
+@pytest.mark.parametrize("page", TEXTS, ids=[page.stem for page in TEXTS])
+def test_a_file_of_the_checkout_that_a_page_names_is_there(page):
+    for name in re.findall(r"\b(?:tests|benchmarks|examples)/[\w/.-]+\.\w+", page.read_text()):
+        if "NAME" not in name and "FOLDER" not in name:
+            assert (ROOT / name).is_file(), name

@@ -9,9 +9,11 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import psutil
 import pytest
 
+import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.errors import ParameterError
 from hapticclay.studies import sweep, sweep_store
@@ -309,18 +311,130 @@ def test_a_stray_file_among_the_parts_is_refused_and_kept(copy):
     assert stray.is_file()
 
 
-def test_a_part_that_may_not_be_read_is_refused_not_removed(copy, monkeypatch):
-    real = type(copy).read_bytes
-
-    def denied(self):
-        if self.name == "part-000003.parquet":
-            raise PermissionError(13, "Permission denied")
-        return real(self)
-
-    monkeypatch.setattr(type(copy), "read_bytes", denied)
-    with pytest.raises(ParameterError, match="part-000003.*Permission denied"):
+def test_a_part_that_cannot_be_read_is_refused_not_removed(copy):
+    part = sweep_store.sweep_part(copy, 3)
+    part.unlink()
+    part.symlink_to(part)  # the system finds no end of it, and no fault of the file
+    with pytest.raises(ParameterError, match="part-000003.*[Tt]oo many"):
         sweep.run_sweep(plan(), copy, workers=1)
-    assert sweep_store.sweep_part(copy, 3).is_file()
+    assert part.is_symlink()
+
+
+def to_zeros(part):
+    part.symlink_to("/dev/zero")
+
+
+@pytest.mark.parametrize("make", [to_zeros, os.mkfifo, os.mkdir])
+def test_a_part_that_is_no_file_is_refused_at_once(copy, capsys, whole, make):
+    """A device that never ends and a pipe without a writer would be read for ever."""
+    part = sweep_store.sweep_part(copy, 3)
+    part.unlink()
+    make(part)
+    with pytest.raises(ParameterError, match="part-000003.parquet.*damaged"):
+        sweep_store.read_sweep(copy)
+    if make is os.mkdir:
+        with pytest.raises(ParameterError, match="damaged and cannot be removed"):
+            sweep.run_sweep(plan(), copy, workers=1)
+        part.rmdir()
+    sweep.run_sweep(plan(), copy, workers=1)
+    assert columns(sweep_store.read_sweep(copy)) == whole
+
+
+def test_a_part_that_claims_too_many_rows_is_not_read(copy):
+    """A column of one value takes some bytes, however many rows there are."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    part = sweep_store.sweep_part(copy, 3)
+    pq.write_table(pa.table({"run": np.zeros(2_000_000, dtype=np.int64)}), part)
+    assert part.stat().st_size < 10_000
+    with pytest.raises(ParameterError, match="part-000003.parquet.*damaged"):
+        sweep_store.read_sweep(copy)
+
+
+def sweep_study(out, progress):
+    return sweep.run_sweep(plan(), out, workers=1, progress=progress)
+
+
+def column_study(out, progress):
+    scene = hc.with_fields(hc.constant_cut(operator=hc.Operator()), {"t_max": 0.01})
+    masses = {"operator.mass": np.linspace(0.5, 1.0, 8)}
+    return hc.studies.run_columns(scene, masses, out, chunk=2, workers=1, progress=progress)
+
+
+def trial_study(out, progress):
+    law = hc.studies.Distribution("uniform", 20.0, 30.0)
+    trials = hc.studies.Trials(hc.studies.PushedLoop("x", K=2.0), {"b": law}, runs=8, chunk=2)
+    return hc.studies.monte_carlo(trials, out=out, progress=progress)
+
+
+def remove_all(out):
+    shutil.rmtree(out)
+
+
+def remove_parts(out):
+    shutil.rmtree(out / "data")
+
+
+def replace_sweep(out):
+    """The folder is removed, and another sweep begins in its place, which no lock prevents."""
+    shutil.rmtree(out)
+    sweep.run_sweep(plan("1:2:2"), out, workers=1)
+
+
+@pytest.mark.parametrize("study", [sweep_study, column_study, trial_study])
+@pytest.mark.parametrize(
+    "harm, said",
+    [
+        (remove_all, "was removed or replaced while the sweep ran"),
+        (replace_sweep, "was removed or replaced while the sweep ran"),
+        (remove_parts, r"\d of \d+ runs are in .*: files were removed while the sweep ran"),
+    ],
+)
+def test_a_folder_removed_at_work_is_an_error_and_is_made_again(tmp_path, study, harm, said):
+    out, files = tmp_path / "o", []
+
+    def progress(n):
+        files.append(n)
+        if len(files) == 2:
+            harm(out)
+
+    with pytest.raises(FileNotFoundError, match=said):
+        study(out, progress)
+    others = len(list((out / "data").glob("part-*"))) if out.exists() else 0
+    assert others < 20  # what another sweep wrote is left alone, and nothing is added
+    if harm is replace_sweep:
+        with pytest.raises(ParameterError, match="another"):
+            study(out, lambda n: None)
+        shutil.rmtree(out)
+    study(out, lambda n: None)
+    table = sweep_store.read_sweep(out)
+    assert table["run"].to_pylist() == list(range(table.num_rows))
+    assert table.num_rows == (RUNS if study is sweep_study else 8)
+
+
+def test_a_folder_removed_after_the_last_file_is_an_error(tmp_path):
+    """The last chunk is stored, and nothing more is written that would notice."""
+    made = []
+
+    def progress(n):
+        made.append(n)
+        if sum(made) == RUNS:
+            sweep_store.sweep_part(tmp_path, 5).unlink()
+
+    with pytest.raises(FileNotFoundError, match=f"76 of {RUNS} runs are in"):
+        sweep_study(tmp_path, progress)
+
+
+@pytest.mark.untraced
+def test_the_command_says_in_one_line_that_its_folder_has_gone(tmp_path):
+    out = tmp_path / "o"
+    with at_work(out, 0.3, 4) as (p, _):
+        shutil.rmtree(out)
+        said, err = p.communicate(timeout=60)
+    lines = [line for line in err.splitlines() if " to go" not in line]
+    assert p.returncode == 1 and len(lines) == 1 and f"{out} was removed" in lines[0]
+    assert "runs in" not in said and not out.exists()
 
 
 def test_of_sweeps_started_at_once_one_wins_and_the_others_are_refused(tmp_path):

@@ -81,7 +81,30 @@ def test_the_slowest_period_is_where_the_limit_is_reached():
     assert rendered_stiffness_limit(handle, 0.0, period, period) == pytest.approx(
         2.0 * limit, rel=1e-5
     )
-    assert slowest_period(handle, 0.5 * limit, 0.0, 1.0, 0.005) == 0.005
+    slow = slowest_period(handle, 0.5 * limit, 0.0, 1.0, 0.005)  # slower than the one it has
+    assert slow > 0.005
+    assert rendered_stiffness_limit(handle, 0.0, slow, slow) == pytest.approx(0.5 * limit, rel=1e-5)
+
+
+@pytest.mark.parametrize("Ts", [1e-3, 1e-2, 0.4])
+@pytest.mark.parametrize(("K", "B"), [(1000.0, 3.0), (50.0, 3.0), (1e4, 3.0), (10.0, 8.0)])
+def test_the_slowest_period_of_a_free_mass_is_that_of_jury(K, B, Ts):
+    """A mass m under K and B, held: z^2 - (2 - B T/m - K T^2/2m) z + 1 - B T/m + K T^2/2m.
+
+    Jury: T < 2 B/K and T < 2 m/B, whatever period the program has. Within the bisection's 1e-9
+    and the rounding that counts as stable, 1e-12 of an eigenvalue, whose slope here is above 1e-3.
+    """
+    m = 0.3
+    handle = Handle(np.diag([m, m]), np.zeros(2), np.zeros(2), np.array([1.0, 0.0]))
+    found = slowest_period(handle, K, B, 0.0, Ts)
+    assert found == pytest.approx(min(2.0 * B / K, 2.0 * m / B), rel=1e-7)
+
+
+def test_a_wall_softer_than_the_hand_is_stable_at_any_rate():
+    """Both hold the handle by springs; that of the wall, which comes late, is the weaker one."""
+    assert slowest_period(Handle.of(SCENE), 10.0, 0.0, 1.2, 0.005) == math.inf
+    free = Handle.of(hc.Scenario(origin=NOMINAL, length=None))
+    assert slowest_period(free, 640.0, 0.0, 1.0, 0.005) == 0.0  # nothing damps it
 
 
 def test_without_hand_and_damping_every_delayed_wall_buzzes():

@@ -7,7 +7,7 @@ import math
 import control
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
@@ -16,6 +16,7 @@ from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
 from hapticclay.theory import linear_loop, roots, stability_margins
 from hapticclay.theory.stability_margins import BREAKS
+from tests.hunt import examples
 
 OMEGA = np.geomspace(1e-2, 1e4, 20_001)
 LOOPS = dict(
@@ -123,6 +124,111 @@ def test_margins_against_python_control(axis, K, b, th, at):
     dense = 2.0 / largest(lambda w: np.abs((d(1j * w) - n(1j * w)) / (d(1j * w) + n(1j * w))))
     assert m.disk <= dense * (1.0 + 1e-9)  # exact: no grid finds less
     assert m.disk == pytest.approx(dense, rel=1e-5)  # the last grid is finer than any resonance
+
+
+def loop_by_its_parts(axis, K, b, th, compensator, at):
+    """L(omega) from the factors of Eqs. 8 and 12, without a polynomial of the loop."""
+    printed = hc.model.controller.SERVO["xy".index(axis)]
+
+    def L(w):
+        s = 1j * w
+        T = b * s
+        if th:
+            T = T + th.mass * s**2 + th.damper * s + th.spring
+        G, Sh = (x.gain / (s**2 + x.damping * s + x.stiffness) for x in (printed.G, printed.S))
+        C = K * np.polyval(compensator.num, s) / np.polyval(compensator.den, s)
+        return (G * C + Sh) * T if at == "force" else G * C * T / (1.0 + Sh * T)
+
+    return L
+
+
+BIPROPER = dict(
+    axis=st.sampled_from("xy"),
+    K=st.floats(-3.0, 1.0).map(lambda x: 10.0**x),
+    b=st.floats(0.0, 3.5).map(lambda x: 10.0**x),
+    th=st.none()
+    | st.builds(Operator, st.floats(0.01, 5.0), st.floats(0.1, 100.0), st.floats(0.1, 500.0)),
+    num=st.tuples(st.just(1.0), st.floats(0.1, 50.0), st.floats(0.1, 2e3)),
+    den=st.tuples(st.just(1.0), st.floats(0.1, 50.0), st.just(0.0) | st.floats(0.1, 2e3)),
+    at=st.sampled_from(BREAKS),
+)  # both of degree 2: with the hand's mass, L does not roll off
+
+
+@examples(40)
+@given(**BIPROPER)
+@example(
+    "y",
+    0.0385,
+    1903.0,
+    Operator(0.349, 0.505, 0.496),
+    (1.0, 0.1107, 3.5775),
+    (1.0, 26.566, 21.31),
+    "compensator",
+)
+@example(
+    "x",
+    0.0405,
+    2058.8,
+    Operator(0.032, 31.74, 2.054),
+    (1.0, 0.2758, 1809.1),
+    (1.0, 10.65, 1.0464),
+    "force",
+)
+def test_no_dense_scan_finds_a_smaller_disk_margin(axis, K, b, th, num, den, at):
+    """The slope of |L| ratios loses its highest power; its rounding must not hide the peak."""
+    C = hc.Compensator(num, den)
+    m = hc.theory.margins(axis, K, b, th, compensator=C, at=at)
+    assume(m.stable and m.disk > 1e-3)
+    L = loop_by_its_parts(axis, K, b, th, C, at)
+    dense = 2.0 / largest(lambda w: np.abs((1.0 - L(w)) / (1.0 + L(w))))
+    # The scan ends at 1e-6 and 1e8 rad/s, the margin at 0 and infinity.
+    assert m.disk == pytest.approx(dense, rel=1e-5)
+
+
+@examples(8)
+@given(
+    axis=st.sampled_from("xy"),
+    share=st.floats(-3.0, -0.1).map(lambda x: 1.0 - 10.0**x),
+    b=st.floats(1.0, 300.0),
+    den=st.tuples(st.just(1.0), st.floats(0.1, 50.0), st.just(0.0) | st.floats(0.1, 2e3)),
+    num=st.tuples(st.floats(0.1, 1.0), st.floats(1.0, 100.0))
+    | st.tuples(st.just(1.0), st.floats(0.1, 50.0), st.floats(1.0, 2e3)),
+    th=st.none()
+    | st.builds(Operator, st.floats(0.01, 5.0), st.floats(0.1, 100.0), st.floats(0.1, 500.0)),
+    late=st.sampled_from([1e-3, 4e-3]),
+)
+@example(
+    "x",
+    0.9998,
+    265.7,
+    (1.0, 1.2457, 23.379),
+    (1.0, 89.456, 4040.35),
+    Operator(9.2488, 0.3539, 711.34),
+    1e-3,
+)
+def test_no_dense_scan_finds_a_smaller_disk_margin_of_a_delayed_loop(
+    axis, share, b, den, num, th, late
+):
+    C = hc.Compensator(num, den)
+    limit = hc.theory.gain_limit(axis, b, th, compensator=C, delay=late)
+    assume(0.0 < limit < 1e6)
+    m = hc.theory.margins(axis, share * limit, b, th, compensator=C, delay=late)
+    assume(m.stable)
+    printed = hc.model.controller.SERVO["xy".index(axis)]
+    own = printed.S
+    w = np.geomspace(1e-2, 3e4, 200_001)
+    s, T = 1j * w, b * 1j * w
+    late_by = np.exp(-s * late)
+    body, hand = own.gain * b * s * late_by, 0.0
+    if th:
+        hand = own.gain * (th.mass * s**2 + th.damper * s + th.spring)
+        T = T + hand / own.gain
+    # every action of the motors is late: the servo's feedback, held clay and the compensator
+    arm = s**2 + hand + late_by * (own.damping * s + own.stiffness) + body
+    G = printed.G.gain / (s**2 + printed.G.damping * s + printed.G.stiffness)
+    drive = late_by * G * (s**2 + own.damping * s + own.stiffness)
+    L = share * limit * drive * np.polyval(num, s) / np.polyval(den, s) * T / arm
+    assert m.disk <= 2.0 / np.max(np.abs((1.0 - L) / (1.0 + L))) * (1.0 + 1e-6)
 
 
 @pytest.mark.parametrize(

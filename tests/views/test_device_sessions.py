@@ -195,6 +195,10 @@ def test_a_paused_session_gives_the_device_no_force(device_hand):
     asked = server.exchanges[0].asked
     assert abs(asked[-3, 0]) > 0.0  # of the last slice
     assert np.all(asked[-2:] == 0.0)
+    slices(session, 12)  # goes on: from nothing, over the ramp of 0.2 s
+    after = np.abs(server.exchanges[0].asked[len(asked) :, 0])
+    assert np.all(after[:2] == 0.0) and np.all(after <= 0.05 * np.arange(12) * 10.0 + 1e-12)
+    assert after[-1] > 0.0
 
 
 def test_a_lost_device_lets_go(device_hand):

@@ -2,16 +2,18 @@
 
 import dataclasses
 import functools
+import math
 import time
 
 import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.simulation.engines import has_numba
-from hapticclay.stepping.run import CHUNK, PLAIN
+from hapticclay.kernel import native
+from hapticclay.kernel.row import CHUNK
 from hapticclay.views.clock import FRAME_TIME, LONGEST_SLICE, Clock
 from hapticclay.views.live_run import played
+from hapticclay.views.live_verdict import live_verdict
 from hapticclay.views.player import Player
 from hapticclay.views.replay import Replay
 from hapticclay.views.session import Session
@@ -265,7 +267,7 @@ def test_replay_follows_the_record():
 def test_verdict_follows_the_monitor_and_the_gain():
     """K_y below its limit, above it, and below again: the verdict names each."""
     session = Session(hc.constant_cut(dt=1e-3), stiffness=10.0)
-    assert session.verdict().text == "stable; limit of K here: none"
+    assert session.verdict().text == "stable; no limit of K here"
     session.push((0.0, 0.2))
     drag(session, 3.0, lambda t: (0.1, 0.0))
     assert session.b == (90.0, 90.0)
@@ -305,16 +307,32 @@ def test_verdict_of_a_replay_is_that_of_its_record(gain, axis):
     assert said[-1][1].unstable == bool(axis)
 
 
-def test_steps_too_short_for_python_are_compiled_to_the_same_bits(monkeypatch):
-    from hapticclay.views import live_run as module
-
+@pytest.mark.skipif(not native.is_there(), reason="needs the compiled kernel")
+def test_a_session_is_compiled_where_there_is_a_kernel_to_the_same_bits(monkeypatch):
     fine, ends = hc.constant_cut(dt=5e-5), []
-    for numba in (True, False):
-        with monkeypatch.context() as patch:
-            if not numba:
-                patch.setattr(module, "has_numba", lambda: False)
-            live = drag(Session(fine, stiffness=10.0), 0.3)
-            assert (live.run.kernel is PLAIN) == (not numba or not has_numba())
-            ends.append(live.record())
+    for engine in ("native", "python"):
+        live = drag(Session(fine, stiffness=10.0), 0.3)
+        assert live.run.row.engine == engine
+        ends.append(live.record())
+        monkeypatch.setattr(native, "why_not", lambda: "it is not built")
     np.testing.assert_array_equal(ends[0].p, ends[1].p)
-    assert Session(hc.constant_cut()).run.kernel is PLAIN
+
+
+@pytest.mark.parametrize(
+    "limit,told",
+    [
+        ((math.inf, math.inf), "stable; no limit of K here"),
+        ((3.0, 0.8), "stable; limit of K here: 3, 0.8"),
+        ((math.inf, 0.8), "stable; limit of Ky here: 0.8"),
+        ((3.0, math.inf), "stable; limit of Kx here: 3"),
+        (None, "stable"),
+    ],
+)
+def test_a_verdict_names_the_limits_that_there_are(limit, told):
+    assert live_verdict((0.5, 0.5), limit, None, False).text == told
+
+
+def test_an_oscillation_has_no_word_of_a_limit_that_is_not_there():
+    onset = hc.Outcome("diverged", 1.0, 1, "y", "growing oscillation")
+    text = live_verdict((0.5, 0.5), (math.inf, math.inf), onset, True).text
+    assert text == "UNSTABLE since 1.0 s: growing oscillation of y"

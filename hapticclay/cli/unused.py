@@ -1,0 +1,76 @@
+"""Options that would do nothing, which a command refuses rather than ignores."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from ..errors import ParameterError
+
+Given = Mapping[str, Sequence[str]]  # values of the words that were given, by name
+
+
+class Unused(NamedTuple):
+    """Options that do nothing, in a command where a combination of others stands.
+
+    A combination names words as "spec" (given), or "design=grid" (given with this value).
+
+    Attributes:
+        options: names of the options, and of fields behind --set.
+        why: what to do about them, for the error.
+        beside: words that are all given; () for any command line.
+        without: words none of which is given.
+    """
+
+    options: tuple[str, ...]
+    why: str
+    beside: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+
+    def refuse(self, given: Given) -> None:
+        """Refuses the options where they do nothing.
+
+        Args:
+            given: the words of a command line.
+
+        Raises:
+            ParameterError: one of them is given.
+        """
+        beside = all(_is_given(word, given) for word in self.beside)
+        if not beside or any(_is_given(word, given) for word in self.without):
+            return
+        for name in self.options:
+            if name in given:
+                raise ParameterError(name, " ".join(given[name]) or True, self.why)
+
+
+FIGURE_WORDS = "format", "dpi", "style", "data"
+
+
+def undrawn(*switches: str) -> tuple[Unused, ...]:
+    """Options of figures beside an option that leaves the figures out.
+
+    Args:
+        *switches: the options, as "no-plots".
+    """
+    why = "is for figures, which --{} leaves out: give one of the two"
+    return tuple(Unused(FIGURE_WORDS, why.format(x), (x,)) for x in switches)
+
+
+def refuse_unused(rules: Iterable[Unused], given: Given) -> None:
+    """Refuses options that would do nothing.
+
+    Args:
+        rules: of the command.
+        given: the words of a command line.
+
+    Raises:
+        ParameterError: one of them is given.
+    """
+    for rule in rules:
+        rule.refuse(given)
+
+
+def _is_given(word: str, given: Given) -> bool:
+    name, equals, value = word.partition("=")
+    return name in given and (not equals or value in given[name])

@@ -1,0 +1,188 @@
+"""Outliers of measured columns: spikes, lost packets, repeated values, steps that never return.
+
+A handle has mass: its position cannot jump. An increment that continues neither the increments
+before it nor those after it is a jump; a velocity that jumps, as at a hit, continues one of them.
+Between a jump away and the jump back lie outliers. Scales are medians, which outliers hardly move
+(F. R. Hampel, The influence curve and its role in robust estimation, J. Am. Stat. Assoc. 69 (1974)
+383).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+NORMAL = 1.4826  # standard deviation of normal noise over its median absolute value
+BEFORE = 4  # increments that predict the next one
+JUMP = 8.0  # deviations of the prediction that make a jump; white noise reaches 7.4 in 1e6 samples
+COUNT = 0.5  # least deviation, in counts of a quantised column ...
+MOVING = 0.04  # ... and as a share of the increments around
+BLOCK = 200  # samples over which the deviation of the prediction is measured
+LONGEST = 24  # samples from a jump to the jump back
+SIDES = (8, 3)  # samples on each side that bridge a gap; fewer where another gap is near
+FAR = 4.0  # outliers lie so much farther from the bridge than the samples that carry it
+LOST = "jumps away and back, or values that repeat before a jump: lost packets?"
+NAMED = 3  # times that a sentence names
+
+
+class Cleaned(NamedTuple):
+    """A column without its outliers.
+
+    Attributes:
+        x: the column, with outliers replaced by a curve through the samples around, (n,).
+        bad: mask of the outliers, (n,).
+        steps: indices of the samples after a jump that does not return, (m,).
+    """
+
+    x: np.ndarray
+    bad: np.ndarray
+    steps: np.ndarray
+
+
+def robust_deviation(x: np.ndarray) -> float:
+    """Standard deviation of normal noise that has the same median absolute value.
+
+    Args:
+        x: residuals, (n,), n >= 1.
+    """
+    return NORMAL * float(np.median(np.abs(x)))
+
+
+def cleaned(x: np.ndarray, count: float = 0.0) -> Cleaned:
+    """A column that is smooth but for noise, without its outliers.
+
+    Args:
+        x: evenly spaced samples, (n,), n >= 100.
+        count: their quantum; 0 for none.
+    """
+    given, bad = np.asarray(x, dtype=float), np.zeros(len(x), dtype=bool)
+    now, at = given, _jumps(given, count)
+    for _ in range(5):  # small outliers stand beside large ones
+        more = bad.copy()
+        for first, stop in _gaps(now, at):
+            more[first:stop] = True
+        if np.array_equal(more, bad):
+            break
+        bad = more
+        now = bridged(given, bad)
+        at = _jumps(now, count)
+    lasting = at[~(bad[at] | bad[at + 1])]
+    return Cleaned(now, bad, lasting + 1)
+
+
+def bridged(x: np.ndarray, bad: np.ndarray) -> np.ndarray:
+    """The column with outliers replaced by the cubic through the good samples on both sides.
+
+    Args:
+        x: samples, (n,).
+        bad: mask of those to replace, (n,).
+    """
+    out, good = x.copy(), np.flatnonzero(~bad)
+    for first, stop in runs_of(bad):
+        i = int(np.searchsorted(good, first))
+        around = good[max(i - SIDES[0], 0) : i + SIDES[0]]
+        both = 0 < i < len(good)
+        out[first:stop] = _curve(around, x, 3 if both else 1)(np.arange(first, stop))
+    return out
+
+
+def runs_of(mask: np.ndarray) -> list[tuple[int, int]]:
+    """(start, stop) of each run of True in a mask.
+
+    Args:
+        mask: (n,).
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def sentence(column: str, t: Sequence[float] | np.ndarray, samples: int, why: str) -> str:
+    """A warning about samples that are left out.
+
+    Args:
+        column: "position", "force", ...
+        t: their times [s], (m,).
+        samples: number of samples of the column.
+        why: what is wrong with them.
+    """
+    are = "are" if len(t) > 1 else "is"
+    return f"{len(t)} of {samples} {column}s {are} left out, at t = {times(t)} s: {why}"
+
+
+def times(t: Sequence[float] | np.ndarray) -> str:
+    """The first of some times, in words.
+
+    Args:
+        t: the times [s].
+    """
+    more = ", ..." if len(t) > NAMED else ""
+    return ", ".join(f"{x:.6g}" for x in t[:NAMED]) + more
+
+
+def _jumps(x: np.ndarray, count: float) -> np.ndarray:
+    """Indices i of increments from x[i] to x[i + 1] that continue neither side."""
+    d = np.diff(x)
+    ahead = np.linalg.pinv(np.vander(np.arange(-BEFORE, 0), 2))[1]  # a line, at the next increment
+    left, right = np.full((2, len(d)), np.inf)
+    left[BEFORE:] = np.convolve(d, ahead[::-1], "valid")[:-1]
+    right[:-BEFORE] = np.convolve(d, ahead, "valid")[1:]
+    off = np.minimum(np.abs(d - left), np.abs(d - right))
+    size = np.abs(d)
+    around = np.max([np.roll(size, k) for k in (-2, -1, 1, 2)], axis=0)
+    least = np.maximum(COUNT * count, MOVING * around) + 1e-14 * float(np.max(np.abs(x)))
+    return np.flatnonzero(off > JUMP * np.maximum(_local_deviation(off), least))
+
+
+def _local_deviation(off: np.ndarray) -> np.ndarray:
+    """Deviation of normal noise at each value, from the median over the blocks around it."""
+    blocks = np.array_split(off, max(len(off) // BLOCK, 1))
+    each = np.array([robust_deviation(block) for block in blocks])
+    wide = np.concatenate((each[:1], each, each[-1:]))
+    each = np.max([wide[:-2], each, wide[2:]], axis=0)
+    return np.repeat(each, [len(block) for block in blocks])
+
+
+def _gaps(x: np.ndarray, at: np.ndarray) -> list[tuple[int, int]]:
+    """(start, stop) of samples between a jump away and a jump back, or frozen before a jump."""
+    out, end = [], -1
+    for k, i in enumerate(at.tolist()):
+        if i <= end:
+            continue
+        if i < SIDES[0] or i >= len(x) - 1 - SIDES[0]:  # the end of the column
+            out.append((0, i + 1) if i < SIDES[0] else (i + 1, len(x)))
+            continue
+        back = (j for j in at[k + 1 :].tolist() if j - i <= LONGEST)
+        found = next((j for j in back if _stands_out(x, i + 1, j + 1).all()), None)
+        if found is not None:
+            out.append((i + 1, found + 1))
+            end = found
+        elif (first := _first_repeat(x, i)) < i and _stands_out(x, first + 1, i + 1).any():
+            out.append((first + 1, i + 1))
+    return out
+
+
+def _first_repeat(x: np.ndarray, i: int) -> int:
+    """Index of the first sample that has the value of sample i without a change in between."""
+    other = np.flatnonzero(x[:i] != x[i])
+    return int(other[-1]) + 1 if len(other) else 0
+
+
+def _stands_out(x: np.ndarray, first: int, stop: int) -> np.ndarray:
+    """Whether first and last of some samples lie far from a curve that both sides follow, (2,)."""
+    ends = np.array([first, stop - 1])
+    for side in SIDES:
+        low, high = max(first - side, 0), min(stop + side, len(x))
+        around = np.concatenate((np.arange(low, first), np.arange(stop, high)))
+        if len(around) < 2 * SIDES[-1]:
+            break
+        curve = _curve(around, x, 3 if side > SIDES[-1] else 2)
+        left = np.max(np.abs(x[around] - curve(around)))
+        if (far := np.abs(x[ends] - curve(ends)) > FAR * left).any():
+            return far
+    return np.zeros(2, dtype=bool)
+
+
+def _curve(around: np.ndarray, x: np.ndarray, degree: int) -> np.polynomial.Polynomial:
+    return np.polynomial.Polynomial.fit(around, x[around], min(degree, len(around) - 1))

@@ -1,0 +1,144 @@
+"""Processes of this machine that make runs of a study."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+    from multiprocessing.process import BaseProcess
+
+UNGUARDED = 77  # exit status of a worker that came upon a study while it imported the script
+ALONE = "use workers=1 (--workers 1)"
+NO_GUARD = (
+    'the study must stand below `if __name__ == "__main__":`, since each worker process imports '
+    f"the script; or {ALONE}"
+)
+NO_FILE = (
+    "worker processes import the script that starts them, and this one comes from no file: save "
+    f"it, or {ALONE}"
+)
+NOT_BEGUN = (
+    "the worker processes ended while they imported the script that started them (its error "
+    f"stands above): mend it, or {ALONE}"
+)
+KILLED = "a worker was killed (memory?); the same command resumes the sweep"
+DAEMON = f"a daemonic process, as of multiprocessing.Pool, can start no workers: {ALONE}"
+_end: Any = None  # in a worker: the event that tells it to take no further run
+
+
+@contextlib.contextmanager
+def started(crew: int) -> Iterator[Callable[..., Future[Any]]]:
+    """Processes that call functions; yields the function that submits a call.
+
+    At the end no further call begins, `ended` is true in those at work, and they are waited for.
+
+    Args:
+        crew: number of processes.
+
+    Raises:
+        ChildProcessError: processes cannot be started, or one ended before its time.
+    """
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+    from concurrent.futures.process import BrokenProcessPool
+
+    leave_if_imported()
+    if multiprocessing.current_process().daemon:
+        raise ChildProcessError(DAEMON)
+    if _has_lost_script():
+        raise ChildProcessError(NO_FILE)
+    context = multiprocessing.get_context("spawn")  # the engine's threads do not survive a fork
+    try:
+        end, begun = context.Event(), context.Event()
+        pool = ProcessPoolExecutor(
+            crew, mp_context=context, initializer=_begin, initargs=(end, begun)
+        )
+    except (OSError, ImportError) as error:  # semaphores live in shared memory
+        raise ChildProcessError(_no_semaphores(error)) from None
+    others, workers = set(multiprocessing.active_children()), set()
+
+    def submit(*call: Any) -> Future[Any]:
+        try:
+            job = pool.submit(*call)
+        except BrokenProcessPool:
+            raise
+        except (OSError, RuntimeError) as error:  # the latter for a thread
+            told = getattr(error, "strerror", None) or error
+            fault = f"a worker process cannot be started ({told}): use fewer, or {ALONE}"
+            raise ChildProcessError(fault) from None
+        workers.update(multiprocessing.active_children())
+        return job
+
+    try:
+        yield submit
+    except BrokenProcessPool:
+        raise ChildProcessError(_cause(workers - others, begun.is_set())) from None
+    finally:
+        end.set()
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _no_semaphores(error: Exception) -> str:
+    told = getattr(error, "strerror", None) or error
+    return (
+        f"worker processes cannot be started ({told}): they need shared memory, on Linux a "
+        f"writable /dev/shm; mount it, or {ALONE}"
+    )
+
+
+def _has_lost_script() -> bool:
+    """Whether workers could not import the script, as one from standard input."""
+    main = sys.modules.get("__main__")
+    file = getattr(main, "__file__", None)
+    return getattr(main, "__spec__", None) is None and bool(file) and not os.path.exists(file)
+
+
+def _cause(workers: set[BaseProcess], begun: bool) -> str:
+    """Why workers ended, in words."""
+    if any(p.exitcode == UNGUARDED for p in workers):
+        return NO_GUARD
+    return KILLED if begun else NOT_BEGUN
+
+
+def leave_if_imported() -> None:
+    """Ends a worker that imports a script without main guard and has come to a study in it.
+
+    The process that started it says why. To start processes in turn, Python would raise an error
+    of many lines in each worker.
+    """
+    imported = sys.modules.get("__mp_main__")
+    if imported is not None and sys.modules.get("__main__") is not imported:
+        raise SystemExit(UNGUARDED)
+
+
+def ended() -> bool:
+    """Whether this worker shall take no further run."""
+    return _end is not None and _end.is_set()
+
+
+def _begin(end: Any, begun: Any) -> None:
+    """Ignores signals of the terminal, so a worker finishes; the worker ends with its parent."""
+    import signal
+    import threading
+
+    global _end
+    _end = end
+    begun.set()
+    for name in ("SIGINT", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    import multiprocessing
+
+    parent = multiprocessing.parent_process()
+    assert parent
+    parent.join()
+    os._exit(1)  # a killed parent receives no report
