@@ -243,8 +243,7 @@ class Run:
 
     def _make(self, room: int) -> None:
         self.row.advance(self._prepared(room))
-        if self.row.caller is not None:
-            self.row.caller.check()
+        self.row.check()
         self._count()
 
     def _prepared(self, room: int) -> int:
@@ -373,7 +372,7 @@ class Run:
     @property
     def _prepares(self) -> bool:
         """Whether something but chance is to be prepared before steps, or looked at after them."""
-        return self.drives is not None or self.row.caller is not None
+        return self.drives is not None or self.row.is_called
 
     def interrupt(self) -> None:
         """Ends the run at its last sample."""
@@ -445,8 +444,7 @@ class Run:
         """The row that a step would write now, and the force of the clay in it [N]."""
         self._prepared(self.filled + 1)
         found = self.row.peek()
-        if self.row.caller is not None:
-            self.row.caller.check()
+        self.row.check()
         return self._with_force(found)
 
     def numbers_ahead(self) -> list[float]:
