@@ -37,7 +37,11 @@ def engine_for(engine: str, steps: float = 0.0) -> str:
 
 
 def tell(why: str) -> None:
-    """Says once that runs are slow, why, and what helps."""
+    """Says once that runs are slow, why, and what helps.
+
+    Args:
+        why: there is no compiled kernel.
+    """
     global _told
     if not _told:
         _told = True

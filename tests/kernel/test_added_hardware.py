@@ -1,59 +1,58 @@
 """The cost of an imperfection of the hardware: the edits that CONTRIBUTING.md lists, in a copy."""
 
-import os
-import shutil
-import subprocess
-import sys
-from pathlib import Path
+from tests.kernel.edited import missing_in, run_edited
 
-import hapticclay as hc
-
-PACKAGE = Path(hc.__file__).parent
 FIELD = "    dead_band: Annotated[float, Bound(0.0, 10.0, 'N.m')] = 0.0\n"
 TRAIT = """    ("dead band", lambda x: x.dead_band > 0.0, LEFT_OUT, {},
      lambda x: told_values("dead band {}", (x.dead_band,), "N.m")),
 """
-PART = "    band = float(io.dead_band) if io.dead_band > 0.0 else None\n"
-FUNCTION = '''
-def without_small(band, x):
-    """Torques of which those within a dead band are none [N.m]."""
-    if band is None:
-        return x
-    return 0.0 if abs(x[0]) < band else x[0], 0.0 if abs(x[1]) < band else x[1]
+RECORD = "    band: real  # torques below it are none [N.m]\n"
+FUNCTION = '''def without_small(m, t):
+    """A torque, none within a dead band [N.m]."""
+    return 0.0 if abs(t) < m.band else t
+
+
 '''
-CONVERTED = "hardware.converted(part, clipped(tau, limits))"
+QUANTIZED = "    s.next.{0}.tau = law.quantize(t{1}, m.dac_bits, m.dac_range{1})\n"
+DECLARED = "cdef double without_small(Model m, double t) noexcept nogil\n"
 EDITS = {  # a dead band, below which motors hold no torque: by file, what stands, and what then
     "model/hardware.py": [
         ("    friction: Annotated[", FIELD + "    friction: Annotated["),
         ('    ("joint friction",', TRAIT + '    ("joint friction",'),
     ],
-    "stepping/parts.py": [
-        ("    friction: Any\n    passivity", "    band: Any\n    friction: Any\n    passivity")
+    "kernel/records.py": [
+        ("    friction: whole\n    slip:", RECORD + "    friction: whole\n    slip:")
     ],
-    "stepping/scene.py": [
-        ("    more = difference", PART + "    more = difference"),
-        ("adc, dac, delay, friction, pass", "adc, dac, delay, band, friction, pass"),
+    "kernel/scene.py": [
+        ("    put_delay(m, arrays,", "    m.band = float(io.dead_band)\n    put_delay(m, arrays,")
     ],
-    "stepping/hardware.py": [("# ---- joints ---", FUNCTION + "# ---- joints ---")],
-    "stepping/sampled.py": [
-        ("def driven_torques(part, limits,", "def driven_torques(part, band, limits,"),
-        (f"return {CONVERTED}", f"return hardware.without_small(band, {CONVERTED})"),
-        ("driven_torques(sampler.dac, parts", "driven_torques(sampler.dac, sampler.band, parts"),
+    "kernel/hardware.py": [
+        ("def drive(m, s, t1, t2):", FUNCTION + "def drive(m, s, t1, t2):"),
+        *(
+            (
+                QUANTIZED.format(x, n),
+                QUANTIZED.format(x, n).replace("= ", "= without_small(m, ").replace(")\n", "))\n"),
+            )
+            for x, n in zip("xy", "12", strict=True)
+        ),
     ],
+    "kernel/hardware.pxd": [("cdef void drive(", DECLARED + "cdef void drive(")],
 }
 RUN = """
 import dataclasses
 import numpy as np
 import hapticclay as hc
+from hapticclay.kernel import native
 from hapticclay.model import support
-from hapticclay.stepping.many import kind_key
+from hapticclay.simulation.many import kind_key
 
 s = hc.constant_cut(control="sampled", t_max=0.05)
-plain = hc.simulate(s, engine="python")
+plain = hc.simulate(s)
 runs = [
-    hc.simulate(dataclasses.replace(s, hardware=hc.Hardware(dead_band=band)), engine="python")
+    hc.simulate(dataclasses.replace(s, hardware=hc.Hardware(dead_band=band)))
     for band in (1e-9, 0.02)
 ]
+assert not native.is_there(), "a kernel built from other records is refused"
 assert plain.p.tobytes() == runs[0].p.tobytes()
 tau = np.abs(runs[1].tau)
 assert (np.abs(plain.tau) < 0.02).any() and ((tau == 0.0) | (tau >= 0.02)).all()
@@ -73,23 +72,6 @@ assert with_name.hardware.dead_band == 0.02
 
 def test_an_imperfection_is_five_files_of_the_package(tmp_path):
     """Motors with a dead band: no torque within it is held, and what is not within it stays."""
-    shutil.copytree(PACKAGE, tmp_path / "hapticclay", ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copytree(PACKAGE.parent / "mjcf", tmp_path / "mjcf")
-    for name, edits in EDITS.items():
-        file = tmp_path / "hapticclay" / name
-        text = file.read_text()
-        for old, new in edits:
-            assert old in text, (name, old)
-            text = text.replace(old, new)
-        file.write_text(text)
-    out = subprocess.run(
-        [sys.executable, "-c", RUN],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(tmp_path)},
-        capture_output=True,
-        text=True,
-    )
-    assert out.returncode == 0, out.stderr
-    assert "must be 'sampled'" in out.stdout or "must be None" in out.stdout, out.stdout
-    told = (PACKAGE.parent / "CONTRIBUTING.md").read_text()
-    assert all(f"`hapticclay/{name}`" in told or f"`{Path(name).name}`" in told for name in EDITS)
+    told = run_edited(tmp_path, EDITS, RUN)
+    assert "must be 'sampled'" in told or "must be None" in told, told
+    assert not missing_in("Add an imperfection of the hardware", EDITS)
