@@ -197,6 +197,11 @@ class Run:
         return self.row.s.i
 
     @property
+    def q(self) -> tuple[float, float]:
+        """Present angles of shoulder and elbow [rad]."""
+        return self.row.s.q1, self.row.s.q2
+
+    @property
     def filled(self) -> int:
         """Number of samples not judged yet."""
         return self.row.s.row
