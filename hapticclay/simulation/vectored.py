@@ -108,7 +108,8 @@ class VectoredRuns:
             scenario: what it runs from now on; None for what it was given last.
         """
         run = self.runs[k]
-        if scenario is None and not self.changed[k] and run.drives is None and not run.row.is_called:
+        is_alone = run.drives is not None or run.row.is_called
+        if scenario is None and not self.changed[k] and not is_alone:
             run.restart()
             run.scenario = self.given[k]
             run.push_evenly((0.0, *scene.steady_force(run.scenario), 0.0, 0.0))
