@@ -42,8 +42,10 @@ DIRECTIVES = {  # the arithmetic of C: whole numbers are no objects, nothing is 
     "wraparound": False,
     "initializedcheck": False,
 }
-# no rounding is left out; see kernel/probe.py
-FLAGS = ["/O2", "/fp:precise"] if os.name == "nt" else ["-O1", "-g0", "-ffp-contract=off"]
+# every rounding stays, and the order of sums; kernel/probe.py finds a compiler that does otherwise
+ROUNDED = ["-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"]
+GCC = ["-O3", "-g0", "-fno-semantic-interposition", *ROUNDED]
+FLAGS = ["/O2", "/fp:precise"] if os.name == "nt" else GCC
 FLAGS += os.environ.get("HAPTICCLAY_CFLAGS", "").split()
 LINKED = ["-Wl,-s"] if sys.platform == "linux" else []  # no names for debuggers
 LINKED += os.environ.get("HAPTICCLAY_LDFLAGS", "").split()

@@ -29,6 +29,7 @@ from . import (
     sampled_loop,
     scaling,
     stiffness,
+    study,
     throughput,
     work_precision,
     yielding_clay,
@@ -47,14 +48,10 @@ PARTS: dict[str, Any] = {
 }
 LIMITATIONS = (
     "Run times are those of one machine, named below, with other programs on it: compare numbers "
-    "within a table, not with those of another machine. Compilation is left out of all run times "
-    "but that of the first call.",
+    "within a table, not with those of another machine. Run times leave out imports, and the "
+    "compilation of SciPy's right-hand sides.",
     "All jobs are the planar arm of the paper in clay. Another arm, contact geometry or a larger "
     "model was not measured.",
-    "In single runs hapticclay makes the steps that cross a border or stop in Python, until a "
-    "process has made some 120 of one kind of scene (18,000, if their machine code is not stored "
-    "yet); from then on they are compiled. The tables of cuts, hits and sampled loops are those of "
-    "single runs; those of throughput are compiled throughout; that of yielding clay has both.",
     "The programs for the other packages are ours, written from the same equations "
     "(`benchmarks/peers`). Their authors might tune them better; a corrected program is welcome.",
     "Settings are a ladder of steps or tolerances. The best setting between two of them may be "
@@ -62,6 +59,11 @@ LIMITATIONS = (
     "Errors are those against a reference of limited accuracy, stated with each section. An error "
     "close to that accuracy is an upper bound.",
     "The real-time behaviour of an operating system, a bus or a device is not part of any number.",
+)
+PARTLY_IN_PYTHON = (  # said of figures of a release that left some steps to Python
+    "The release measured here made the first steps of a process that cross a border or stop in "
+    "Python. The tables of cuts, hits and sampled loops contain such steps; those of throughput "
+    "are compiled throughout; that of yielding clay has both."
 )
 BEGIN, END = "<!-- recommend: benchmarks/bench.py --readme -->", "<!-- end -->"
 
@@ -89,7 +91,10 @@ def page(data: dict[str, dict[str, Any]]) -> str:
     for name, found in data.items():
         text += PARTS[name].sections(found)
     omissions = [x for found in data.values() for x in found.get("omissions", ())]
-    text += ["## Limitations", "\n".join(f"- {x}" for x in LIMITATIONS)]
+    limitations = list(LIMITATIONS)
+    if any(study.is_of_both(found) for found in data.values()):
+        limitations.insert(2, PARTLY_IN_PYTHON)
+    text += ["## Limitations", "\n".join(f"- {x}" for x in limitations)]
     text += ["## Left out", "\n".join(f"- {x}" for x in omissions) or "Nothing.", "## Machine"]
     made: dict[tuple[str, ...], list[str]] = {}
     for name, found in data.items():

@@ -28,36 +28,9 @@ DISTRIBUTIONS = (
 
 
 def warm() -> None:
-    """Compile the loops, or load their machine code, before the clock runs."""
+    """Load the loops and make a run of each method before the clock runs."""
     for kind in ({}, {"integrator": "accurate"}, {"control": "sampled"}):
         hc.simulate(hc.free(t_max=0.01, **kind), engine="native")
-
-
-def warm_throughout(s: hc.Scenario) -> None:
-    """Compile all steps of runs like this one: those that cross borders or stop, too.
-
-    Args:
-        s: the scene.
-    """
-    from hapticclay.stepping import compiled
-
-    for are_compiled in (False, True):
-        compile_careful_steps(s, are_compiled)
-        compiled.warm(s)
-
-
-def compile_careful_steps(s: hc.Scenario, are_compiled: bool) -> None:
-    """Choose how the next run like this one makes the steps that cross a border or stop.
-
-    Args:
-        s: the scene.
-        are_compiled: as later in a process; else in Python, as its first ones, see
-            `compiled.enough`.
-    """
-    from hapticclay.stepping import compiled, machine_code, scene
-
-    kind = machine_code.kind_of(scene.parts_of(s))
-    compiled.met[kind] = int(compiled.enough(kind)) + 1 if are_compiled else 0
 
 
 def machine() -> list[str]:

@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from hapticclay.model.arm import PAPER, inverse_kinematics
+from hapticclay.formulas.arm import inverse_kinematics
+from hapticclay.kernel.engine import build, mujoco, warnings_caught
+from hapticclay.model.arm import PAPER
 from hapticclay.scene.scenario import Scenario
-from hapticclay.stepping.engine import build, mujoco, warnings_caught
 from hapticclay.views import film
 from hapticclay.views.stage import THICKNESS, picture_spec
 

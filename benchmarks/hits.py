@@ -25,12 +25,12 @@ from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
+from hapticclay.kernel import native
 from hapticclay.model.cells import Profile
 from hapticclay.model.clay import Clay, slab
 from hapticclay.model.constants import AXES, L1, L2, ORIGIN, TS
 from hapticclay.model.operator import Operator
 from hapticclay.scene.scenario import Scenario
-from hapticclay.simulation import engines
 from tests import oracles
 
 from . import common, reference
@@ -139,7 +139,7 @@ def row(kind: str, b: float, method: str, dt: float) -> dict[str, Any]:
 def methods() -> dict[str, tuple[float, ...]]:
     """Way to step -> dt [s], coarse to fine."""
     fast, accurate = (2e-2, 1e-2, 4e-3, 2e-3, 1e-3, TS, 1e-4), (4e-3, 2e-3, 1e-3, 5e-4)
-    if not engines.has_numba():
+    if not native.is_there():
         return {"fast": fast, "accurate": accurate}
     common.warm()
     return {"fast, native": (*fast, 3.6e-5, 1e-5), "accurate, native": (*accurate, 2.5e-4, 1.6e-4)}

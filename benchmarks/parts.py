@@ -21,11 +21,10 @@ import numpy as np
 from tabulate import tabulate
 
 import hapticclay as hc
+from hapticclay.kernel import engine, native
 from hapticclay.model.arm import PAPER
 from hapticclay.model.hardware import Coupling, Hardware
 from hapticclay.model.signals import Multisine
-from hapticclay.simulation import engines
-from hapticclay.stepping import engine
 from hapticclay.views import stage
 
 from . import common
@@ -189,10 +188,9 @@ def main(
         "engine": compare(list(models), lambda name: step(models[name], steps), rounds),
         "loop": compare(list(LOOP), lambda name: run(name, steps), rounds),
     }
-    if engines.has_numba():
+    if native.is_there():
         common.warm()
-        native = compare(list(LOOP), lambda name: run(name, 10 * steps, "native"), rounds)
-        found["native"] = native
+        found["native"] = compare(list(LOOP), lambda name: run(name, 10 * steps, "native"), rounds)
     return common.write(out, "parts", {"rounds": rounds, "steps": steps, **found})
 
 

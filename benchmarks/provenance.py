@@ -1,8 +1,8 @@
 """Which code a page's figures were measured on, and whether that code is still the one that ships.
 
 Figures of run time and error depend on how a run advances and on what a scene is, so a page is
-stale once `hapticclay/stepping`, `hapticclay/model` or a model in `mjcf/` computes something else.
-Comments, docstrings and layout compute nothing and do not count.
+stale once `formulas`, `model`, `kernel`, the runs of `simulation` or a model in `mjcf/` compute
+something else. Comments, docstrings and layout of Python files compute nothing and do not count.
 """
 
 from __future__ import annotations
@@ -17,7 +17,11 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
-MEASURED = ("hapticclay/model/*.py", "hapticclay/stepping/*.py", "mjcf/*")
+ROOMS = "formulas/*", "kernel/*", "model/*"
+RUNS = "many", "monitor", "one_run", "run", "vectored"  # of simulation
+FILES = (*(f"{room}.{kind}" for room in ROOMS for kind in ("py", "pxd", "pyx")),
+         *(f"simulation/{name}.py" for name in RUNS))  # fmt: skip
+MEASURED = (*(f"hapticclay/{file}" for file in FILES), "mjcf/*")
 UNKNOWN = "unknown"  # commit of a copy without history
 
 

@@ -18,8 +18,8 @@ exit status is 1 if any differ.
 Only public names (`import hapticclay as hc`) and the command line are used, because modules may
 move between releases. Where a public keyword changes its name or meaning, "One question, two
 releases" below is the only place to adapt. The command line is run with the very package that
-`import hapticclay` finds here. Bits can only agree on one machine, with the same numpy, SciPy,
-MuJoCo and numba. All questions take about three minutes on one core; --only chooses some by a
+`import hapticclay` finds here. Bits can only agree on one machine, with the same numpy, SciPy
+and MuJoCo. All questions take about three minutes on one core; --only chooses some by a
 regular expression, --list names them.
 """
 

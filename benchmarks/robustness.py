@@ -119,7 +119,7 @@ def measure(seeds: int, runs: int) -> list[dict[str, Any]]:
 def timed(runs: int) -> dict[str, Any]:
     """Time of many runs of the first case."""
     trials = replace(next(iter(cases().values()))[0], runs=runs)
-    hc.studies.monte_carlo(replace(trials, runs=20))  # loads and compiles
+    hc.studies.monte_carlo(replace(trials, runs=20))  # imports
     wall, spent = time.perf_counter(), time.process_time()
     found = hc.studies.monte_carlo(trials)
     wall, spent = time.perf_counter() - wall, time.process_time() - spent

@@ -102,7 +102,7 @@ def reference(s: hc.Scenario) -> tuple[np.ndarray, str]:
 
 
 def methods(s: hc.Scenario, times: np.ndarray, quick: bool) -> list[study.Method]:
-    """hapticclay's methods and those of the peers; a quick run compiles nothing."""
+    """hapticclay's methods and those of the peers; a quick run leaves compiled ones out."""
     from .peers import sampled_loop as peers
 
     steps = tuple(TS / n for n in PARTS)

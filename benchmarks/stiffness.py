@@ -18,8 +18,8 @@ import numpy as np
 from tabulate import tabulate
 
 import hapticclay as hc
+from hapticclay.kernel.engine import warnings_caught
 from hapticclay.model.constants import S
-from hapticclay.stepping.engine import warnings_caught
 
 from . import common, hits
 from .peers import mujoco_plain, ours

@@ -16,15 +16,15 @@ import numpy as np
 
 import hapticclay as hc
 from hapticclay import files
-from hapticclay.simulation import engines
+from hapticclay.kernel import native
 
 from . import common, diagrams, ranking
 from .turns import take_turns
 
 POSITION, UNIT = "position", "m"
 ERRORS = {POSITION: f"largest error of the handle position [{UNIT}]"}
-# ends of the names of our methods: whole steps compiled; those that cross a border or stop, too
-NATIVE, THROUGHOUT = ", native", ", native throughout"
+NATIVE = ", native"  # end of the name of a method that is compiled
+THROUGHOUT = ", native throughout"  # in figures of releases that left some steps to Python
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Problem:
         scene: as hapticclay solves it, but for its step.
         times: at which positions are compared, evenly spaced [s], (n,).
         reference: returns positions there [m], (n, 2), and the sentences on their own error.
-        methods: returns the ways to solve it; what they need compiled, it compiles.
+        methods: returns the ways to solve it; what they compile, it compiles first.
     """
 
     name: str
@@ -94,8 +94,6 @@ def ours(scene: hc.Scenario, times: np.ndarray, name: str, dt: float) -> Run:
     """
     integrator, _, how = name.partition(", ")
     s = replace(scene, dt=dt, integrator=integrator)
-    if how:
-        common.compile_careful_steps(s, name.endswith(THROUGHOUT))
     r = hc.simulate(s, engine="native" if how else "python")
     first, every = round(times[0] / dt), round((times[1] - times[0]) / dt)
     note = "" if r.outcome.code == "time limit" else r.status
@@ -105,20 +103,19 @@ def ours(scene: hc.Scenario, times: np.ndarray, name: str, dt: float) -> Run:
 def our_methods(
     scene: hc.Scenario, times: np.ndarray, ladders: dict[str, tuple[float, ...]]
 ) -> list[Method]:
-    """hapticclay's methods; those that are compiled, only where numba is there.
+    """hapticclay's methods; those that are compiled, only where the kernel is.
 
     Args:
         scene: of the problem.
         times: of the positions [s].
-        ladders: steps [s] by method: an integrator, then nothing, NATIVE or THROUGHOUT.
+        ladders: steps [s] by method: an integrator, then nothing or NATIVE.
     """
     out = []
+    if native.is_there():
+        common.warm()
     for name, steps in ladders.items():
-        integrator, _, how = name.partition(", ")
-        if how and not engines.has_numba():
+        if name.endswith(NATIVE) and not native.is_there():
             continue
-        if how:
-            common.warm_throughout(replace(scene, integrator=integrator, dt=steps[0]))
         solve = functools.partial(ours, scene, times, name)
         out.append(Method("hapticclay", name, steps, solve))
     return out
@@ -225,6 +222,11 @@ def shown(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return out
 
 
+def is_of_both(data: dict[str, Any]) -> bool:
+    """Whether figures tell runs that are compiled throughout from others."""
+    return any(str(r.get("method", "")).endswith(THROUGHOUT) for r in data.get("rows", ()))
+
+
 def sections(data: dict[str, Any]) -> list[str]:
     """The paragraphs of a part of the page, a section a problem."""
     text = []
@@ -235,9 +237,9 @@ def sections(data: dict[str, Any]) -> list[str]:
         single = [r for r in rows if not r["method"].endswith(THROUGHOUT)]
         if len(single) < len(rows):
             text += [
-                "hapticclay makes the first steps that cross a border or stop in Python: some 120 "
-                "of a kind of scene in each process, and some 18,000 where their machine code is "
-                "not stored yet. In such runs (methods without `throughout`):",
+                "The release measured here made the first steps of a process that cross a border "
+                "or stop in Python; later releases compile all steps ahead. Its runs with such "
+                "steps (methods without `throughout`):",
                 *ranked(single),
             ]
         text += [

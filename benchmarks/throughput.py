@@ -11,11 +11,9 @@ makes the page.
 from __future__ import annotations
 
 import dataclasses
-import os
 import statistics
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -27,8 +25,9 @@ from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay.files import atomic
+from hapticclay.kernel import native as kernel
 from hapticclay.model.constants import CLAY_X as CLAY
-from hapticclay.simulation import batch, engines
+from hapticclay.simulation import batch
 
 from . import common
 
@@ -86,23 +85,8 @@ def timed(function, *args, **kw) -> tuple[np.ndarray, Any]:
 
 
 def warm(todo: list[hc.Scenario]) -> None:
-    """Compiles all that runs like these may need, so that no timing has it in it."""
-    from hapticclay.stepping import scene
-
-    warm_together(todo)
-    for s in {scene.traits(s): s for s in todo}.values():
-        common.warm_throughout(s)
-
-
-def warm_together(todo: list[hc.Scenario]) -> None:
-    """Compiles what makes many runs like these together."""
-    from hapticclay.stepping import many
-
-    pool = batch.BatchPool(1)
-    for key, s in {many.kind_key(s): s for s in todo}.items():
-        if key is not None:
-            pool.many([s] * many.FEWEST, [key] * many.FEWEST)
-            batch.carried.add(pool.lane().patterns.of(key, s).kind)
+    """Imports, and loads the engine's model: a small batch before one that is timed."""
+    hc.simulate_batch(todo[: batch.MANY], keep="summaries")
 
 
 def native(scenario: hc.Scenario, steps: int) -> tuple[float, float, float]:
@@ -111,13 +95,12 @@ def native(scenario: hc.Scenario, steps: int) -> tuple[float, float, float]:
     One of a batch of summaries; one alone, from call to return, all samples recorded; none but the
     last.
     """
-    from hapticclay.stepping.compiled import KERNEL
 
     def bare() -> float:
         return steps * floor(scenario, steps, time.process_time)
 
     s, pool = lasting(scenario, steps), batch.BatchPool(1)
-    first, short, then = bare(), timed(pool.brief, s, KERNEL)[0][1], bare()
+    first, short, then = bare(), timed(pool.brief, s)[0][1], bare()
     whole = timed(hc.simulate, s, engine="native")[0][1]
     between = bare()
     thin = timed(hc.simulate, s, engine="native", every=1_000_000)[0][1]
@@ -133,12 +116,12 @@ def measure(rounds: int, steps: int) -> list[dict[str, float | str]]:
     rows: list[dict[str, float | str]] = []
     for name, scenario in SCENES.items():
         times = []
-        if engines.has_numba():
+        if kernel.is_there():
             warm([lasting(scenario, steps)])
         for _ in range(rounds):
             times.append((floor(scenario, steps), loop(scenario, steps)))
         compiled = (
-            [native(scenario, steps) for _ in range(OFTEN * rounds)] if engines.has_numba() else []
+            [native(scenario, steps) for _ in range(OFTEN * rounds)] if kernel.is_there() else []
         )
         rows.append(
             {
@@ -231,23 +214,18 @@ def batches(sizes: list[tuple[int, int]], rounds: int) -> list[dict[str, Any]]:
 
 
 def first_calls() -> dict[str, float]:
-    """Processor seconds of the first native call of a process, import of numba included:
-
-    uncached, cached.
-    """
+    """Processor seconds of a process up to its first record, and of a second run in it."""
     code = (
-        "import time, hapticclay as hc; s = hc.free(t_max=0.01); hc.simulate(s); a = "
-        "time.process_time(); "
-        "hc.simulate(s, engine='native'); print(time.process_time() - a)"
+        "import time, hapticclay as hc; s = hc.free(t_max=0.01); hc.simulate(s, engine='native'); "
+        "a = time.process_time(); hc.simulate(s, engine='native'); "
+        "print(a, time.process_time() - a)"
     )
-    with tempfile.TemporaryDirectory() as folder:
-        env = {**os.environ, "NUMBA_CACHE_DIR": folder}
-        run = [
-            subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, check=True)
-            for _ in range(3)
-        ]
-    first, *rest = (float(r.stdout) for r in run)
-    return {"uncached_s": first, "cached_s": min(rest)}
+    made = [
+        subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout
+        for _ in range(3)
+    ]
+    first, second = zip(*(map(float, x.split()) for x in made), strict=True)
+    return {"first_s": statistics.median(first), "second_s": statistics.median(second)}
 
 
 def memory() -> float | str:
@@ -404,8 +382,9 @@ def stability_map() -> dict[str, float]:
 
 
 TITLES = {
-    "first_call": "The first native call of a process, with the import of numba, in processor "
-    "seconds.",
+    "first_call": "The first native run of a process, imports included, in processor seconds. "
+    "Earlier releases compiled in it (uncached) or loaded what an earlier process had stored "
+    "(cached).",
     "rows": "The closed loop, every sample recorded, against the floor: a bare loop of `mj_step` "
     "in C with the same model, measured alternately; medians. On a busy machine the ratios are "
     "reliable, the microseconds are not.",
@@ -451,11 +430,11 @@ def main(
     """Measures, writes the data; returns it."""
     rounds, steps = rounds or (3 if quick else 7), steps or (5000 if quick else 20_000)
     data: dict[str, Any] = {"rounds": rounds, "steps": steps}
-    native = engines.has_numba()
-    if native and not quick:
+    compiled = kernel.is_there()
+    if compiled and not quick:
         data["first_call"] = [first_calls()]
     data["rows"] = measure(rounds, steps)
-    if native:
+    if compiled:
         sizes = [(64, 1000)] if quick else [(64, 1000), (1024, 1000), (64, LONG), (1024, LONG)]
         data["batch"] = batches(sizes + full * [(16384, LONG)], 1 if quick else min(rounds, 5))
         runs = SHORT_QUICK if quick else SHORT
@@ -464,7 +443,7 @@ def main(
         data["columns"] = [row for x in ("continuous", "sampled") for row in column_runs(sizes, x)]
         out.mkdir(parents=True, exist_ok=True)
         draw(data["columns"], out)
-    if native and full:
+    if compiled and full:
         data["linearity"] = linearity([1000, 10_000, 100_000], 200)
         data["map"] = [stability_map()]
     return common.write(out, "throughput", data)

@@ -103,13 +103,12 @@ def about(s: hc.Scenario) -> str:
 
 
 def methods(s: hc.Scenario, times: np.ndarray, quick: bool) -> list[study.Method]:
-    """hapticclay's methods and those of the peers; a quick run compiles nothing."""
+    """hapticclay's methods and those of the peers; a quick run leaves compiled ones out."""
     from .peers import yielding_clay as peers
 
     ladders = {"fast": FAST[:5], "accurate": ACCURATE[:3]}
     if not quick:
-        for end in (study.NATIVE, study.THROUGHOUT):
-            ladders |= {"fast" + end: FAST, "accurate" + end: ACCURATE}
+        ladders |= {"fast" + study.NATIVE: FAST, "accurate" + study.NATIVE: ACCURATE}
     return study.our_methods(s, times, ladders) + peers.methods(s, times, False if quick else None)
 
 

@@ -1,10 +1,8 @@
-"""The suite in parallel: who shares a worker, what runs alone, and which engine runs.
+"""The suite in parallel: who shares a worker, and what runs alone.
 
-Workers are processes of pytest-xdist. The tests of a file share a worker, and with it fixtures,
-runs and machine code; so do those of some files (TOGETHER). A test marked `perf` compares run
-times: while it runs, the other workers wait. Tests marked `plain` test steps in Python, or would
-compile a kind of scene for longer than Python takes: there `engine="auto"` takes no machine code.
-Tests marked `compiled` have long runs of one kind: there it takes machine code at once.
+Workers are processes of pytest-xdist. The tests of a file share a worker, and with it fixtures and
+runs; so do those of some files (TOGETHER). A test marked `perf` compares run times: while it runs,
+the other workers wait.
 """
 
 import contextlib
@@ -19,8 +17,6 @@ from hypothesis import settings
 os.environ.setdefault("MPLBACKEND", "agg")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: workers share the cores
 
-from hapticclay.simulation import batch, engines  # noqa: E402
-from hapticclay.stepping.notice import Notice  # noqa: E402
 from tests.hunt import EXAMPLES, HUNTS, MORE  # noqa: E402
 
 try:
@@ -41,13 +37,9 @@ settings.register_profile(
 settings.load_profile("default")
 HERE = Path(__file__).parent
 
-TOGETHER = {  # files that share a dear fixture, machine code or the processor's time for a screen
+TOGETHER = {  # files that share a dear fixture, or the processor's time for a screen
     "paper/test_ledger.py": "ledger",
     "paper/test_report.py": "ledger",
-    "simulation/test_batch.py": "batch",
-    "simulation/test_column_batch.py": "batch",
-    "simulation/test_simulation_batch.py": "step by step",
-    "simulation/test_stepwise.py": "step by step",
     "studies/test_impedance.py": "passivity",
     "studies/test_passivity_runs.py": "passivity",
     "studies/test_port_energy.py": "passivity",
@@ -55,11 +47,7 @@ TOGETHER = {  # files that share a dear fixture, machine code or the processor's
     "system/test_window.py": "screen",
 }
 # folders with long files have the first turns, lest one be the last
-LONG = ("system", "views", "stepping", "studies")
-PLAIN = {  # files whose tests are about steps in Python
-    "test_engine.py",
-    "test_interrupted.py",
-}
+LONG = ("system", "views", "kernel", "studies")
 
 
 def folder_turn(item):
@@ -75,8 +63,6 @@ def pytest_collection_modifyitems(items):
         file = item.path.relative_to(HERE).as_posix()
         group = TOGETHER.get(file, file)
         item.add_marker(pytest.mark.xdist_group(group))
-        if item.path.name in PLAIN:
-            item.add_marker(pytest.mark.plain)
         # xdist 3.8 appends the group to `_nodeid`, which pytest 9.2 no longer has
         if "PYTEST_XDIST_WORKER" in os.environ and not hasattr(item, "_nodeid"):
             item._id = type(item._id).parse(f"{item.nodeid}@{group}")
@@ -116,16 +102,6 @@ def pytest_runtest_protocol(item):
         return (yield)
 
 
-@pytest.fixture(autouse=True)
-def auto_engine(request, monkeypatch):
-    """What `engine="auto"` takes in a test that is marked."""
-    if request.node.get_closest_marker("plain"):
-        monkeypatch.setattr(engines, "repays", lambda kind, time: False)
-    elif request.node.get_closest_marker("compiled"):
-        for place, name in ((engines, "repays"), (batch, "outweighs")):
-            monkeypatch.setattr(place, name, lambda *kind_and_time: engines.has_numba())
-
-
 @pytest.fixture(scope="session")
 def paper_runs():
     """The runs behind the ledger, made once."""
@@ -140,10 +116,3 @@ def ledger_rows(paper_runs):
     from hapticclay.paper import claims
 
     return claims.ledger_rows(paper_runs)
-
-
-@pytest.fixture(autouse=True)
-def silent_compiler(request, monkeypatch):
-    """Without machine code on disk, too, stderr holds what a test is about, and no more."""
-    if request.path.name != "test_notice.py":
-        monkeypatch.setattr(Notice, "begin", lambda self: None)

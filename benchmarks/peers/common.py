@@ -13,7 +13,8 @@ from math import cos, sin
 import numpy as np
 
 from hapticclay import build, free
-from hapticclay.model.arm import PAPER, inverse_kinematics
+from hapticclay.formulas.arm import inverse_kinematics
+from hapticclay.model.arm import PAPER
 from hapticclay.model.constants import C_POLE, L1, L2, G, S
 
 from ..problems import EDGES, PROBLEMS, Result

@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 import hapticclay as hc
-from hapticclay.simulation import engines
+from hapticclay.kernel import native as kernel
 
 from ..common import warm
 from .common import PROBLEMS, Result
@@ -23,7 +23,7 @@ def methods() -> dict[str, list[float]]:
     accurate = [4e-3, 2e-3, 1e-3, 5e-4]
     sampled = [4e-3, 2e-3, 1e-3, 3.6e-4, 1e-4]
     native: dict[str, list[float]] = {}
-    if engines.has_numba():
+    if kernel.is_there():
         warm()  # before the clock runs
         native["fast, native"] = [*fast, 3.6e-5, 1e-5]
         native["accurate, native"] = [*accurate, 2.5e-4, 1.6e-4]

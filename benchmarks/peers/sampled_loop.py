@@ -22,7 +22,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import hapticclay as hc
-from hapticclay.model.arm import inverse_kinematics
+from hapticclay.formulas.arm import inverse_kinematics
 from hapticclay.model.constants import C_POLE, G
 from hapticclay.model.hardware import butterworth
 

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import hapticclay as hc
-from hapticclay.model.arm import inverse_kinematics
+from hapticclay.formulas.arm import inverse_kinematics
 from hapticclay.model.constants import C_POLE
 
 from ..study import Method, Run

@@ -6,7 +6,11 @@ from . import flow, numbers
 
 
 def slide(case):
-    """Direction in which a joint slides, 0 at rest."""
+    """Direction in which a joint slides, 0 at rest.
+
+    Args:
+        case: 0 at rest, 1 forwards, 2 backwards.
+    """
     return 0.0 if case == 0 else 1.0 if case == 1 else -1.0
 
 

@@ -37,9 +37,8 @@ class Controller:
     delay of the hardware. The next call receives the state. The law must render the clay itself,
     unless the scenario's `render` is "physical".
 
-    Compiled runs compile the function with numba if possible. Otherwise Python runs it, with
-    bit-identical results, and a line says so. Captured variables are frozen when the function is
-    compiled: values that change from call to call belong in the state.
+    Python runs it, in compiled runs too. Values that change from call to call belong in the state,
+    or a run cannot return to an earlier sample.
 
     Attributes:
         law: the function, or its name "package.module:name", imported when a run starts.
@@ -107,21 +106,17 @@ class LawCaller:
     Attributes:
         law: the function.
         error: exception of a failed call, after which the torques are not finite.
-        pointer: what machine code calls, where Python runs the law; else None.
-        called: what machine code calls, once it does.
     """
 
     def __init__(self, controller: Controller, buffer: Any):
         self.controller, self.law = controller, controller.function()
         self.buffer: Any = memoryview(buffer)
         self.error: BaseException | None = None
-        self.pointer: Any = None
-        self.called: Any = None
         self._returned = 0.0, 0.0
         self._ends = BUFFER + len(controller.state), BUFFER + 2 * len(controller.state)
 
-    def __call__(self, _desk: object = None) -> None:
-        try:  # machine code drops exceptions raised here: the run ends, and `check` raises them
+    def __call__(self, _buffer: object = None) -> None:
+        try:  # compiled code drops exceptions raised here: the run ends, and `check` raises them
             if self.error is None:
                 self._answer()
         except BaseException as error:
@@ -151,15 +146,13 @@ class LawCaller:
         return all(map(math.isfinite, self.buffer[TORQUE : TORQUE + 2].tolist()))
 
     def check(self) -> None:
-        """Raises LawFailed if a call has failed; a compiled law then leaves torques not finite.
+        """Raises LawFailed if a call has failed; it then leaves torques not finite.
 
         Exceptions that are not errors, such as Ctrl-C, are raised unchanged. Torques that are not
         finite end a run; at the first sample they raise LawFailed.
         """
         if self.error is None and not self.finite():
-            if self.pointer is None:
-                self()  # called in Python, which shows the cause
-            elif all(map(math.isfinite, self._returned)):
+            if all(map(math.isfinite, self._returned)):
                 self.error = KeyboardInterrupt()  # raised before the call could store it
             torques = tuple(self.buffer[TORQUE : TORQUE + 2].tolist())
             if self.error is None and self.buffer[0] <= 0.0:

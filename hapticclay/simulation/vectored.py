@@ -50,6 +50,7 @@ class VectoredRuns:
         self.states = np.zeros(n * native, layout.dtype_of(records.State))
         self.spares = [one(records.State) for _ in range(workers * native)]
         self.engines = np.zeros((workers, n), np.int64)  # addresses, by thread and run
+        self.kept: list[list[mover.Mover]] = [[] for _ in scenarios]  # what lies there
         places = [Place(self.movers[0]) for _ in scenarios]
         self.runs = [
             self._new(k, s, x) for k, (s, x) in enumerate(zip(scenarios, places, strict=True))
@@ -77,7 +78,8 @@ class VectoredRuns:
         self.force[k], self.gain[k] = s.force, s.gain
         self.looked_at[k], self.diverging[k] = -np.inf, False
         if self.engine == "native":
-            self.engines[:, k] = [x.of(s).row.ctypes.data for x in self.movers]
+            self.kept[k] = [x.of(s) for x in self.movers]
+            self.engines[:, k] = [x.row.ctypes.data for x in self.kept[k]]
         self.is_shown = False
 
     def _sync(self, k: int) -> Run:
@@ -91,7 +93,11 @@ class VectoredRuns:
         return run
 
     def scenario(self, k: int) -> Scenario:
-        """The scenario of a run, with all that is now in effect."""
+        """The scenario of a run, with all that is now in effect.
+
+        Args:
+            k: its index.
+        """
         return self._sync(k).scenario
 
     def restart(self, k: int, scenario: Scenario | None) -> None:
@@ -102,7 +108,8 @@ class VectoredRuns:
             scenario: what it runs from now on; None for what it was given last.
         """
         run = self.runs[k]
-        if scenario is None and not self.changed[k] and run.drives is None and not run.row.caller:
+        is_alone = run.drives is not None or run.row.is_called
+        if scenario is None and not self.changed[k] and not is_alone:
             run.restart()
             run.scenario = self.given[k]
             run.push_evenly((0.0, *scene.steady_force(run.scenario), 0.0, 0.0))
@@ -112,7 +119,12 @@ class VectoredRuns:
         self._begin(k)
 
     def change(self, k: int, change: Callable[[Scenario], Scenario]) -> None:
-        """Continues with other numbers, unless the run has ended."""
+        """Continues with other numbers, unless the run has ended.
+
+        Args:
+            k: its index.
+            change: the scenario with these numbers, from the present one.
+        """
         if self.over[k]:
             return
         run = self._sync(k)
@@ -121,7 +133,12 @@ class VectoredRuns:
         self.changed[k], self.is_shown = True, False
 
     def set_gain(self, which: np.ndarray, gain: np.ndarray) -> None:
-        """Continues with other gains, in runs that have not ended."""
+        """Continues with other gains, in runs that have not ended.
+
+        Args:
+            which: indices of the runs.
+            gain: K of each, shape (n, 2) [1/kg].
+        """
         other = (gain != self.gain[which]).any(axis=1) & ~self.over[which]
         which, gain = which[other], gain[other]
         self.gain[which], self.changed[which] = gain, True
@@ -137,7 +154,12 @@ class VectoredRuns:
     # ---- steps
 
     def push(self, which: np.ndarray, force: np.ndarray) -> None:
-        """Sets constant muscle forces."""
+        """Sets constant muscle forces.
+
+        Args:
+            which: indices of the runs.
+            force: of each, shape (n, 2) [N].
+        """
         other = (force != self.force[which]).any(axis=1)
         which, force = which[other], force[other]
         if not len(which):
@@ -169,7 +191,13 @@ class VectoredRuns:
         for k in which[alone].tolist() if self.engine == "native" else which.tolist():
             self._one(k, n)
         if self.engine == "native":
+            self._draw(which[~alone], n)
             self._together(which[~alone], n)
+
+    def _draw(self, which: np.ndarray, n: int) -> None:
+        """Draws what the hardware of runs leaves to chance in the next n steps."""
+        for k in which[self.models["chance"][which] != 0].tolist():
+            self.runs[k].draw(n)
 
     def _one(self, k: int, n: int) -> None:
         """Advances a run for which something is to be prepared, or in Python."""
@@ -248,6 +276,7 @@ class VectoredRuns:
             for k in live[alone].tolist() if self.engine == "native" else live.tolist():
                 self.shown[k] = self.runs[k].ahead()
             if self.engine == "native" and not alone.all():
+                self._draw(live[~alone], 1)
                 self._call(self._peek, live[~alone])
                 self._put_force(live[~alone])
             self.is_shown = True
@@ -263,7 +292,12 @@ class VectoredRuns:
             self.runs[k]._with_force(shown[k])
 
     def torque_reached(self, n: int, k: int) -> np.ndarray:
-        """As `run.torque_reached`, in the last rows of each run, shape (runs, 2)."""
+        """As `run.torque_reached`, in the last rows of each run, shape (runs, 2).
+
+        Args:
+            n: number of rows, at most.
+            k: how many reach it.
+        """
         pairs = [(run.place.buffers.rows, run.filled) for run in self.runs]
         return np.array([torque_reached(rows[max(i - n, 0) : i], k) for rows, i in pairs])
 

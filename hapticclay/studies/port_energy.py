@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..errors import Bound, ParameterError, check_fields, integer, number, numbers_of
-from ..model import hardware
+from ..formulas import hardware
 from ..model.samples import Samples
 from ..model.spring import STIFFNESS_MAX
 from ..scene.scenario import Scenario

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -27,6 +28,7 @@ from .linear_loop import LinearLoop
 PHASE_STEP = 1.01  # the frequency grid grows by this factor ...
 NEAR_AXIS = 10.0 ** np.arange(-9.0, 0.0, 0.25)  # ... and closes in on every resonance
 SAME_FREQUENCY = 1e-10  # of a pole's: a crossing as near belongs to K = 0
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 LOWEST = -200.0  # logarithm of the least frequency of a search
 MOST_TURNS = 100_000  # points that follow the turns of a delay
 LEAST_GAIN = 1e-60  # no pole crosses at a lower gain, and products of such numbers underflow
@@ -134,7 +136,8 @@ def gain_crossings(loop: LoopFamily) -> list[tuple[float, float]]:
 
     def phase_sine(x: np.ndarray) -> np.ndarray:
         z = loop.h(np.exp(x))
-        return z.imag / np.abs(z)
+        size = np.abs(z)
+        return np.divide(z.imag, size, out=np.zeros(len(x)), where=(size > 0.0) & (size < np.inf))
 
     z = loop.h(loop.grid)
     if not np.any(z):  # the compensator has no input
@@ -146,7 +149,7 @@ def gain_crossings(loop: LoopFamily) -> list[tuple[float, float]]:
     for i in range(len(beyond)):
         x, y = np.log(grid[piece == i]), z[piece == i]
         found += _zeros(phase_sine, x, y.imag / np.abs(y), y.real > 0.0)
-    omega = np.array([*found, *loop.ends])
+    omega = np.array([*found, *loop.ends], dtype=float)
     size = loop.h(omega).real
     kept = size > loop.rounding(omega)
     for pole in loop.poles:
@@ -211,11 +214,16 @@ def _zeros(
 def _bottoms(
     f: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
-    """Where f is least between low and high, each element for itself, by thirds."""
-    for _ in range(40):
-        third = (high - low) / 3.0
-        left = f(low + third) < f(high - third)
-        low, high = np.where(left, low, low + third), np.where(left, high - third, high)
+    """Where f is least between low and high, each element for itself, by golden sections."""
+    at = np.array([high - GOLDEN * (high - low), low + GOLDEN * (high - low)])
+    y = np.array([f(at[0]), f(at[1])])
+    for _ in range(34):  # to 1e-7 of the width
+        left = y[0] < y[1]
+        low, high = np.where(left, low, at[0]), np.where(left, at[1], high)
+        new = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
+        at = np.where(left, [new, at[0]], [at[1], new])
+        value = f(new)
+        y = np.where(left, [value, y[0]], [y[1], value])
     return 0.5 * (low + high)
 
 
@@ -227,7 +235,7 @@ def _bracketed(
     Where f has one sign at both ends, up to rounding, the zero is the end nearer to it.
     """
     out = np.array(low)
-    active = np.arange(len(low))
+    active: Any = np.arange(len(low))
     a, b, c, t = high, low, low, np.full(len(low), 0.5)
     fa, fb = (f(a), f(b)) if len(a) else (a, b)
     fc = fb
@@ -405,9 +413,9 @@ def sampled_loop(loop: LinearLoop) -> LoopFamily:
 
     z1 = eigenvalues(free).astype(complex)
     resonances = np.log1p(z1[np.abs(1.0 + z1) > 1e-6]) / Ts
-    slow = sum(linear_loop.delayed_servo(loop, rational))
+    physical, motors = linear_loop.delayed_servo(loop, rational)
     resonances = np.concatenate(
-        (resonances, exact_roots.approximate_roots(slow), roots.nonzero_roots(t))
+        (resonances, exact_roots.approximate_roots(physical + motors), roots.nonzero_roots(t))
     )
     resonances = resonances[resonances != 0.0]
     top = np.pi / Ts

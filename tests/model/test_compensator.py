@@ -2,7 +2,6 @@
 
 import math
 from decimal import Decimal
-from types import SimpleNamespace
 
 import control
 import numpy as np
@@ -14,9 +13,10 @@ from scipy.linalg import expm
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
+from hapticclay.formulas import compensator as formula
+from hapticclay.kernel import records, servo
 from hapticclay.model import compensator
 from hapticclay.model.compensator import ORDER, Compensator
-from hapticclay.stepping import servo
 
 EPS = np.finfo(float).eps
 OMEGA = np.logspace(-2, 5, 40)
@@ -316,18 +316,25 @@ def test_numbers_for_the_loops_are_the_realisation_and_zeros(c):
     for own, all_of_it in ((A, a[:n, :n]), (B, b[:n]), (C, out[:n])):
         np.testing.assert_array_equal(own, all_of_it)
     assert form[24] == D and not a[n:].any() and not a[:, n:].any()
-    assert len(form) == compensator.FORM and not b[n:].any() and not out[n:].any()
+    assert len(form) == formula.FORM and not b[n:].any() and not out[n:].any()
 
 
 # ---- how a step carries its states
 
 
+def formed(numbers, order):
+    """A model with gains of 1 and the numbers of both compensators."""
+    m = records.Model()
+    m.formed, m.order, m.form[:], m.x.K, m.y.K = 1, order, numbers, 1.0, 1.0
+    return m
+
+
 def held(form, n, i, h):
     """Phi and Gamma of `exponential`, of the whole size, begun at a place that is not 0."""
-    e = [math.nan] * compensator.WORK
+    e = [math.nan] * formula.WORK
     for j in range(40):
         e[j] = 0.0
-    compensator.exponential(form, n, i, h, e, 20)
+    formula.exponential(form, n, i, h, e, 20)
     assert not any(e[:20])
     return np.array(e[20:36]).reshape(ORDER, ORDER), np.array(e[36:40])
 
@@ -424,9 +431,6 @@ def test_a_kick_shows_the_output_at_its_sample_and_ends_half_a_step_later(c, bef
     after, f, n = share * before, x[4], c.order
     other = Compensator((1.0, 3.0), (1.0, 2.0))
     form = compensator.form_numbers(other) + compensator.form_numbers(c)
-    kick, work = [0.0] * (2 * compensator.KICK), [0.0] * compensator.WORK
-    for i in (0, 1):
-        compensator.form_kick(form, max(n, 1), i, before, after, work, kick)
     z = list(x[:n]) + [0.0] * (ORDER - n)
     _, B, C, D = c.state_space()
     held_force, early, whole = (f, 0.0, 0.0) if before == after else (0.0, after, before + after)
@@ -434,12 +438,14 @@ def test_a_kick_shows_the_output_at_its_sample_and_ends_half_a_step_later(c, bef
     kicked = at[:n] + 0.5 * whole * B * f
     end = expm(augmented(c, 0.5 * after)) @ (*kicked, held_force)
     at[:n] += 0.5 * early * B * f
-    part = SimpleNamespace(kick=kick, gain=(1.0, 1.0))
-    shown, feed = servo.shown_axis(part, 1, z)
-    shown += feed * f
+    m, s, k = formed(form, max(n, 1)), records.State(), records.Kick()
+    s.y.z[:], k.y.net, k.before, k.after = z, f, before, after
+    servo.output(m, s, k)
+    shown = k.y.delta + k.y.feed * f
     scale = np.abs(C).sum() + abs(D)
     assert shown == pytest.approx(C @ at[:n] + D * f, abs=1e-11 * scale * (1 + np.abs(at).max()))
-    z = servo.state_after(part, 1, z, f)
+    servo.states_behind(m, s, k, 1)
+    z = k.y.z
     bound = 1e-11 * (1 + np.abs(end).max())
     np.testing.assert_allclose(z[:n], end[:n], atol=bound)
     assert not any(z[n:])
@@ -454,10 +460,10 @@ def test_four_stages_are_a_step_of_runge_kutta(c, x):
     M = augmented(c, h)
     out = sum(np.linalg.matrix_power(M, k) / math.factorial(k) for k in range(5)) @ (*x[:n], f)
     start = z = np.array(list(x[:n]) + [0.0] * (ORDER - n))
-    numbers = [0.0] * compensator.FORM + compensator.form_numbers(c)
-    part, end = SimpleNamespace(numbers=numbers, gain=(1.0, 1.0)), start
+    numbers = [0.0] * formula.FORM + compensator.form_numbers(c)
+    m, rate, end = formed(numbers, n), np.empty(4), start
     for weight, ahead in ((1.0, 0.5 * h), (2.0, 0.5 * h), (2.0, h), (1.0, 0.0)):
-        rate = np.array(servo.form_rates(part, 1, z, f))
+        servo.state_rates(m, 1, z, f, rate)
         end, z = end + h / 6.0 * weight * rate, start + ahead * rate
     np.testing.assert_allclose(end[:n], out[:n], atol=1e-13 * (1 + np.abs(out).max()))
 

@@ -12,6 +12,7 @@ from scipy.integrate import quad
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
+from hapticclay.formulas import pieces as formula
 from hapticclay.model import pieces
 from hapticclay.model.signals import Multisine
 
@@ -173,11 +174,11 @@ def test_sums_and_the_loops_table_say_the_same(cases, t, h):
     wave = -2.0 * hc.Multisine((1.0, 0.5), seed=3)
     want = sum([case[0].mean(t, h) for case in cases], wave.mean(t, h))
     np.testing.assert_allclose(signal.mean(t, h), want, rtol=1e-12, atol=1e-12)
-    table = pieces.loop_table(signal.cosines, signal.pieces(0.0, 4.096, 1e-3), 1e-9)
+    table = pieces.loop_table(signal.cosines, signal.pieces(0.0, 4.096, 1e-3), 1e-9).ravel()
     # (2 pi 30 Hz 0.5 ms)^4/2000 of 20 in a value, next to none in a mean
-    np.testing.assert_allclose(pieces.mean_of_table(table, t, h), want, rtol=1e-9, atol=1e-8)
+    np.testing.assert_allclose(formula.mean_of_table(table, t, h), want, rtol=1e-9, atol=1e-8)
     if all(abs(t - x) > 1e-6 for case in cases for x in case[2]):
-        value = pieces.mean_of_table(table, t, 0.0)
+        value = formula.mean_of_table(table, t, 0.0)
         np.testing.assert_allclose(value, signal(t), rtol=1e-6, atol=2e-6)
 
 

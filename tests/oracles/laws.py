@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from hapticclay.model import arm
+from hapticclay.formulas import arm
 
 
 def trapezoid(rate, H, L, R):

@@ -1,7 +1,7 @@
 """The paper's sampled controller as a law of the user's own, typed out from Eqs. 14 to 20.
 
 One formula a line, in the order of docs/equations.md, so that its numbers are those of the
-built-in controller to the last bit. Numba compiles it.
+built-in controller to the last bit.
 """
 
 from math import cos, sin

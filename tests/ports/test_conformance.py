@@ -13,7 +13,7 @@ from websockets.exceptions import ConnectionClosed
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model.arm import inverse_kinematics, jacobian, joint_torques
+from hapticclay.formulas.arm import inverse_kinematics, jacobian, joint_torques
 from hapticclay.model.constants import NOMINAL
 from hapticclay.ports import ButtonScript, Inverse3, Trajectory, serve
 from hapticclay.ports.driven_arm import TARGET_STIFFNESS

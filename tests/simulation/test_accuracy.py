@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from benchmarks import hits, reference
 from hapticclay.errors import ParameterError
+from hapticclay.kernel import native
 from hapticclay.model.cells import Profile
 from hapticclay.model.clay import Clay
 from hapticclay.model.constants import AXES, ORIGIN, TORQUE_LIMIT
@@ -93,7 +94,8 @@ def test_errors_are_as_small_as_asked_and_estimates_are_true():
     Estimates lie within a factor of 3 of the truth in as many; the others are hits whose order no
     step shows. Scenes without a crossing, or unstable, have no estimate, and say so.
     """
-    pytest.importorskip("numba")
+    if not native.is_there():
+        pytest.skip("needs the compiled kernel")
     found, n = [], 100 if HUNTS else 40
 
     @settings(max_examples=n)

@@ -8,7 +8,6 @@ import pytest
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.simulation import column_batch
-from hapticclay.stepping.many import FEWEST
 from tests.simulation.test_stepwise import fast
 
 RICH = hc.Hardware(
@@ -44,16 +43,10 @@ def assert_same(got, want):
         assert np.array_equal(*both, equal_nan=want.dtype[name].base.kind == "f"), name
 
 
-def repay(self, key, jobs):
-    """In place of Plan._repay: all runs but a few of a kind are made together."""
-    return len(jobs) >= FEWEST
-
-
 @fast
 @pytest.mark.parametrize("base", [SHORT, SAMPLED], ids=["continuous", "sampled"])
 def test_columns_give_the_bits_of_scenarios(base, monkeypatch):
     monkeypatch.setattr(column_batch, "PART", 20 * base.t_max / base.dt)  # several parts
-    monkeypatch.setattr(column_batch.batch.Plan, "_repay", repay)
     given = columns()
     if base.hardware:
         given["hardware.delay"] = np.random.default_rng(1).uniform(0.0, 1e-3, N)
@@ -63,8 +56,7 @@ def test_columns_give_the_bits_of_scenarios(base, monkeypatch):
 
 
 @fast
-def test_clay_that_is_stiffer_for_some_rows(monkeypatch):
-    monkeypatch.setattr(column_batch.batch.Plan, "_repay", repay)
+def test_clay_that_is_stiffer_for_some_rows():
     base = replace(SHORT, start=(0.051, 0.0))
     b = np.concatenate([np.geomspace(90.0, 2e3, N // 2), np.geomspace(4e3, 1e5, N - N // 2)])
     given = {"clay.x.values.1": b, "clay.y.values.1": np.where(np.arange(N) % 7, 90.0, b)}
@@ -74,7 +66,6 @@ def test_clay_that_is_stiffer_for_some_rows(monkeypatch):
     assert_same(hc.simulate_columns(base, given), by_objects(base, given))
 
 
-@pytest.mark.plain
 def test_other_fields_vary_with_a_scenario_each():
     given = {"arm.l1": np.linspace(0.25, 0.3, N), "force.x": np.linspace(1.0, 2.0, N)}
     assert not column_batch.Columns(SHORT, given).is_plain
@@ -102,7 +93,6 @@ def test_bad_columns_are_refused_at_the_door(field, given, monkeypatch):
     assert error.value.field == field
 
 
-@pytest.mark.plain
 def test_what_a_scenario_refuses_is_told_with_its_row():
     with pytest.raises(ParameterError, match=r"hardware.delay\[1\]"):  # 100 samples, before a run
         column_batch.Columns(SAMPLED, {"hardware.delay": [1e-3, 0.9]})

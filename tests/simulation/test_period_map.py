@@ -13,6 +13,7 @@ from hapticclay.studies import growth
 from hapticclay.studies.boundary import PushedLoop, pose_matrix
 from tests.hunt import some
 from tests.oracles.sampled_wall import sample_map
+from tests.simulation.test_stepwise import fast
 
 HAND = hc.Operator(0.4, 5.0, 80.0)
 LEAD = hc.Compensator((1.0, 20.0), (1.0, 60.0, 0.0))
@@ -49,10 +50,10 @@ def scene_of(base):
     return base.scenario(1.0, push=1e-3, steps=16)
 
 
-def map_of(scenario, compiled=False, i=0):
+def map_of(scenario, engine="python", i=0):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(period_map, "repays", lambda *arguments: compiled)
-        return period_map.PeriodMaps(1).of(scenario, i)
+        patch.setattr(period_map, "engine_for", lambda asked: engine)
+        return period_map.PeriodMaps().of(scenario, i)
 
 
 def rates(loop):
@@ -106,10 +107,11 @@ def test_the_map_of_any_sampled_loop_has_its_eigenvalues(K, b, hand, pose, delay
         assert np.abs(found - z).min() < 1e-4
 
 
+@fast
 @pytest.mark.parametrize("base", some([LOOPS["stiff"], LOOPS["late"], WALLS["window"]], 2))
 def test_compiled_steps_give_the_same_bits(base):
     s = scene_of(base)
-    plain, compiled = map_of(s), map_of(s, compiled=True)
+    plain, compiled = map_of(s), map_of(s, "native")
     for name, x in plain._asdict().items():
         assert np.array_equal(x, getattr(compiled, name)), name
 
@@ -125,7 +127,7 @@ def test_coordinates_that_do_not_act_on_the_axis_are_left_out():
 
 
 def test_one_scene_does_not_decide_what_acts_in_the_next():
-    maps = period_map.PeriodMaps(1)
+    maps = period_map.PeriodMaps()
     straight = scene_of(replace(LOOPS["at another pose"], pose=(0.0, 0.0)))
     maps.of(straight, 0)
     found = maps.of(scene_of(LOOPS["at another pose"]), 0)
@@ -135,7 +137,7 @@ def test_one_scene_does_not_decide_what_acts_in_the_next():
 
 
 def test_scenes_of_one_kind_may_differ_in_their_steps_and_delays():
-    wall, maps = WALLS["two samples late"], period_map.PeriodMaps(1)
+    wall, maps = WALLS["two samples late"], period_map.PeriodMaps()
     for steps, late in ((16, 2.0), (4, 0.5), (50, 3.2)):
         s = replace(wall, delay=late * wall.Ts).scenario(1.0, steps=steps)
         found, alone = maps.of(s, 0), map_of(s)

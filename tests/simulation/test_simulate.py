@@ -317,7 +317,6 @@ def test_runs_are_repeatable_bit_for_bit():
 
 
 @pytest.mark.perf
-@pytest.mark.plain
 def test_speed_is_a_small_multiple_of_the_bare_engine():
     """A guard, not the measurement: benchmarks/throughput.py measures 24."""
     from benchmarks import throughput

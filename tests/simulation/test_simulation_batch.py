@@ -7,12 +7,11 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.simulation import vectored
+from hapticclay.kernel import native
 from hapticclay.simulation.stepwise import Sample
 from tests.hunt import some
 from tests.simulation.test_stepwise import CUT, HARD, HELD, SCENES, fast
 
-pytestmark = pytest.mark.plain
 SAMPLED = replace(CUT, control="sampled", Ts=7.2e-4)
 YIELDS = replace(CUT, clay=hc.slab(hc.Flow(Fy=0.5, K=2.0, n=0.5), 0.001, 0.02))
 SOFT = hc.Groove((-0.03, 0.07), (-0.03, 0.03), 5e3, cells=(100, 60), tool=hc.Tool(0.01, 0.005))
@@ -69,36 +68,34 @@ def test_compiled_runs_of_one_kind_are_those_of_simulations(name):
     scenes = 2 * KINDS[name]
     single = [hc.Simulation(s, engine="python") for s in scenes]
     with hc.SimulationBatch(scenes, engine="native", workers=2) as batch:
-        assert all(v is batch._runs.of[0] is not None for v in batch._runs.of)
         go_on(batch, single, 1, 14, 40)
 
 
 @fast
-@pytest.mark.parametrize("loads", [True, False])
-def test_runs_are_compiled_where_this_pays_and_the_compiler_loads(loads, monkeypatch):
-    monkeypatch.setattr(vectored, "repay", lambda run, steps: steps > 100.0)
-    if not loads:
-        monkeypatch.setattr(vectored, "load_compiled", lambda: None)
+@pytest.mark.parametrize("there", [True, False])
+def test_a_batch_is_compiled_where_there_is_a_kernel(there, monkeypatch):
+    if not there:
+        monkeypatch.setattr(native, "why_not", lambda: "it is not built")
     scenes = KINDS["operator"]
     single = [hc.Simulation(s, engine="python") for s in scenes]
     with hc.SimulationBatch(scenes) as batch:
+        assert {run.row.engine for run in batch._runs.runs} == {"native" if there else "python"}
         go_on(batch, single, 3, 9, 1200)
-        assert [v is not None for v in batch._runs.of] == [loads] * 2
 
 
 @fast
-def test_kinds_that_no_run_has_are_let_go():
-    """As of an arm that is drawn anew at each reset."""
-    scene = HELD
-    with hc.SimulationBatch([scene] * 2, engine="native") as batch:
+def test_more_arms_than_a_batch_keeps():
+    """Of each run its own: some are drawn anew at a reset, and two threads make steps."""
+    scenes = [replace(HELD, arm=hc.Arm(l1=0.25 + 1e-4 * k)) for k in range(24)]
+    with hc.SimulationBatch(scenes, engine="native", workers=2) as batch:
         for k in range(40):
-            batch.reset(0, replace(scene, arm=hc.Arm(l1=0.25 + 1e-4 * k)))
-        assert len(batch._runs.vectors) <= 16
-        batch.advance(40)
+            batch.reset(k % 7, replace(HELD, arm=hc.Arm(l1=0.26 + 1e-4 * k)))
         single = [hc.Simulation(s, engine="python") for s in batch.scenarios]
-        for sim in single:
-            sim.advance(40)
-        assert_alike(batch, single)
+        for n in (40, 1):
+            batch.advance(n)
+            for sim in single:
+                sim.advance(n)
+            assert_alike(batch, single)
 
 
 @fast

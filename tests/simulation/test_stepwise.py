@@ -10,12 +10,9 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.simulation import stepwise
-from hapticclay.simulation.engines import has_numba
-from hapticclay.stepping.run import PLAIN
+from hapticclay.kernel import native
 
-pytestmark = pytest.mark.plain
-fast = pytest.mark.skipif(not has_numba(), reason="needs numba: pip install hapticclay[fast]")
+fast = pytest.mark.skipif(not native.is_there(), reason="needs the compiled kernel")
 CUT = hc.constant_cut(clay=(0.01, 0.02), length=0.03)
 HELD = replace(CUT, operator=hc.Operator())
 HARD = hc.Hardware(
@@ -216,31 +213,12 @@ def visited(sim):
 def test_compiled_steps_give_the_same_bits(s):
     s = replace(s, t_max=2.0, length=None)
     found = []
-    for engine in ("python", "native", "native"):  # the last finds its code ready
+    for engine in ("python", "native"):
         with hc.Simulation(s, engine=engine) as sim:
             found.append(visited(sim))
-    (want, told), *others = found
-    for got, seen in others:
-        same(want, got)
-        assert np.array_equal(told, seen, equal_nan=True)
-
-
-@fast
-@pytest.mark.parametrize(
-    "s", [replace(HELD, length=0.012), replace(HELD, t_max=0.3)], ids=["to a place", "to a time"]
-)
-def test_a_run_that_is_compiled_where_this_pays_goes_on_to_the_same_end(s, monkeypatch):
-    asked = []
-    monkeypatch.setattr(stepwise, "TOLD", 300)
-    monkeypatch.setattr(stepwise, "repay", lambda run, steps: asked.append(steps) or True)
-    with hc.Simulation(s) as sim, hc.Simulation(s, engine="python") as plain:
-        while plain.outcome is None:
-            for each in (sim, plain):
-                each.advance(120, force=(2.0, 0.1))
-            np.testing.assert_array_equal(sim.numbers(), plain.numbers())
-            assert (sim._run.kernel is not PLAIN) == bool(asked)
-        assert len(asked) == 1 and asked[0] == 360
-        same(sim.record(), plain.record())
+    (want, told), (got, seen) = found
+    same(want, got)
+    assert np.array_equal(told, seen, equal_nan=True)
 
 
 def held(sim, n, force):

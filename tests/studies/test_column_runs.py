@@ -14,7 +14,6 @@ from hapticclay.studies.column_runs import ColumnRuns, run_columns
 from hapticclay.studies.sweep_store import read_sweep
 
 pytest.importorskip("pyarrow")
-pytestmark = pytest.mark.plain
 BASE = replace(hc.constant_cut(operator=hc.Operator()), length=None, t_max=0.004)
 HANDS = {"operator.mass": np.linspace(0.1, 1.0, 13), "force.x": np.linspace(4.0, 1.0, 13)}
 

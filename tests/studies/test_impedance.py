@@ -33,7 +33,6 @@ CLOSE = 3e-4
     ],
     ids=["continuous-held", "sampled-free", "late-held", "late-free", "physical-held"],
 )
-@pytest.mark.compiled
 def test_the_arm_feels_as_computed(parts, operator):
     found = measure_impedance(PushedLoop(operator=operator, **parts), lines=12, period=2.0)
     assert found.measured.frequency[[0, -1]] == pytest.approx([0.5, 30.0])
@@ -52,7 +51,6 @@ def test_the_arm_feels_as_computed(parts, operator):
         hc.VirtualWall(100.0, 1.0, -0.02, DEVICE, Ts=4e-3, velocity="exact"),
     ],
 )
-@pytest.mark.compiled
 def test_a_wall_feels_as_computed(wall):
     found = measure_impedance(wall, lines=12, period=2.0)
     assert found.gap < CLOSE
@@ -71,7 +69,6 @@ def test_the_gap_is_that_of_the_engines_steps():
     assert gap > 0.05 > found.gap
 
 
-@pytest.mark.compiled
 def test_friction_is_measured_and_noted():
     """Friction of 4 fc/(pi v) (describing function) adds damping; theory leaves it out."""
     rough = hc.VirtualWall(300.0, 2.0, device=hc.Device(0.1, 0.5, friction=0.002), operator=TH)

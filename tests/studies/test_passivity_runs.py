@@ -50,7 +50,6 @@ def test_sines_find_the_real_part_of_the_impedance(index):
     assert (index.damping >= index.index - 1e-9).all()  # one sine is never the worst hand
 
 
-@pytest.mark.compiled
 def test_late_damped_walls_too():
     """A delay of half a sample: the damper is lowered until its worst path takes nothing."""
     wall = replace(WALL, K=500.0, B=0.2, delay=0.5e-3)
@@ -59,7 +58,6 @@ def test_late_damped_walls_too():
     np.testing.assert_allclose(found.worst, hc.walls.passivity_index(wall, edge), rtol=0.01)
 
 
-@pytest.mark.compiled
 def test_arm_is_passive_on_x_and_active_on_y():
     for axis, K, sign in (("x", 1.0, 1.0), ("y", 0.5, -1.0)):
         found = study.arm_index(hc.constant_cut(), axis)

@@ -39,7 +39,6 @@ def test_the_path_is_imposed_and_its_energy_is_that_of_the_derivation():
         dict(device=hc.Device(0.1, 2.0), B=1.5, velocity_filter=50.0),
     ],
 )
-@pytest.mark.compiled
 def test_runs_are_passive_up_to_the_line_of_colgate_and_schenkel(parts):
     wall = hc.VirtualWall(**parts)
     # the slowest path is at pi/48, where the limit of slow paths is short of by 0.4 % at most

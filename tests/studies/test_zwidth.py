@@ -148,7 +148,6 @@ def test_friction_outweighs_the_encoder_up_to_the_limit_of_abbott_and_okamura():
     assert come_to_rest(above, Press(still=1e-4)) == [True]
 
 
-@pytest.mark.compiled
 def test_a_buzz_without_friction_is_that_of_a_relay():
     # Half a quantum off, the encoder is a relay of K Delta/2; mass, damper and hold make it swing
     # at the omega where their phases add to half a turn. That is its describing function, with the
@@ -172,7 +171,6 @@ def test_a_buzz_without_friction_is_that_of_a_relay():
 
 
 @pytest.mark.usefixtures("few_points")
-@pytest.mark.compiled
 def test_rest_is_the_verdict_of_loops_that_are_not_linear():
     r = zwidth(replace(ROUGH, delay=1e-3), B=(2.0,), press=Press(still=1e-4)).regions[0]
     assert r.verdict == BY_REST and not r.linear and math.isnan(r.gap())
@@ -182,7 +180,6 @@ def test_rest_is_the_verdict_of_loops_that_are_not_linear():
     assert come_to_rest(walls) == [True, False]
 
 
-@pytest.mark.compiled
 def test_friction_holds_more_than_the_linear_loop():
     dry = replace(BARE, device=hc.Device(0.1, 0.5, friction=0.02))
     r = zwidth(dry, B=(0.5,)).regions[0]

@@ -299,7 +299,7 @@ def test_the_page_of_a_study_says_who_leads_and_how_single_runs_fare():
         row("SciPy", "LSODA", "0.1, 0.001", 1e-5, 2.5),
     ]
     text = "\n".join(study.sections({"texts": {"p q": ["about", "told"]}, "rows": rows}))
-    both, single = text.split("hapticclay makes the first steps")
+    both, single = text.split("The release measured here made the first steps")
     assert "by requested error: hapticclay at 1e-02 to 1e-06 m; SciPy at 1e-07 m." in both
     assert "by requested error: SciPy at 1e-02 to 1e-07 m." in single
     assert "Only SciPy went below the 1.0e-06 m of hapticclay." in text and "(p_q.png)" in text
@@ -405,8 +405,8 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
     assert page == bench.page(data) and all(c.name in page for c in some)
 
 
-def test_a_page_is_stale_once_stepping_computes_something_else(tmp_path):
-    package = tmp_path / "hapticclay" / "stepping"
+def test_a_page_is_stale_once_the_kernel_computes_something_else(tmp_path):
+    package = tmp_path / "hapticclay" / "kernel"
     package.mkdir(parents=True)
     file = package / "kick.py"
     file.write_text("def kick(v):\n    return 2.0 * v\n")

@@ -26,7 +26,6 @@ def test_snippet_prints_what_it_says(tmp_path):
     assert (tmp_path / "velocity.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.compiled
 def test_sweep_snippet_runs_on_a_sweep(tmp_path, monkeypatch, capsys):
     text = (DOCS / "sweep.md").read_text()
     code, columns = re.findall(r"```python\n(.*?)```", text, re.S)

@@ -12,9 +12,9 @@ import pytest
 import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.cli.words import check_words, ordered, with_units
+from hapticclay.kernel import engine
 from hapticclay.model import constants
 from hapticclay.simulation import record
-from hapticclay.stepping import engine
 from tests.public import NAMES, told_by, used_in
 from tests.snippets import printed_by
 
@@ -30,7 +30,6 @@ def test_readme_snippet_runs_and_prints_what_it_says(block, tmp_path):
     assert (tmp_path / "out" / "record.npz").is_file()
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("page", ["stability", "limit_cycles", "hardware", "design"])
 def test_stability_pages_say_what_their_snippets_print(page, tmp_path):
     text = (ROOT / "docs" / f"{page}.md").read_text()
@@ -80,7 +79,6 @@ def test_a_symptom_page_shows_its_cause_in_a_few_lines(page, tmp_path):
     assert text.index("**Cause.**") < text.index("## Show it") and "](" in text
 
 
-@pytest.mark.plain
 def test_the_groove_page_says_what_it_prints(tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "groove.md").read_text(), re.S)
     out = printed_by(code, tmp_path)
@@ -210,7 +208,7 @@ NAMED = [
 @pytest.mark.parametrize("name", NAMED)
 def test_a_function_that_the_table_of_the_step_names_exists(name):
     module, function = name.split(".")
-    found = importlib.import_module(f"hapticclay.stepping.{module}")
+    found = importlib.import_module(f"hapticclay.kernel.{module}")
     assert inspect.isfunction(getattr(found, function)), name
 
 

@@ -17,14 +17,7 @@ LEARNING = {*(ROOT / "examples" / "learning").glob("*.py")}  # need torch, and m
 EXAMPLES = sorted({*(ROOT / "examples").rglob("*.py")} - {*TUTORIALS} - LEARNING)
 PAGES = EXAMPLES + TUTORIALS
 IDS = [f"{page.parent.name}/{page.stem}" for page in PAGES]
-# whose runs take Python less time than it takes to compile their kinds
-PLAIN = "clay/groove", "hardware/encoder", "hardware/sampled", "hardware/held_clay"
-COMPILED = "walls/press", "parts/chirp"  # long runs of one kind
-MARKS = dict.fromkeys(PLAIN, pytest.mark.plain) | dict.fromkeys(COMPILED, pytest.mark.compiled)
-RUN = [
-    pytest.param(page, id=name, marks=[MARKS[name]] if name in MARKS else [])
-    for page, name in zip(PAGES, IDS, strict=True)
-]
+RUN = [pytest.param(page, id=name) for page, name in zip(PAGES, IDS, strict=True)]
 # words of a program, and what they are in the suite: fewer, shorter or coarser runs, or in Python
 FEWER = {
     "clay/dent": {"    t_max=2.0,": "    t_max=2.0,\n    dt=2e-3,"},

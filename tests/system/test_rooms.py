@@ -14,7 +14,6 @@ HEAVY = (
     "matplotlib",
     "imageio",
     "viser",
-    "numba",
     "dask",
     "tyro",
     "tqdm",
@@ -40,7 +39,7 @@ def loaded(code, names):
         ("import hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01))", HEAVY),
         (
             "import hapticclay as hc; hc.theory.gain_limit('x', 90.0)",
-            ("matplotlib", "mujoco", "numba", "tyro"),
+            ("matplotlib", "mujoco", "tyro"),
         ),
     ],
 )

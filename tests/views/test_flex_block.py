@@ -9,7 +9,7 @@ import pytest
 
 import hapticclay as hc
 from benchmarks import flex_block
-from hapticclay.stepping import engine
+from hapticclay.kernel import engine
 from hapticclay.views.stage import Stage
 
 ROOT = Path(flex_block.__file__).parents[1]

@@ -146,7 +146,6 @@ OTHER = {  # compensator, static gain of G, and what C adds to the clay, f = (c/
 }
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("name", OTHER)
 def test_force_plot_shows_the_damper_of_any_compensator(name):
     c, ratio, damper = OTHER[name]

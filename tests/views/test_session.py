@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.simulation.engines import has_numba
-from hapticclay.stepping.run import CHUNK, PLAIN
+from hapticclay.kernel import native
+from hapticclay.kernel.row import CHUNK
 from hapticclay.views.clock import FRAME_TIME, LONGEST_SLICE, Clock
 from hapticclay.views.live_run import played
 from hapticclay.views.live_verdict import live_verdict
@@ -307,19 +307,15 @@ def test_verdict_of_a_replay_is_that_of_its_record(gain, axis):
     assert said[-1][1].unstable == bool(axis)
 
 
-def test_steps_too_short_for_python_are_compiled_to_the_same_bits(monkeypatch):
-    from hapticclay.views import live_run as module
-
+@pytest.mark.skipif(not native.is_there(), reason="needs the compiled kernel")
+def test_a_session_is_compiled_where_there_is_a_kernel_to_the_same_bits(monkeypatch):
     fine, ends = hc.constant_cut(dt=5e-5), []
-    for numba in (True, False):
-        with monkeypatch.context() as patch:
-            if not numba:
-                patch.setattr(module, "has_numba", lambda: False)
-            live = drag(Session(fine, stiffness=10.0), 0.3)
-            assert (live.run.kernel is PLAIN) == (not numba or not has_numba())
-            ends.append(live.record())
+    for engine in ("native", "python"):
+        live = drag(Session(fine, stiffness=10.0), 0.3)
+        assert live.run.row.engine == engine
+        ends.append(live.record())
+        monkeypatch.setattr(native, "why_not", lambda: "it is not built")
     np.testing.assert_array_equal(ends[0].p, ends[1].p)
-    assert Session(hc.constant_cut()).run.kernel is PLAIN
 
 
 @pytest.mark.parametrize(

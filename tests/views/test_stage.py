@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.model.arm import inverse_kinematics
+from hapticclay.formulas.arm import inverse_kinematics
 from hapticclay.views import stage
 from tests.oracles.links import Links
 

@@ -410,7 +410,6 @@ def test_picture_of_a_groove_is_what_the_run_has_left(twice):
     assert stage.removal.heights(0.03).min() == pytest.approx(0.03)
 
 
-@pytest.mark.plain
 def test_session_cuts_a_groove_and_changes_its_pressure():
     clay = hc.Clay.of_groove(BLOCK)
     session = Session(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...model.hardware import passivity_controller
+from ...formulas.hardware import passivity_controller
 from ...model.operator import Operator
 from ...model.sampled_controller import Controller
 from ...model.shapes import Constant

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay.model import flow
+from hapticclay.formulas import flow
 from tests.oracles import friction
 
 SIZES = st.floats(1e-3, 1e3)

@@ -10,16 +10,14 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
 import hapticclay as hc
-from hapticclay.model import hardware
+from hapticclay.formulas import hardware
+from hapticclay.kernel import records, sampled
 from hapticclay.model.constants import TS
-from hapticclay.stepping.driver import pushed
-from hapticclay.stepping.kick import at_rates, handle_at, step_around
-from hapticclay.stepping.run import Run
-from hapticclay.stepping.state import Flow, Hold
+from hapticclay.simulation.run import Run
 from tests.hunt import examples
+from tests.kernel.test_engines import ALL, PHYSICAL
 from tests.oracles import paper_law
 from tests.oracles.sampled_yield import yielding
-from tests.stepping.test_engines import ALL, PHYSICAL
 
 Ts = 2.88e-3  # of the runs beside the oracle [s]
 SPAN = 0.1152  # their length [s]
@@ -212,7 +210,6 @@ def test_clay_that_holds_the_handle_leaves_no_motion_at_all(along, dt, parts):
     assert np.abs(r.fe[held]).max() <= 9.0 * (1.0 + 1e-12)
 
 
-@pytest.mark.plain
 def test_the_sensor_shows_the_whole_push_of_a_hand_at_rest():
     shown = []
 
@@ -241,12 +238,14 @@ def started(**kw):
 
 def first_kick(run, friction, Fy, tau, w):
     """Its first kick, with joint rates w before it, under torques."""
-    parts, state, law = run.views, run.state, (Fy, 0.0, 1.0, Fy, 0.0, 1.0)
-    sampler = parts.sampler._replace(friction=friction)
-    clay = state.clay._replace(laws=state.clay.laws._replace(flow=Flow(law, law)))
-    at = at_rates(handle_at(parts.arm, state.body, 0.0), w)
-    step, hold = step_around(0.0, parts.time.dt), Hold(tau, (0.0, 0.0), None, None)
-    return pushed(sampler, parts, state.clock, step, at, w, clay, hold)
+    m, s, k = run.row.m, run.row.s, records.Kick()
+    m.friction, m.slip[:] = int(friction is not None), friction or (0.0, 0.0)
+    for z in s.axis:
+        z.Fy, z.Kn, z.n = z.old_Fy, z.old_Kn, z.old_n = Fy, 0.0, 1.0
+    s.w1, s.w2 = w
+    s.now.x.tau, s.now.y.tau = tau
+    sampled.across(m, s, k, m.dt)
+    return k
 
 
 @given(
@@ -256,12 +255,17 @@ def first_kick(run, friction, Fy, tau, w):
 )
 def test_friction_and_clay_are_the_least_kinetic_energy_within_both(t, w, Fy):
     run = started()
-    kick = lambda t: np.array(first_kick(run, None, 0.0, t, w).w)  # noqa: E731
+
+    def kick(t):
+        k = first_kick(run, None, 0.0, t, w)
+        return np.array([k.w1, k.w2])
+
     free = kick(t)
     A = np.column_stack([kick((t[0] + 1.0, t[1])) - free, kick((t[0], t[1] + 1.0)) - free])
-    u = np.reshape(first_kick(run, None, 0.0, t, w).at.u, (2, 2))  # of both links
+    u = np.reshape(first_kick(run, None, 0.0, t, w).u, (2, 2))  # of both links
     J = np.array([[u[0, 0] + u[1, 0], u[1, 0]], [u[0, 1] + u[1, 1], u[1, 1]]])
     k = first_kick(run, (0.3, 0.2), Fy, t, w)
+    after = np.array([k.w1, k.w2])
     # rates after the kick: free + A (friction - J' clay), of least energy w' A^-1 w
     half = np.linalg.cholesky(np.linalg.inv(A)).T
     G, most = np.column_stack((A, -A @ J.T)), np.array([0.3, 0.2, Fy + 1e-12, Fy + 1e-12])
@@ -269,12 +273,12 @@ def test_friction_and_clay_are_the_least_kinetic_energy_within_both(t, w, Fy):
     expected = free + G @ best.x
     if any(w):  # a kick that stops on the way, and turns, is no single implicit step
         v0, v1 = J @ w, J @ expected
-        turned = any(np.any(v0 * x < 0) for x in (v1, J @ free, J @ k.w))
+        turned = any(np.any(v0 * x < 0) for x in (v1, J @ free, J @ after))
         if turned:
             return
-    np.testing.assert_allclose(k.w, expected, atol=1e-9 * (1.0 + np.abs(free).max()))
+    np.testing.assert_allclose(after, expected, atol=1e-9 * (1.0 + np.abs(free).max()))
     if np.abs(expected).max() < 1e-13 and Fy > 1e-3 and best.optimality < 1e-12:
-        assert np.abs(k.loop.slip[0]) <= 0.3 and np.abs(k.loop.slip[1]) <= 0.2
+        assert np.abs(k.slip1) <= 0.3 and np.abs(k.slip2) <= 0.2
 
 
 def test_friction_beside_clay_elsewhere_is_that_without_it():

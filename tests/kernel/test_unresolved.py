@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.stepping import modes, pace, path, run, scene
+from hapticclay.kernel import modes, pace, path
 from tests.hunt import HUNTS
 
 AFTER = hc.Pulse((8.0, 0.0), 0.0, 0.3, 0.6)
@@ -85,8 +85,7 @@ def test_steps_of_clay_that_grows_depend_on_the_sample_alone():
 
 def test_clay_that_has_grown_too_stiff_ends_the_run_with_a_status(monkeypatch):
     most = modes.SUBSTEPS if HUNTS else 50
-    for module in (modes, run, scene):
-        monkeypatch.setattr(module, "SUBSTEPS", most)
+    monkeypatch.setattr(modes, "SUBSTEPS", most)
     growing = hc.Clay(hc.Profile((), (50.0,), growth=(5e5 * most,)), NONE)
     r = hc.simulate(replace(GROWING, clay=growing, dt=1e-4, t_max=0.2), engine="python")
     assert r.outcome.code == "unresolved" and f"more than {most} steps in one sample" in r.status

@@ -1,12 +1,6 @@
-"""The kick: what it works out, what the engine makes of it, one source for both engines."""
+"""The kick: what it works out, and what the engine makes of it."""
 
 import dataclasses
-import importlib.util
-import os
-import shutil
-import subprocess
-import sys
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -16,12 +10,13 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 import hapticclay as hc
-from hapticclay.model import arm, damping
+from hapticclay.formulas import arm, damping
+from hapticclay.kernel import arm as arms
+from hapticclay.kernel import kick, path
+from hapticclay.kernel.layout import Kind, Many
 from hapticclay.model.operator import NO_HAND, Operator
-from hapticclay.stepping import driver, kick, path, sampled
-from hapticclay.stepping import run as runs
-from hapticclay.stepping.run import Run
-from hapticclay.stepping.state import Axis, Loop
+from hapticclay.simulation import run as runs
+from hapticclay.simulation.run import Run
 from tests.oracles import Arm, laws
 from tests.oracles.links import Links
 
@@ -63,9 +58,6 @@ NEAR = {  # the same, short of the border but for the heavy hand, which would te
     name: dataclasses.replace(s, t_max=0.3, start=(0.0 if name == "heavy hand" else 0.045, 0.0))
     for name, s in CASES.items()
 }
-fast = pytest.mark.skipif(
-    importlib.util.find_spec("numba") is None, reason="needs numba: pip install hapticclay[fast]"
-)
 unit = st.floats(-1.0, 1.0)
 
 
@@ -78,19 +70,19 @@ def held(compensator, h, z, f):
     return (expm(h * M) @ (*z, f))[:n]
 
 
-def kick_by_laws(run, state, before, after):
+def kick_by_laws(run, before, after):
     """One kick put together from the laws, as docs/equations.md has it; motors without limits.
 
     Returns velocity, net force, torques, rates of the reference model, delta, and states of the
     compensator after it.
     """
-    s, x, y = run.scenario, state.loop.x, state.loop.y
+    s, state = run.scenario, run.row.s
     H, L, R = (0.5 * (before + after), before / (before + after), after / (before + after))
-    formed = state.loop.form is not None
+    formed = run.row.m.formed
     hands, links = [th or NO_HAND for th in s.operators], s.arm.links
-    u = arm.jacobian(*state.body.q, links)
-    p = Links(*links[:4]).forward(state.body.q) - s.origin
-    (w1, w2), (g1, g2) = state.body.w, state.body.g
+    q, w1, w2, g1, g2 = (state.q1, state.q2), state.w1, state.w2, state.g1, state.g2
+    u = arm.jacobian(*q, links)
+    p = Links(*links[:4]).forward(q) - s.origin
     v = arm.handle_velocity(w1, w1 + w2, u)
     c = arm.centripetal(w1 + 0.5 * before * g1, w1 + w2 + 0.5 * before * g2, u)
     W = (
@@ -107,13 +99,14 @@ def kick_by_laws(run, state, before, after):
     f, d, n, a, feed, rate = [], [], [], [], [], []
     for i in (0, 1):
         th, compensator, K = hands[i], s.compensators[i], s.gain[i]
-        delta, yi, ydi = (x, y)[i].delta, (x, y)[i].y, (x, y)[i].yrate
+        axis = state.axis[i]
+        delta, yi, ydi = axis.delta, axis.y, axis.yrate
         ratio = s.servo[i].G.gain / s.servo[i].G.stiffness
         keep, take, ni, mi, spring = laws.servo_weights(s.servo[i], H, L, R)
         feed.append((0.0, 0.0))
         if formed:  # what it shows at the sample without the force of the kick, and per N
             _, B, C, D = compensator.state_space()
-            z = state.loop.form[i][: compensator.order]
+            z = axis.z[: compensator.order]
             delta += C @ held(compensator, 0.5 * before, z, 0.0)
             # held between equal steps; between others, one impulse at the sample
             moved = held(compensator, 0.5 * before, 0.0 * np.array(z), 1.0)
@@ -135,7 +128,7 @@ def kick_by_laws(run, state, before, after):
     states = []
     for i, compensator in enumerate(s.compensators):
         if formed:
-            z = state.loop.form[i][: compensator.order]
+            z = state.axis[i].z[: compensator.order]
             drive, B = s.gain[i] * ff[i], compensator.state_space()[1]
             if before == after:
                 states += [*held(compensator, H, z, drive)]
@@ -144,7 +137,7 @@ def kick_by_laws(run, state, before, after):
                 states += [*held(compensator, 0.5 * after, kicked, 0.0)]
         else:
             keep, take = laws.trapezoid(compensator.den[1], H, L, R)
-            states.append(keep * (x, y)[i].rate + take * s.gain[i] * ff[i])
+            states.append(keep * state.axis[i].rate + take * s.gain[i] * ff[i])
     return (ux, uy), ff, (t1, t2), rates, shown, states
 
 
@@ -161,28 +154,26 @@ def test_the_kick_is_what_its_laws_say(name, x, before, after):
     after = before if after is None else after
     s = dataclasses.replace(CASES[name], torque_limit=(1e6, 1e6))
     run = Run(s, 1)
-    state = run.state
-    formed, orders = run.parts.form is not None, [c.order for c in s.compensators]
-    assert formed == (name in ("formed", "all"))
-    axes = [Axis(*(0.1 * a for a in x[2 + 4 * i : 6 + 4 * i])) for i in (0, 1)]
-    form = None
-    if formed:
-        axes = [axis._replace(rate=0.0) for axis in axes]
-        own = [[0.1 * a for a in x[10 + 4 * i :][: orders[i]]] for i in (0, 1)]
-        form = tuple((*z, *[0.0] * (4 - len(z))) for z in own)
+    m, state = run.row.m, run.row.s
+    orders = [c.order for c in s.compensators]
+    assert m.formed == (name in ("formed", "all"))
+    for i, axis in enumerate(state.axis):
+        axis.delta, axis.rate, axis.y, axis.yrate = (0.1 * a for a in x[2 + 4 * i : 6 + 4 * i])
+        if m.formed:
+            axis.rate = 0.0
+            axis.z[: orders[i]] = [0.1 * a for a in x[10 + 4 * i :][: orders[i]]]
     before, after = before * s.dt, after * s.dt
-    state = state._replace(
-        clock=state.clock._replace(before=before),
-        body=state.body._replace(w=x[:2]),
-        loop=Loop(*axes, form),
-    )
-    u, f, tau, rates, shown, states = kick_by_laws(run, state, before, after)
-    k = driver.kick(run.views, state.clock, state.body, state.loop, state.clay, after)
-    if formed:
-        own = [k.loop.form[i][j] for i in (0, 1) for j in range(orders[i])]
+    state.before, state.w1, state.w2 = before, *x[:2]
+    u, f, tau, rates, shown, states = kick_by_laws(run, before, after)
+    k = state.k
+    kick.by_servo(m, state, k, after)
+    if m.formed:
+        own = [k.axis[i].z[j] for i in (0, 1) for j in range(orders[i])]
     else:
-        own = [k.loop.x.rate, k.loop.y.rate]
-    found = k.motion.u, k.motion.f, k.tau, (k.loop.x.yrate, k.loop.y.yrate), k.delta, own
+        own = [k.x.next_rate, k.y.next_rate]
+    delta = kick.shown_delta(k, 0), kick.shown_delta(k, 1)
+    found = (k.x.u, k.y.u), (k.x.net, k.y.net), (k.tau1, k.tau2)
+    found = *found, (k.x.next_yrate, k.y.next_yrate), delta, own
     for a, b, what in zip(found, (u, f, tau, rates, shown, states), "uftrds", strict=True):
         # 1/dt = 2800 multiplies roundings of the velocity
         np.testing.assert_allclose(a, b, rtol=1e-11, atol=1e-11, err_msg=what)
@@ -192,15 +183,14 @@ def test_the_kick_is_what_its_laws_say(name, x, before, after):
 def test_engine_does_what_the_kick_foretold(name, monkeypatch):
     """The rates after each engine step are those worked out."""
     worst = 0.0
-    plain = sampled.stepped_arm
+    plain = arms.step_engine
 
-    def stepped(sampler, parts, e, s, k, after):
+    def stepped(m, s, k, h, even):
         nonlocal worst
-        q, w = plain(sampler, parts, e, s, k, after)
-        worst = max(worst, *(abs(a - b) for a, b in zip(w, k.w, strict=True)))
-        return q, w
+        plain(m, s, k, h, even)
+        worst = max(worst, abs(s.w1 - k.w1), abs(s.w2 - k.w2))
 
-    monkeypatch.setattr(sampled, "stepped_arm", stepped)
+    monkeypatch.setattr(arms, "step_engine", stepped)
     hc.simulate(NEAR[name], engine="python")
     assert 0.0 < worst < 1e-11  # rounding of a 2x2 solve, conditioned by b dt/Lambda = 4e2 at most
 
@@ -208,7 +198,7 @@ def test_engine_does_what_the_kick_foretold(name, monkeypatch):
 @pytest.mark.parametrize("name", CASES)
 def test_steps_that_glide_are_those_with_a_look_at_their_end(name, monkeypatch):
     gliding = hc.simulate(NEAR[name], engine="python")
-    monkeypatch.setattr(path, "run_whole_steps", lambda parts, s, e, room: s)
+    monkeypatch.setattr(path, "whole_steps", lambda m, s, room: None)
     careful = hc.simulate(NEAR[name], engine="python")
     for field in ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta"):
         np.testing.assert_array_equal(getattr(gliding, field), getattr(careful, field), field)
@@ -252,63 +242,36 @@ def test_engine_never_sees_more_than_the_motors_can_give():
     assert np.any(np.abs(r.tau) == limit)
 
 
-def numbers_in(value):
-    """All numbers in tuples of tuples."""
-    if isinstance(value, tuple):
-        return [x for each in value for x in numbers_in(each)]
-    return [] if value is None else [value]
-
-
 @pytest.mark.parametrize("name", CASES)
 def test_a_run_in_python_holds_no_numpy_numbers(name):
     """They are several times slower in CPython, and divide by zero without an error."""
     run = Run(NEAR[name], 1)
     run.go(None)
-    assert {type(x) for x in numbers_in(run.state)} == {int, float}
-    assert {type(x) for x in numbers_in(run.views)} <= {int, float, memoryview}
+    assert {type(x) for x in numbers_in(run.row.s)} == {int, float}
+    assert {type(x) for x in numbers_in(run.row.m)} == {int, float}
 
 
-@fast
-def test_a_changed_law_changes_both_engines(tmp_path):
-    """Python and machine code come from one source."""
-    package = Path(hc.__file__).parent
-    shutil.copytree(package, tmp_path / "hapticclay", ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copytree(package.parent / "mjcf", tmp_path / "mjcf")
-    code = (
-        "import sys, hapticclay as hc\n"
-        "for engine in sys.argv[1:]:\n"
-        "    r = hc.simulate(hc.constant_cut(t_max=0.8), engine=engine)\n"
-        "    print(r.p[-1].tolist(), r.energy['clay'])\n"
-    )
-    env = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-
-    def ends(*engines):
-        out = subprocess.run(
-            [sys.executable, "-c", code, *engines],
-            cwd=tmp_path,
-            env=env,
-            capture_output=True,
-            text=True,
-        )
-        assert out.returncode == 0, out.stderr
-        return out.stdout.splitlines()
-
-    r = hc.simulate(hc.constant_cut(t_max=0.8), engine="python")
-    python = f"{r.p[-1].tolist()} {r.energy['clay']}"
-    law = tmp_path / "hapticclay/model/damping.py"
-    text = law.read_text()
-    changed = text.replace("return (L * b0[0], L * b0[1])", "return (L * b0[0], 2.0 * L * b0[1])")
-    assert changed != text
-    law.write_text(changed)
-    new_python, new_native = ends("python", "native")
-    assert new_python == new_native != python
+def numbers_in(record):
+    """All numbers in a record."""
+    for name, kind in type(record).kinds.items():
+        x = getattr(record, name)
+        if isinstance(kind, Many):
+            for each in x:
+                yield from numbers_in(each)
+        elif not isinstance(kind, Kind):
+            yield from numbers_in(x)
+        elif not kind.is_place:
+            yield from x if kind.shape else [x]
 
 
 def test_a_kick_counts_half_of_the_clay_on_either_side_and_all_of_the_muscle():
-    run = Run(CASES["hand"], 1)
-    clay = run.state.clay._replace(b=(8.0, 6.0), old=(8.0, 6.0))
-    step = kick.step_around(1e-3, 1e-3)
-    at = kick.handle_at(run.parts.arm, run.state.body, 0.0)
-    a = kick.acting(run.views, run.parts.clay, None, run.state.clock, step, at, (0.0, 0.0), clay)
-    assert a.viscous == ((4.0, 3.0), (4.0, 3.0)) and (step.L, a.uh) == (0.5, (2.0, 0.0))
-    assert a.split is None and a.d == (4.0, 3.0, 0.0)
+    row = Run(dataclasses.replace(CASES["hand"], operator=None), 1).row
+    m, s, k = row.m, row.s, row.s.k
+    s.x.b, s.y.b = s.x.old, s.y.old = 8.0, 6.0
+    kick.begin(k, 1e-3, 1e-3)
+    kick.take_up(s, k)
+    arms.handle_at(m, k, s.q1, s.q2, 0.0, 0.0)
+    kick.act(m, s, k)
+    assert (k.x.b0, k.y.b0, k.x.b1, k.y.b1) == (4.0, 3.0, 4.0, 3.0)
+    assert (k.L, k.x.uh, k.y.uh) == (0.5, 2.0, 0.0)
+    assert k.over == 0.0 and (k.x.d, k.y.d, k.dxy) == (4.0, 3.0, 0.0)

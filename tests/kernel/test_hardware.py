@@ -9,18 +9,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model import arm, constants, hardware
+from hapticclay.formulas import arm
+from hapticclay.formulas import hardware as formula
+from hapticclay.kernel import scene
+from hapticclay.model import constants, hardware
 from hapticclay.model.cells import Profile
 from hapticclay.model.clay import Clay
 from hapticclay.model.constants import TS
 from hapticclay.model.operator import Operator
-from hapticclay.stepping import scene
-from hapticclay.stepping.run import Run
+from hapticclay.simulation import run as runs
+from hapticclay.simulation.run import Run
 from hapticclay.theory import linear_loop
 from tests.hunt import examples
 
@@ -79,28 +82,28 @@ def test_a_run_in_python_loads_nothing_that_compiles_or_readies_signals():
         "import sys, hapticclay as hc; [hc.simulate(hc.constant_cut(t_max=0.01, control=x), "
         "engine='python') for x in ('continuous', 'sampled')]; "
         "print(*sorted(m.rpartition('.')[2] for m in sys.modules "
-        "if m.startswith('hapticclay.stepping.')))"
+        "if m.startswith(('hapticclay.kernel.', 'hapticclay.native.', 'hapticclay.simulation.'))))"
     )
     run = [sys.executable, "-c", code]
     out = subprocess.run(run, capture_output=True, text=True, check=True)
     loaded = set(out.stdout.split())
     assert {"path", "run"} < loaded
-    assert not loaded & {"cache", "compiled", "many", "own_law", "signal_ahead"}
+    assert not loaded & {"machine", "many", "vectored", "signal_ahead"}
 
 
 def test_random_effects_are_drawn_part_by_part(monkeypatch):
     """No run holds those of all its samples; return to a sample brings them back."""
     s = cut(hc.Hardware(jitter=5e-5, dropout_probability=0.1, force_noise=0.1), t_max=0.1)
     whole = hc.simulate(s)
-    monkeypatch.setattr(scene, "NOISE_AHEAD", 8)
+    for module in (scene, runs):
+        monkeypatch.setattr(module, "NOISE_AHEAD", 8)
     run = Run(s, 1)
     run.pause = 100
     run.go(None)
     early = run.snapshot()
     run.pause = 200
     run.go(None)
-    drawn = run.parts.sampler.chance
-    assert 0 < drawn.first <= 101 and len(drawn.numbers) // 4 < 150
+    assert 0 < run.row.m.chance_first <= 101 and len(run.row.arrays["chances"]) // 4 < 150
     run.return_to(early)
     run.pause = math.inf
     run.go(None)
@@ -173,17 +176,17 @@ def test_an_interface_needs_a_sampled_loop_and_a_controller_held_clay():
 @given(st.floats(-20.0, 20.0), st.integers(2, 24), st.floats(0.1, 100.0))
 def test_a_converter_is_off_by_half_a_level_and_ends_at_its_range(x, bits, span):
     level = 2.0 * span / 2**bits
-    y = hardware.quantize(x, bits, span)
+    y = formula.quantize(x, bits, span)
     assert -span <= y <= span - level * (1.0 - 1e-12)
     if -span <= x <= span - level:
         assert abs(y - x) <= 0.5 * level * (1.0 + 1e-9)
-    assert hardware.quantize(y, bits, span) == y  # idempotent
+    assert formula.quantize(y, bits, span) == y  # idempotent
     assert abs(y / level - round(y / level)) < 1e-6
 
 
 @given(st.lists(st.floats(-10.0, 10.0), min_size=2, max_size=20), st.integers(2, 16))
 def test_converters_are_monotone(xs, bits):
-    ys = [hardware.quantize(x, bits, 5.0) for x in sorted(xs)]
+    ys = [formula.quantize(x, bits, 5.0) for x in sorted(xs)]
     assert ys == sorted(ys)
 
 
@@ -191,7 +194,7 @@ def test_converters_are_monotone(xs, bits):
 def test_quantisation_error_has_the_variance_of_a_uniform_one(bits):
     rng = np.random.default_rng(0)
     x, level = rng.uniform(-4.0, 4.0, 200_000), 10.0 / 2**bits
-    error = np.array([hardware.quantize(v, bits, 5.0) for v in x]) - x
+    error = np.array([formula.quantize(v, bits, 5.0) for v in x]) - x
     # mean of n uniform errors: level/sqrt(12 n); variance of the squares: level^4/180; five sigma
     assert abs(error.mean()) < 5.0 * level / math.sqrt(12 * len(x))
     assert abs((error**2).mean() - level**2 / 12) < 5.0 * level**2 / math.sqrt(180 * len(x))
@@ -239,11 +242,11 @@ def test_a_run_that_overflows_has_an_outcome(render, seed):
 
 
 def test_halves_go_to_the_even_level():
-    assert [hardware.round_to_even(x, 1.0) for x in (0.5, 1.5, 2.5, -0.5)] == [0.0, 2.0, 2.0, 0.0]
-    assert hardware.encode(math.tau * 3 / 1000, 1000) == pytest.approx(
+    assert [formula.round_to_even(x, 1.0) for x in (0.5, 1.5, 2.5, -0.5)] == [0.0, 2.0, 2.0, 0.0]
+    assert formula.encode(math.tau * 3 / 1000, 1000) == pytest.approx(
         math.tau * 3 / 1000, rel=1e-15
     )
-    assert hardware.encode(0.123, 0) == 0.123
+    assert formula.encode(0.123, 0) == 0.123
 
 
 def test_in_a_run_torques_lie_on_levels_within_the_range():
@@ -262,7 +265,7 @@ def test_in_a_run_torques_lie_on_levels_within_the_range():
 @given(st.integers(1, 30), st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(1e-4, 1e-2))
 def test_difference_is_exact_for_constant_rates(window, w1, w2, Ts):
     at = lambda k: (1.0 + k * Ts * w1, -0.5 + k * Ts * w2)  # noqa: E731
-    found = hardware.velocity_difference(-window, at(-window), 0, at(0), Ts)
+    found = formula.velocity_difference(-window, at(-window), 0, at(0), Ts)
     assert found == pytest.approx((w1, w2), abs=16 * EPS / (window * Ts))
 
 
@@ -273,10 +276,10 @@ def test_window_divides_the_noise_of_an_encoder():
     """
     counts, Ts, w = 4096, 1e-3, 0.7391
     for m in (1, 4, 16):
-        q = [hardware.encode(w * k * Ts, counts) for k in range(4000)]
+        q = [formula.encode(w * k * Ts, counts) for k in range(4000)]
         v = np.array(
             [
-                hardware.velocity_difference(k - m, (q[k - m], 0.0), k, (q[k], 0.0), Ts)[0]
+                formula.velocity_difference(k - m, (q[k - m], 0.0), k, (q[k], 0.0), Ts)[0]
                 for k in range(m, 4000)
             ]
         )
@@ -298,7 +301,7 @@ def test_velocity_filter_is_an_exact_first_order_lag_of_held_means():
     a = cont2discrete((np.array([[-w]]), np.array([[w]]), np.eye(1), np.zeros((1, 1))), Ts)
     rng, y, z = np.random.default_rng(1), 0.0, 0.0
     for u in rng.standard_normal(50):
-        y, z = hardware.low_pass(y, u, cutoff, Ts), float(a[0][0, 0] * z + a[1][0, 0] * u)
+        y, z = formula.low_pass(y, u, cutoff, Ts), float(a[0][0, 0] * z + a[1][0, 0] * u)
         assert y == pytest.approx(z, abs=1e-12)
 
 
@@ -308,9 +311,10 @@ def test_difference_lags_half_its_window_in_a_run():
     for m in (1, 4):
         run = Run(replace(s, hardware=hc.Hardware(velocity="difference", velocity_window=m)), 1)
         shown = []
-        for _ in range(run.parts.time.last):
-            run.advance(run.filled + 1)  # one step; the kick to its sample ended with event.w
-            shown.append((run.state.loop.event.w, run.state.loop.machine.rates.w))
+        for _ in range(run.row.m.last):
+            run.advance(run.filled + 1)  # one step; the kick to its sample ended with e.w1, e.w2
+            s_ = run.row.s
+            shown.append(((s_.e.w1, s_.e.w2), (s_.now.x.w, s_.now.y.w)))
         true, seen = np.array([x[0] for x in shown]), np.array([x[1] for x in shown])
         late = np.array([np.mean(true[max(k - m, 0) : k + 1], axis=0) for k in range(len(true))])
         # trapezoid against the integral: second differences of the rate
@@ -335,13 +339,13 @@ def test_filter_is_scipys_butterworth_discretised_exactly(order, cutoff):
     x, y = (0.0, 0.0), []
     for v in u:
         y.append(x[0])
-        x = hardware.filter_step(f, *x, v)
+        x = formula.filter_step(f, *x, v)
     np.testing.assert_allclose(
         y, signal.lfilter(n[0], d, u), atol=1e-9
     )  # polynomials of order 2 near z = 1
     still = (0.0, 0.0)
     for _ in range(20_000):
-        still = hardware.filter_step(f, *still, 1.0)
+        still = formula.filter_step(f, *still, 1.0)
     assert still[0] == pytest.approx(1.0, rel=1e-9)
 
 
@@ -449,7 +453,7 @@ def test_the_run_decays_2_percent_inside_the_limit_and_grows_2_percent_outside(a
 )
 def test_friction_obeys_coulombs_law(w, a11, a22, share, limit):
     a12 = share * math.sqrt(a11 * a22)
-    f = hardware.coulomb_friction(w, a11, a12, a22, limit)
+    f = formula.coulomb_friction(w, a11, a12, a22, limit)
     after = (w[0] + a11 * f[0] + a12 * f[1], w[1] + a12 * f[0] + a22 * f[1])
     for j in (0, 1):
         assert abs(f[j]) <= limit[j]
@@ -513,7 +517,7 @@ def test_a_joint_that_friction_can_hold_rests_exactly_while_the_other_slides():
     st.floats(0.05, 5.0),
 )
 def test_the_controllers_force_is_never_active_in_the_hold(energy, b, v, Ts, W):
-    f = hardware.passivity_controller(energy, b * v, v, Ts, W)
+    f = formula.passivity_controller(energy, b * v, v, Ts, W)
     gain = Ts * f * (v - 0.5 * Ts * W * f)
     assert f * v >= 0.0
     best = 0.5 * v * v / W
@@ -524,16 +528,14 @@ def test_the_controllers_force_is_never_active_in_the_hold(energy, b, v, Ts, W):
         assert f == 0.0
 
 
-@given(st.floats(-1e-6, -1e-9), st.floats(0.01, 1.0), st.floats(0.0, 100.0))
-def test_for_short_samples_it_is_hannaford_and_ryus_damper(energy, v, b):
-    Ts, W = 1e-4, 1e-6
-    assume(2.0 * W * -energy < 1e-3 * v * v)
+@given(st.floats(-1e-6, -1e-9), st.floats(0.01, 1.0), st.floats(0.0, 0.99))
+def test_for_short_samples_it_is_hannaford_and_ryus_damper(energy, v, share):
+    Ts, W = 1e-4, 1e-6  # 2 W |energy| is below 1e-3 v^2
     need = -energy / (Ts * v)
-    assume(need > b * v)
-    assert hardware.passivity_controller(energy, b * v, v, Ts, W) == pytest.approx(need, rel=1e-2)
+    b = share * need / v  # which resists less
+    assert formula.passivity_controller(energy, b * v, v, Ts, W) == pytest.approx(need, rel=1e-2)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("b", [8e3, 1e6])
 def test_clay_too_stiff_for_its_hold_is_bounded_by_the_controller(b):
     kw = dict(b=b, start=(0.06, 0.0), gain=(1.0, 0.1), t_max=0.5)
@@ -563,7 +565,6 @@ def test_the_controller_leaves_passive_clay_alone(parts):
     assert b.energy["passivity_controller"] == 0.0
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("parts", [dict(encoder=65536), dict(velocity="difference")])
 def test_the_controller_acts_in_passive_clay_where_place_or_velocity_is_not_exact(parts):
     """On the idle axis, whose velocity passes zero: some 1e-7 J and 1e-6 m, of 5 N and 20 cm."""
@@ -582,7 +583,7 @@ def test_the_controller_acts_in_passive_clay_where_place_or_velocity_is_not_exac
     st.floats(1e-5, 1e-2),
 )
 def test_through_a_coupling_no_clay_resists_more_than_its_spring_and_damper(b, k, d, v, Ts):
-    tool, u = hardware.virtual_coupling(0.0, 0.0, v, b, (k, d), Ts)
+    tool, u = formula.virtual_coupling(0.0, 0.0, v, b, (k, d), Ts)
     assert abs(b * u) <= min(b, d + k * Ts) * abs(v) * (1.0 + 1e-12)
     assert b * u == pytest.approx(
         k * (0.0 - tool) + d * (v - u), abs=1e-9 * max(1.0, (d + k * Ts) * abs(v))
@@ -592,7 +593,7 @@ def test_through_a_coupling_no_clay_resists_more_than_its_spring_and_damper(b, k
 def test_in_steady_motion_a_coupling_renders_the_clay_itself():
     tool, b, v, Ts = 0.0, 90.0, 0.1, 1e-3
     for i in range(3000):
-        tool, u = hardware.virtual_coupling(tool, (i + 1) * Ts * v, v, b, (2e3, 20.0), Ts)
+        tool, u = formula.virtual_coupling(tool, (i + 1) * Ts * v, v, b, (2e3, 20.0), Ts)
     assert b * u == pytest.approx(b * v, rel=1e-9)
 
 
@@ -649,8 +650,8 @@ def test_the_lag_of_a_velocity_is_that_of_the_page(cutoff):
     Ts, y, lag = 1e-3, 0.0, 5e-4
     for k in range(1, 2001):
         p, old = ((0.5 * (i * Ts) ** 2, 0.0) for i in (k, k - 1))
-        w, _ = hardware.velocity_difference(k - 1, old, k, p, Ts)
-        y = w if cutoff is None else hardware.low_pass(y, w, cutoff, Ts)
+        w, _ = formula.velocity_difference(k - 1, old, k, p, Ts)
+        y = w if cutoff is None else formula.low_pass(y, w, cutoff, Ts)
     if cutoff is not None:
         a = math.exp(-math.tau * cutoff * Ts)
         lag += Ts * a / (1.0 - a)

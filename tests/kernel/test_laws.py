@@ -1,7 +1,9 @@
 """Laws of the clay in modules of their own, in every method, against independent solutions."""
 
 import dataclasses
+import itertools
 import pickle
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,13 +11,15 @@ from scipy.integrate import solve_ivp
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.stepping import laws, run
+from hapticclay.kernel import user_laws
+from hapticclay.simulation import run
 from tests.hunt import some
 from tests.oracles import Arm, axis_rates, drag_law, hardening_law
 from tests.oracles.hardening_law import DAMPING, WAY
 
 CLAY = 5.0  # [N.s/m] of the viscous clay around the law
 ARRAYS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
+CONTRACT = "numbers", "refuses", "start", "load", "moved", "force"
 METHODS = {
     "continuous": dict(),
     "accurate": dict(integrator="accurate", dt=2e-3),
@@ -31,12 +35,12 @@ METHODS = {
 
 @pytest.fixture
 def hardening(monkeypatch):
-    monkeypatch.setattr(laws, "TABLE", [hardening_law])
+    monkeypatch.setattr(user_laws, "TABLE", [hardening_law])
 
 
 @pytest.fixture
 def both(monkeypatch):
-    monkeypatch.setattr(laws, "TABLE", [hardening_law, drag_law])
+    monkeypatch.setattr(user_laws, "TABLE", [hardening_law, drag_law])
 
 
 def scene(**kw):
@@ -134,9 +138,7 @@ def same(a, b):
 
 
 @pytest.mark.parametrize("name", [name for name in METHODS if name != "held"])  # as "hardware"
-def test_machine_code_and_steps_one_by_one_give_the_same_bits(both, name):
-    from hapticclay.stepping import compiled
-
+def test_both_engines_and_steps_one_by_one_give_the_same_bits(both, name):
     s = dataclasses.replace(scene(**METHODS[name]), t_max=0.1, force=(1.0, 0.3))
     a, b = hc.simulate(s, engine="python"), hc.simulate(s, engine="native")
     assert not same(a, b) and a.energy == b.energy
@@ -147,20 +149,21 @@ def test_machine_code_and_steps_one_by_one_give_the_same_bits(both, name):
         while one.outcome is None:
             one.step()
         assert not same(a, one.record())
-    brief = run.completed(s, 10**9, compiled.KERNEL, run.EngineStore(), None, True)[0].brief()
+    brief = run.completed(s, 10**9, "native", run.Place(), None, True)[0].brief()
     assert tuple(map(float, brief[3][0])) == tuple(a.p[-1].tolist())
     assert tuple(map(float, brief[3][3])) == tuple(a.fe[-1].tolist()) and brief[4] == a.energy
 
 
+@pytest.mark.parametrize("engine", ["python", "native"])
 @pytest.mark.parametrize("name", ["continuous", "accurate", "physical"])
-def test_a_run_goes_on_from_a_snapshot_with_the_law_as_it_was(both, name):
+def test_a_run_goes_on_from_a_snapshot_with_the_law_as_it_was(both, name, engine):
     s = dataclasses.replace(scene(**METHODS[name]), t_max=0.1)
-    whole, parts = run.Run(s, 1), run.Run(s, 1)
+    whole, parts = run.Run(s, 1, engine), run.Run(s, 1, engine)
     whole.go(None)
     parts.pause = parts.scenario.t_max // s.dt // 2
     parts.go(None)
     saved = parts.snapshot()
-    other = run.Run(s, 1)
+    other = run.Run(s, 1, engine)
     other.return_to(pickle.loads(pickle.dumps(saved)))
     other.go(None)
     for name, x in whole.arrays().items():
@@ -203,3 +206,33 @@ def test_batches_carry_the_law(both):
     single = np.array([hc.simulate(many[i], engine="python").p[-1] for i in at])
     np.testing.assert_array_equal(ends["p"][at], single)
     assert not np.array_equal(single, single[0])
+
+
+FAILS = {
+    "load": lambda z, k: 1 / 0,
+    "moved": lambda z, px, py, vx, vy, h: 1 / 0,
+    "force": lambda z, px, py, vx, vy, out: 1 / 0,
+}
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("function", FAILS)
+def test_what_a_law_raises_ends_the_run_and_is_raised(function, engine, monkeypatch, capfd):
+    functions = {name: getattr(drag_law, name) for name in CONTRACT}
+    law = SimpleNamespace(**functions | {function: later(functions[function], FAILS[function])})
+    monkeypatch.setattr(user_laws, "TABLE", [law])
+    for s in (scene(), scene(control="sampled", render="physical")):
+        with pytest.raises(ZeroDivisionError):
+            hc.simulate(s, engine=engine)
+        with pytest.raises(ZeroDivisionError), hc.Simulation(s, engine=engine) as one:
+            while one.outcome is None:
+                one.step()
+    with pytest.raises(ZeroDivisionError):
+        hc.simulate_batch([scene(force=(0.1 * i, 0.0)) for i in range(6)], keep="summaries")
+    assert not capfd.readouterr().err
+
+
+def later(plain, fails):
+    """A function that fails at each third call and then no more."""
+    calls = itertools.count(1)
+    return lambda *arguments: (fails if next(calls) % 3 == 0 else plain)(*arguments)

@@ -219,7 +219,6 @@ def test_a_multisine_in_a_sum_is_the_multisine(kw):
         np.testing.assert_array_equal(getattr(a, x), getattr(b, x))
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("kw", WAYS)
 def test_a_function_is_asked_within_the_run_alone_and_part_by_part(kw):
     """Once for each half step and twice in it, where both drives are its; never far ahead."""

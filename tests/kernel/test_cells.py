@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-import importlib.util
 import math
 
 import numpy as np
@@ -12,14 +11,14 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
+from hapticclay.kernel import native
 from hapticclay.model.constants import GAIN, TS
 from tests.hunt import HUNTS
 from tests.oracles import piecewise_linear
 from tests.oracles.cells import cells
 
 FIELDS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
-NUMBA = importlib.util.find_spec("numba") is not None
-ENGINES = ("python", "native") if NUMBA else ("python",)
+ENGINES = ("python", "native") if native.is_there() else ("python",)
 METHODS = {
     "default": {},
     "accurate": dict(integrator="accurate", dt=1e-3),

@@ -20,8 +20,8 @@ from hapticclay.model.clay import Clay
 from hapticclay.model.signals import Multisine
 from hapticclay.studies import boundary, growth
 from tests.hunt import HUNTS, some
+from tests.kernel.test_engines import same
 from tests.oracles import parts, store
-from tests.stepping.test_compiled import fast, same
 
 SEEDS = some(range(16), 4)  # orders 1 to 4 of C in turns; four along x, four along y, twice
 TS = 3.6e-4
@@ -139,7 +139,6 @@ def at(r, times):
     return r.p[np.searchsorted(r.t, times - 1e-9)]
 
 
-@fast
 @pytest.mark.parametrize("seed", SEEDS)
 def test_shaped_borders_to_1e_7_s_of_the_matrix_exponential(seed):
     """The error is (h/tau)^2/12 of some 0.05 s, tau the times of servo and C, 10 ms and more.
@@ -166,7 +165,6 @@ def both_ways(seed, **kw):
     return dataclasses.replace(s, clay=Clay(x, y))
 
 
-@fast
 @pytest.mark.parametrize("seed", SEEDS)
 def test_unshaped_runs_are_those_of_scipy(seed):
     """Within 5e-7 m at 0.36 ms, 1e-7 m at 1.44 ms by the accurate method; both fall with the step.
@@ -201,7 +199,6 @@ OWN = {
 GAIN = {"order 0": hc.Compensator((1e-3,), (1.0,))}
 
 
-@fast
 @pytest.mark.parametrize("name", some(OWN | GAIN, 5))
 def test_fitted_order_of_both_methods(name):
     """2 from 0.36 to 2.88 ms, 4 from 0.36 to 1.44 ms.
@@ -226,7 +223,6 @@ def test_fitted_order_of_both_methods(name):
 # ---- sampled control
 
 
-@fast
 @pytest.mark.parametrize("seed", range(8))
 def test_sampled_axis_is_its_exact_discretisation(seed):
     """One axis, its torques held: exact as long as nothing but them and inertia moves the handle.
@@ -295,7 +291,6 @@ def discretised(s, i, b, samples):
     return np.array(out)
 
 
-@fast
 @pytest.mark.parametrize("seed", range(4))
 def test_sampled_arm_is_the_hybrid_system(seed):
     """Both axes and the arm as it is, exact between samples: to 1e-7 m, as with the paper's parts.
@@ -329,7 +324,6 @@ def test_a_gain_alone_is_taken_from_any_system_and_kept_by_a_file(make, tmp_path
     assert hc.Scenario.load(tmp_path / "gain.toml").compensator == hc.Compensator((2e-3,), (1.0,))
 
 
-@pytest.mark.plain
 def test_runs_with_a_gain_alone_answer_as_python_control():
     """A handle on a spring of 1/K in clay: p = (K G + S)(uh - (Th + b s) p), to a step of uh.
 
@@ -364,7 +358,6 @@ def test_runs_with_a_gain_alone_answer_as_python_control():
 # ---- stiff clay, hits, limits
 
 
-@fast
 @pytest.mark.parametrize("name", OWN)
 @pytest.mark.parametrize("b", [1e3, 1e4, 1e5, 1e6])
 def test_force_after_a_hit_is_of_second_order(name, b):
@@ -412,7 +405,6 @@ def _pushed(A, B, s):
 BORNE = "order 1, biproper", "order 2, biproper", "order 3", "order 4, biproper"
 
 
-@fast
 @pytest.mark.parametrize("limit", [(1e6, 1e6), (0.5, 0.3)], ids=["strong", "weak"])
 @pytest.mark.parametrize("b,turn", [(1e3, 3), (1e5, 2), (1e6, 0), (1e8, 1)], ids=str)
 def test_stiff_clay_is_borne_whatever_the_compensator(b, turn, limit):
@@ -435,7 +427,7 @@ def test_stiff_clay_is_borne_whatever_the_compensator(b, turn, limit):
         s = dataclasses.replace(s, gain=gain)
         r = hc.simulate(s, engine="native")
         if name == "order 2, biproper":
-            same(r, hc.simulate(s, engine="python"))
+            same(r, hc.simulate(s, engine="python"), name)
         assert np.all(np.isfinite(r.p)) and np.abs(r.p).max() < 0.05
         assert abs(r.energy["residual"]) < 1e-10 * r.energy["throughput"]
         inside = r.b[:, 0] > 0.0
@@ -444,7 +436,6 @@ def test_stiff_clay_is_borne_whatever_the_compensator(b, turn, limit):
         np.testing.assert_allclose(r.fe[inside], (r.b * r.v)[inside], rtol=1e-12)
 
 
-@fast
 @pytest.mark.parametrize(
     "kw",
     [
@@ -465,7 +456,6 @@ def test_accurate_method_divides_its_steps_where_parts_are_fast(kw):
     np.testing.assert_allclose(at(r, times), exact, atol=1e-7)
 
 
-@fast
 def test_torque_limits_with_another_arm():
     """Light and weak: what a limit cuts between samples is of first order in the step.
 
@@ -486,7 +476,6 @@ def test_torque_limits_with_another_arm():
         np.testing.assert_allclose(at(r, TIMES), exact, atol=within)
 
 
-@fast
 @pytest.mark.parametrize("seed", [0, 1, 4, 7])
 def test_friction_with_another_arm(seed):
     """Joints that slide one way all along, as the hybrid system under their constant torques."""
@@ -542,7 +531,6 @@ def loops(n):
             return
 
 
-@fast
 def test_boundary_by_runs_within_0_2_percent_of_python_control():
     """A step of 0.1 mN from rest leaves the arm linear; growth read by ESPRIT, and bracketed."""
     for s, i, b, K, omega in some(loops(8), 4):
@@ -565,7 +553,6 @@ def test_boundary_by_runs_within_0_2_percent_of_python_control():
         assert found == pytest.approx(K, rel=2e-3), (i, s.compensators[i], omega)
 
 
-@fast
 def test_designed_lead_is_felt_as_its_transparency_says():
     """The lead of docs/stability.md by a multisine; fe/fh at its lines from one steady period.
 

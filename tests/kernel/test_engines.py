@@ -1,8 +1,7 @@
-"""All engines make the same run, to the last bit: CPython, machine code, batches.
+"""All engines make the same run, to the last bit: CPython, the compiled kernel, batches.
 
-An entry of KINDS is one kind of scene, whose machine code takes 3 to 10 s to compile, and the
-scenes of it that differ in numbers, which cost next to nothing. `present` finds every trait of
-`model.support` under every method that takes it. Plain scenes are in test_compiled.
+An entry of KINDS is a method with some parts, in scenes that differ in numbers. `present` finds
+every trait of `model.support` under every method that takes it.
 """
 
 import dataclasses
@@ -12,18 +11,30 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
+from hapticclay.kernel import hardware, kick, records
+from hapticclay.kernel.native import is_there
 from hapticclay.model import support
 from hapticclay.model.cells import Profile
 from hapticclay.model.clay import LAWS, Clay
 from hapticclay.model.constants import TS
+from hapticclay.model.signals import Multisine
 from hapticclay.simulation import record
-from hapticclay.stepping.machine_code import kind_of
-from hapticclay.stepping.run import EngineStore, Run, completed
-from hapticclay.stepping.scene import parts_of
-from tests.stepping.test_compiled import GROWING, LAYERS, WAVE, fast
-from tests.stepping.test_kick import HANDS, OTHER, ZEROS
-from tests.stepping.test_own_controller import to_pose
-from tests.stepping.test_signals_in_runs import CASES as SIGNALS
+from hapticclay.simulation.run import Place, Run, completed
+from tests.hunt import HUNTS, some
+from tests.kernel import guards
+from tests.kernel.test_kick import CASES, HANDS, OTHER, ZEROS
+from tests.kernel.test_own_controller import to_pose
+from tests.kernel.test_signals_in_runs import CASES as SIGNALS
+
+native = pytest.mark.skipif(not is_there(), reason="needs the compiled kernel")
+GROWING = Clay(
+    Profile((0.01,), (50.0, 100.0), growth=(0.0, 300.0)),
+    Profile((0.01,), (50.0, 100.0), growth=(9.0, 0.0)),
+)
+WAVE = Multisine(rms=(1.0, 0.5), low=0.2, high=3.0, period=5.0, seed=5)
+LAYERS = Clay(
+    Profile((0.01, 0.02, 0.03), (0.0, 50.0, 500.0, 5.0)), Profile((0.001,), (10.0, 90.0), along="y")
+)
 
 PHYSICAL = dict(
     jitter=5e-5, dropout_probability=0.05, encoder=65536, velocity="difference",
@@ -142,6 +153,44 @@ def grooves(method, damping=0.0, **common):
     )  # fmt: skip
 
 
+MORE = {
+    "whole cut": hc.constant_cut(),
+    "muscle": dataclasses.replace(
+        hc.free(operator=hc.Operator(), t_max=1.0), clay=GROWING, length=None, muscle=WAVE
+    ),
+    "command": dataclasses.replace(
+        hc.free(t_max=1.0), command=dataclasses.replace(WAVE, rms=(1e-3, 2e-3))
+    ),
+    "growth": dataclasses.replace(hc.free(t_max=2.0), clay=GROWING),
+    "layers": dataclasses.replace(hc.free(t_max=1.0, force=(1.0, 0.3)), clay=LAYERS),
+    "at speed": dataclasses.replace(
+        hc.constant_cut(b=1e4, t_max=0.3, torque_limit=(1e5, 1e5)), velocity=(2.0, 0.0)
+    ),
+    "backwards": hc.constant_cut(start=(0.06, 0.0), force=(-1.0, 0.0), t_max=1.0),
+    "along a border": hc.constant_cut(start=(0.1501, 0.0), force=(0.0, 1.0), t_max=0.3),
+    "diverged": hc.constant_cut(gain=(1.0, 1.0)),
+    "thrown out of reach": hc.constant_cut(gain=(1e4, 1e4), torque_limit=(1e6, 1e6)),
+    "unstable, goes on": dataclasses.replace(
+        hc.constant_cut(gain=(25.0, 0.5), t_max=2.0), stop_when_unstable=False
+    ),
+    "stretched": hc.constant_cut(force=(1.0, 50.0)),
+    "stalled": hc.constant_cut(force=(0.0, 0.0), t_max=2.0),
+    "one short step": hc.constant_cut(t_max=1e-5),
+    "not on the grid": hc.constant_cut(t_max=0.1001),
+    "coarse": hc.constant_cut(dt=0.02, t_max=3.0),
+}
+
+
+STILL = {  # by the accurate method as well
+    "cut": hc.constant_cut(),
+    "off axis, origin": hc.constant_cut(force=(1.0, 0.3), t_max=3.0),
+    "stiff: substeps": hc.constant_cut(b=2e4, start=(0.049, 0.0), t_max=0.25),
+    "not on the grid": hc.constant_cut(t_max=0.9007),
+    **{
+        name: MORE[name]
+        for name in ("layers", "at speed", "backwards", "diverged", "stretched", "one short step")
+    },
+}
 OWN = hc.Controller(to_pose, (0.0, 0.0), (20.0, 2.0, 0.01))
 
 
@@ -150,6 +199,10 @@ FILTERED = dict(
     jitter=8e-5, dropout_probability=0.1, delay=0.4 * TS, force_filter=500.0, filter_order=1
 )
 KINDS = {
+    "fast: plain": CASES | MORE,
+    "accurate: plain": {
+        name: dataclasses.replace(s, integrator="accurate", dt=2e-3) for name, s in STILL.items()
+    },
     "fast: signals, growth": signals("fast", GROWS, inertia_shaping=True, operator=HAND)
     | variants(
         "fast", GROWS, dict(inertia_shaping=True, operator=HAND, muscle=WAVE, command=LED),
@@ -219,7 +272,6 @@ KINDS = {
         "physical", STIFF, dict(hardware=PHYSICAL) | FORMED,
         all={}, soft=dict(clay=SOFT), weak=WEAK,
     ),
-    # with hardware these would take minutes to compile
     "physical: yield by axis, springs": springs(
         method="physical", dt=4e-5, Ts=2e-4, t_max=0.04, velocity=(0.1, 0.0)
     ),
@@ -235,11 +287,6 @@ KINDS = {
 }  # fmt: skip
 HOLDS = [x for x in KINDS if "yield" in x and x[:4] in ("fast", "accu")]
 HOLDS += "fast: springs", "physical: yield along the motion"
-WHOLE = (  # of these, steps that may cross borders are compiled as well
-    "fast: yield by axis",
-    "accurate: form, cells, smooth, rotated",
-    "held: plain",
-)
 
 
 def same(a, b, what):
@@ -267,44 +314,21 @@ def plain_end(brief):
     return outcome, counts, [tuple(map(float, x)) for x in last], energy
 
 
-@fast
+@native
 @pytest.mark.parametrize("kind", KINDS)
-def test_all_engines_make_the_same_run(kind, monkeypatch):
-    from hapticclay.stepping import compiled
-
+def test_all_engines_make_the_same_run(kind):
     scenes = KINDS[kind]
-    assert len({kind_of(parts_of(s)) for s in scenes.values()}) == 1
-    monkeypatch.setattr(compiled, "enough", lambda kind: np.inf)  # whole steps alone
     plain = [hc.simulate(s, engine="python") for s in scenes.values()]
-    eventful(kind, dict(zip(scenes, plain, strict=True)))
-    native = [hc.simulate(s, engine="native") for s in scenes.values()]
+    if "plain" not in kind:
+        eventful(kind, dict(zip(scenes, plain, strict=True)))
+    compiled = [hc.simulate(s, engine="native") for s in scenes.values()]
     batch = hc.simulate_batch(scenes.values(), threads=2)
-    for name, *runs in zip(scenes, plain, native, batch, strict=True):
+    for name, *runs in zip(scenes, plain, compiled, batch, strict=True):
         for r in runs[1:]:
             same(r, runs[0], name)
     for (name, s), r in zip(scenes.items(), plain, strict=True):
-        last, _ = completed(s, 10**9, compiled.KERNEL, EngineStore(), brief=True)
+        last, _ = completed(s, 10**9, "native", Place(), brief=True)
         assert plain_end(last.brief()) == plain_end(record.brief(r)), name
-    if kind in WHOLE:
-        monkeypatch.setattr(compiled, "enough", lambda kind: -1.0)
-        for (name, s), r in zip(scenes.items(), plain, strict=True):
-            same(hc.simulate(s, engine="native"), r, name)
-
-
-@fast
-def test_machine_code_that_makes_no_step_is_not_asked_at_each(monkeypatch):
-    """Against a spring every step is a careful one: calls would take as long as the steps."""
-    from hapticclay.stepping import compiled
-
-    monkeypatch.setattr(compiled, "enough", lambda kind: np.inf)
-    s, asked, whole = KINDS["fast: springs"]["lasts"], [], compiled.WHOLE_STEPS
-    hc.simulate(s, engine="native")
-    monkeypatch.setattr(compiled, "WHOLE_STEPS", lambda *x: (asked.append(x), whole(*x))[1])
-    careful = compiled.met[kind_of(parts_of(s))]
-    r = hc.simulate(s, engine="native")
-    careful = compiled.met[kind_of(parts_of(s))] - careful
-    assert r.steps > careful > 500 and len(asked) < careful / 20
-    same(r, hc.simulate(s, engine="python"), "lasts")
 
 
 def test_the_kinds_have_every_part_with_every_method_that_takes_it():
@@ -312,7 +336,8 @@ def test_the_kinds_have_every_part_with_every_method_that_takes_it():
     for scenes in KINDS.values():
         for s in scenes.values():
             (method,) = support.present(s, support.METHODS)
-            found = (*support.present(s.clay, LAWS), *support.present(s, support.PARTS))
+            laws = support.present(s.clay, LAWS) if s.clay else []
+            found = (*laws, *support.present(s, support.PARTS))
             has |= {(method.name, x.name) for x in found}
     parts = [x.name for x in (*LAWS, *support.PARTS)]
     for method in support.METHODS:
@@ -320,9 +345,10 @@ def test_the_kinds_have_every_part_with_every_method_that_takes_it():
         assert takes == {x for name, x in has if name == method.name}
 
 
-def test_a_run_paused_at_every_sample_is_the_run():
+@pytest.mark.parametrize("engine", ["python", pytest.param("native", marks=native)])
+def test_a_run_paused_at_every_sample_is_the_run(engine):
     s = dataclasses.replace(KINDS["held: all hardware, signals"]["all"], t_max=0.05)
-    whole, parts = Run(s, 1), Run(s, 1)
+    whole, parts = Run(s, 1, engine), Run(s, 1, engine)
     whole.go(None)
     while parts.outcome is None:
         parts.advance(parts.filled + 1)
@@ -330,3 +356,65 @@ def test_a_run_paused_at_every_sample_is_the_run():
     for name, x in whole.arrays().items():
         assert (x == parts.arrays()[name]).all(), name
     assert whole.balance() == parts.balance()
+
+
+GUARDS = {
+    "fields have their types": guards.checked_fields,
+    "scratch is full of NaN": guards.spoiled_scratch,
+    "what is tried is tried twice": guards.repeated,
+}
+
+
+@pytest.mark.parametrize("guard", GUARDS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_strict_run_is_the_run(kind, guard):
+    """CPython, as strict as C: see guards. In the suite 0.1 s of three scenes of a kind."""
+    for name in some(KINDS[kind], 3):
+        s = KINDS[kind][name]
+        s = s if HUNTS else dataclasses.replace(s, t_max=min(s.t_max, 0.1))
+        with GUARDS[guard]():
+            r = hc.simulate(s, engine="python")
+        same(r, hc.simulate(s), name)
+
+
+def test_a_field_of_the_wrong_type_is_refused_by_name():
+    with guards.checked_fields():
+        k = records.Kick()
+        k.H, k.u[1], k.u[:2], k.x.v = 1.0, 2.0, (3.0, 4.0), 5.0
+        assert k.u == [3.0, 4.0, 0.0, 0.0] and k.axis[0].v == 5.0
+        for change in (
+            lambda: setattr(k, "H", 1),
+            lambda: setattr(k.y, "v", np.float64(1.0)),
+            lambda: setattr(records.State(), "i", 1.0),
+            lambda: setattr(records.Model(), "hand", True),
+            lambda: k.u.__setitem__(2, 1),
+            lambda: k.u.__setitem__(slice(None), (0.0, 1.0)),
+        ):
+            with pytest.raises(guards.WrongType):
+                change()
+    k.H = 1  # as before
+
+
+def test_stale_scratch_and_an_effect_of_an_event_are_seen(monkeypatch):
+    """The guards see a kick that reads what another left, and an event with an effect."""
+    s = dataclasses.replace(KINDS["held: plain"]["plain"], t_max=0.02)
+    r, drive, act = hc.simulate(s, engine="python"), hardware.drive, kick.act
+
+    def counts(m, s, t1, t2):
+        s.steps += 1
+        drive(m, s, t1, t2)
+
+    def stale(m, s, k):
+        left = k.x.u if s.i > 3 else 0.0
+        act(m, s, k)
+        k.x.f += 0.0 * left
+
+    with monkeypatch.context() as patch:
+        patch.setattr(hardware, "drive", counts)
+        once = hc.simulate(s, engine="python")
+        with guards.repeated():
+            assert hc.simulate(s, engine="python").steps > once.steps > r.steps
+    monkeypatch.setattr(kick, "act", stale)
+    assert hc.simulate(s, engine="python").outcome.code == r.outcome.code
+    with guards.spoiled_scratch():
+        assert hc.simulate(s, engine="python").outcome.code != r.outcome.code

@@ -1,4 +1,4 @@
-"""The accurate integrator: fourth order, by the laws of the loop, one source for both engines."""
+"""The accurate integrator: fourth order, by the laws of the loop."""
 
 import dataclasses
 
@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model import arm, controller
+from hapticclay.formulas import arm, controller
+from hapticclay.kernel import arm as arms
+from hapticclay.kernel import instant
 from hapticclay.model.operator import NO_HAND, Operator
-from hapticclay.stepping.engine_step import accelerations
-from hapticclay.stepping.instant import instant
-from hapticclay.stepping.run import Run
-from hapticclay.stepping.state import Axis, Moment, Point
+from hapticclay.simulation.run import Run
 from tests.oracles import laws, nonlinear, piecewise_linear, store
 from tests.oracles.links import Links
 
@@ -159,18 +158,20 @@ def test_a_stage_is_what_its_laws_say(name, x, b, held):
     """Put together from the laws, a stage is the same to rounding."""
     s = dataclasses.replace(hc.constant_cut(integrator="accurate"), **STAGES[name])
     s = dataclasses.replace(s, operator=s.operator or (hc.Operator() if held else None))
-    run = Run(s, 1)
-    parts, links, clay_now = run.views, s.arm.links, run.state.clay._replace(b=(b, b))
-    (q1, q2), (w1, w2) = run.state.body.q, x[:2]
+    row, links = Run(s, 1).row, s.arm.links
+    m, z, now = row.m, row.s.a.z, row.s.a.now
+    row.s.x.b = row.s.y.b = b
+    (q1, q2), (w1, w2) = (row.s.q1, row.s.q2), x[:2]
+    z.q1, z.q2, z.w1, z.w2 = q1, q2, w1, w2
     dx, dy, ex, ey, yx, yy, ydx, ydy = (0.1 * each for each in x[2:10])
-    form = None
-    if parts.form:
+    z.x.delta, z.x.rate, z.x.y, z.x.yrate = dx, ex, yx, ydx
+    z.y.delta, z.y.rate, z.y.y, z.y.yrate = dy, ey, yy, ydy
+    if m.formed:
         states = [0.1 * each for each in x[10:18]]
         states[s.compensators[0].order : 4] = [0.0] * (4 - s.compensators[0].order)
         states[7] = 0.0
-        form = tuple(states[:4]), tuple(states[4:])
-    z = Point((q1, q2), (w1, w2), Axis(dx, ex, yx, ydx), Axis(dy, ey, yy, ydy), form)
-    now = instant(parts, Moment(0.0, 0.0, -1, 0.0), z, clay_now, None)
+        z.x.z[:], z.y.z[:] = states[:4], states[4:]
+    instant.evaluate(m, row.s, z, 0.0, -1, now)
     hands = [th or NO_HAND for th in s.operators]
     u = arm.jacobian(q1, q2, links)
     p = (Links(*links[:4]).forward((q1, q2)) - s.origin).tolist()
@@ -184,9 +185,9 @@ def test_a_stage_is_what_its_laws_say(name, x, b, held):
     a, hand, shown, feed = [], [], [dx, dy], [0.0, 0.0]
     for i, (y, yd) in enumerate(((yx, ydx), (yy, ydy))):
         th, servo = hands[i], s.servo[i]
-        if form:
+        if m.formed:
             _, _, C, D = s.compensators[i].state_space()
-            shown[i] += C @ form[i][: len(C)]
+            shown[i] += C @ z.axis[i].z[: len(C)]
             feed[i] = s.gain[i] * D
             W[2 * i] += servo.G.gain * feed[i]  # a force moves delta, and delta the reference
         ydd = servo.G.gain * shown[i] - servo.G.stiffness * y - servo.G.damping * yd
@@ -204,7 +205,9 @@ def test_a_stage_is_what_its_laws_say(name, x, b, held):
     fh = out[4] + fe[0], out[5] + fe[1]
     delta = shown[0] + feed[0] * out[4], shown[1] + feed[1] * out[5]
     expected = (*p, *v, *fh, *out[6:8], *delta)
-    sample = *now.p, *now.v, *now.fh, *now.tau, *now.delta
+    k, of_x, of_y = row.s.k, now.x, now.y
+    sample = k.x.p, k.y.p, k.x.v, k.y.v, of_x.fh, of_y.fh, now.tau1, now.tau2
+    sample = *sample, of_x.shown, of_y.shown
     np.testing.assert_allclose(sample, expected, rtol=1e-11, atol=1e-11)
 
 
@@ -214,20 +217,22 @@ def test_a_stage_is_what_its_laws_say(name, x, b, held):
 def test_the_joints_accelerate_as_in_mj_forward(name, x, bx, by):
     """Its dampers and motors act there; the method applies their torques itself."""
     s = dataclasses.replace(hc.constant_cut(integrator="accurate"), **STAGES[name])
-    run = Run(s, 1)
+    row = Run(s, 1).row
     q = 1.2 + x[0], -1.5 + x[1]
-    still = Axis(0.0, 0.0, 0.0, 0.0)
-    z = Point(q, x[2:], still, still, run.state.loop.form)
-    clay = run.state.clay._replace(b=(bx, by))
-    now = instant(run.views, Moment(0.0, 0.0, -1, 0.0), z, clay, None)
-    found = accelerations(run.e.probe, z, now)
+    z, now = row.s.a.z, row.s.a.now
+    (z.q1, z.q2), (z.w1, z.w2) = q, x[2:]
+    for axis, start in zip(z.axis, row.s.axis, strict=True):
+        axis.z[:] = start.z
+    row.s.x.b, row.s.y.b = bx, by
+    instant.evaluate(row.m, row.s, z, 0.0, -1, now)
+    found, tau, fh = arms.accelerations(row.m, z, now), (now.tau1, now.tau2), (now.x.fh, now.y.fh)
     model = hc.build(s)
     data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:], data.ctrl[:] = q, x[2:], (*now.tau, bx, by)
+    data.qpos[:], data.qvel[:], data.ctrl[:] = q, x[2:], (*tau, bx, by)
     u = arm.jacobian(*q, s.arm.links)  # type: ignore[call-arg]
-    data.qfrc_applied[:] = arm.joint_torques(*now.fh, u)
+    data.qfrc_applied[:] = arm.joint_torques(*fh, u)
     mujoco.mj_forward(model, data)
-    scale = np.abs(data.qacc).max() + np.abs(now.fh).max() * 10.0
+    scale = np.abs(data.qacc).max() + np.abs(fh).max() * 10.0
     # rounding, 1e-16, times the condition of the inertia, up to 1e2, and the forces that cancel
     np.testing.assert_allclose(found, data.qacc, rtol=0.0, atol=1e-12 * (1.0 + scale))
 

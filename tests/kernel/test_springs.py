@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 import hapticclay as hc
 from hapticclay.theory import linear_loop
-from tests.stepping.test_yield import V0, M, slider
+from tests.kernel.test_yield import V0, M, slider
 
 HIT = 0.01 / V0  # when the slider comes to the wall [s]
 
@@ -108,7 +108,6 @@ def test_a_zener_wall_relaxes_to_its_lasting_spring():
     assert r.energy["springs_dissipated"] > 0.0
 
 
-@pytest.mark.plain
 def test_steps_and_files_agree_with_the_run(tmp_path):
     spring = hc.Spring(k=2e4, limit=3.0, k1=1e3, tau=0.05, unilateral=True)
     s = dataclasses.replace(
@@ -139,7 +138,6 @@ def without_samples():
     return hc.simulate(s)
 
 
-@pytest.mark.plain
 @pytest.mark.parametrize("render", ["physical", "held"])
 def test_sampled_control_meets_the_same_springs(render):
     exact = without_samples()
@@ -163,7 +161,6 @@ def test_springs_are_refused_where_no_law_of_them_is_known():
         dataclasses.replace(s, clay=dataclasses.replace(s.clay, angle=0.1))
 
 
-@pytest.mark.plain
 def test_a_held_spring_pulls_at_the_place_that_the_encoder_reads():
     # soft and lasting: nothing yields or relaxes, so the force tells the place
     k, counts = 800.0, 4096
@@ -183,7 +180,6 @@ def test_a_held_spring_pulls_at_the_place_that_the_encoder_reads():
     assert a.fe[:-1:5, 0][beyond] == pytest.approx(k * read[beyond], abs=1e-9)
 
 
-@pytest.mark.plain
 def test_an_encoder_changes_yielding_and_relaxing_springs_by_its_rounding():
     # far finer than the motion: the same run as without one, to what a count does to the force
     spring = hc.Spring(k=2e3, limit=3.0, k1=500.0, tau=0.1, unilateral=True)

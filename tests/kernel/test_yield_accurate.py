@@ -12,10 +12,10 @@ from scipy.integrate import quad
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
+from hapticclay.kernel import modes, pace
 from hapticclay.model.cells import Profile
 from hapticclay.model.clay import Clay
-from hapticclay.stepping import modes, pace
-from hapticclay.stepping.run import Run
+from hapticclay.simulation.run import Run
 from tests.hunt import HUNTS, examples
 from tests.oracles import store
 from tests.oracles.yielding import yielding_case
@@ -245,10 +245,11 @@ def test_below_the_yield_force_nothing_moves(along):
         t_max=0.5, start=(0.05, 0.02),
     )  # fmt: skip
     run = Run(s, 1)
-    q = run.data.qpos.copy()
+    data = run.row.mover.data
+    q = data.qpos.copy()
     run.go(None)
     r = run.arrays()
-    assert np.array_equal(run.data.qpos, q) and np.all(run.data.qvel == 0.0)
+    assert np.array_equal(data.qpos, q) and np.all(data.qvel == 0.0)
     assert np.all(r["v"] == 0.0) and np.all(r["qd"] == 0.0) and np.ptp(r["p"], axis=0).max() == 0.0
     assert [x.axis for x in run.stops] == (["xy"] if along else ["x", "y"])
     assert all(x.start == 0.0 and x.end is None for x in run.stops)

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.model import arm
+from hapticclay.formulas import arm
+from hapticclay.model.arm import PAPER, jacobians
 from tests.oracles import Arm
 from tests.oracles.links import Links
 
@@ -47,7 +48,7 @@ def test_columns_are_the_jacobian_in_absolute_angles(a, q1, q2):
     u = arm.jacobian(q1, q2, a.links)
     found, exact = columns(u) @ relative, oracle(a).jacobian((q1, q2))
     np.testing.assert_allclose(found, exact, atol=4 * EPS * size(a))
-    several = arm.jacobians(np.full(3, q1), np.full(3, q2), a.links)
+    several = jacobians(np.full(3, q1), np.full(3, q2), a.links)
     # NumPy's sines may differ from those of math in the last bit
     np.testing.assert_allclose(several, np.repeat(u, 3).reshape(4, 3), atol=EPS * size(a))
 
@@ -80,7 +81,7 @@ def test_trace_of_mobility_is_the_same_at_every_pose(a, q1, q2):
 
 
 def test_trace_of_mobility_is_the_sum_of_the_printed_gains():
-    assert arm.PAPER.links[4] == pytest.approx(0.7919 + 0.131, rel=4 * EPS)
+    assert PAPER.links[4] == pytest.approx(0.7919 + 0.131, rel=4 * EPS)
 
 
 @given(arms, angle, elbow, st.floats(-5, 5), st.floats(-5, 5))
@@ -96,7 +97,7 @@ def test_rates_invert_the_jacobian(a, q1, q2, vx, vy):
 @given(st.floats(0.12, 0.58), st.floats(-3.1, 3.1))
 def test_inverse_reaches_the_point_with_the_elbow_bent_right(r, phi):
     x, y = r * math.cos(phi), r * math.sin(phi)
-    q1, q2 = arm.inverse_kinematics(x, y, arm.PAPER.links)
+    q1, q2 = arm.inverse_kinematics(x, y, PAPER.links)
     # acos loses half the digits near the stretched arm; 0.58 m keeps sin(q2) above 0.15
     np.testing.assert_allclose(Arm.forward((q1, q2)), (x, y), atol=100 * EPS)
     assert q2 < 0.0
@@ -106,8 +107,8 @@ def test_inverse_reaches_the_point_with_the_elbow_bent_right(r, phi):
 def test_inverse_takes_the_remainder_by_a_turn_exactly(r, phi):
     """Bit for bit the IEEE remainder, for which compiled code has no function."""
     x, y = r * math.cos(phi), r * math.sin(phi)
-    q1, q2 = arm.inverse_kinematics(x, y, arm.PAPER.links)
-    l1, l2 = arm.PAPER.l1, arm.PAPER.l2
+    q1, q2 = arm.inverse_kinematics(x, y, PAPER.links)
+    l1, l2 = PAPER.l1, PAPER.l2
     turned = math.atan2(y, x) - math.atan2(l2 * math.sin(q2), l1 + l2 * math.cos(q2))
     assert q1 == math.remainder(turned, 2.0 * math.pi)
 
@@ -141,8 +142,8 @@ def test_torques_rates_and_accelerations_of_the_links(a, x, q1, q2):
 
 
 def test_nominal_pose_is_decoupled_with_the_printed_inertias():
-    u = arm.jacobian(math.pi / 2, -math.pi / 2, arm.PAPER.links)
-    wxx, wxy, wyy = arm.mobility(u, arm.PAPER.links)
+    u = arm.jacobian(math.pi / 2, -math.pi / 2, PAPER.links)
+    wxx, wxy, wyy = arm.mobility(u, PAPER.links)
     assert (wxx, wyy) == pytest.approx((0.7919, 0.131), rel=8 * EPS)
     assert abs(wxy) < 4 * EPS
     assert (u[1] + u[3], -u[0] - u[2]) == pytest.approx((0.35, 0.24), abs=4 * EPS)

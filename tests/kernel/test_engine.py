@@ -1,7 +1,6 @@
 """The MJCF files compile without a warning and mean what they say."""
 
 import dataclasses
-from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -10,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay.model import arm
+from hapticclay.formulas import arm
+from hapticclay.kernel import arm as arms
+from hapticclay.kernel import engine, path, records
 from hapticclay.model.signals import Multisine
-from hapticclay.stepping import engine, kick, path
 from hapticclay.views import stage
 from tests.oracles.links import Links
 
@@ -169,8 +169,9 @@ def test_the_model_is_that_of_any_arm(a, q1, q2):
     own, links, bound = Links(a.l1, a.l2, a.I1, a.I2), a.links, 1e-14 * max(1.0, a.l1 + a.l2)
     p, J, M = engine.arm_at((q1, q2), a)
     np.testing.assert_allclose(p, own.forward((q1, q2)), atol=bound)
-    here = kick.place(SimpleNamespace(links=links, ox=0.0, oy=0.0), (q1, q2))
-    np.testing.assert_allclose(here, p, atol=bound)
+    m = records.Model()
+    m.links[:] = links
+    np.testing.assert_allclose(arms.place(m, q1, q2), p, atol=bound)
     np.testing.assert_allclose(J, own.jacobian((q1, q2)), atol=bound)
     np.testing.assert_allclose(M, own.M, rtol=1e-13)
     u = arm.jacobian(q1, q2, links)
@@ -198,7 +199,6 @@ def test_a_run_steps_the_arm_of_its_scenario(clay):
     )
 
 
-@pytest.mark.plain
 def test_a_step_beyond_arithmetic_keeps_the_events_before_it(monkeypatch):
     """Machine code goes on with NaN, CPython raises: the crossings and stops are the same."""
     law = hc.Profile((-0.002, 0.002), (5.0, 50.0, 20.0), Fy=(0.0, 1.0, 1.0))
@@ -211,10 +211,10 @@ def test_a_step_beyond_arithmetic_keeps_the_events_before_it(monkeypatch):
     assert len(whole.crossings) == 2 and whole.stops
     careful, last = path.step_to_event, whole.stops[-1].start + s.dt
 
-    def breaking(parts, now, e):
-        if now.clock.t > last:
+    def breaking(m, s):
+        if s.t > last:
             raise ZeroDivisionError
-        return careful(parts, now, e)
+        careful(m, s)
 
     monkeypatch.setattr(path, "step_to_event", breaking)
     broken = hc.simulate(s, engine="python")

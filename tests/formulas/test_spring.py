@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay.model import spring
+from hapticclay.formulas import spring
 
 
 def cycle(k, limit, x, steps=4001):
