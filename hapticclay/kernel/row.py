@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,14 +56,16 @@ class Row:
 
     Attributes:
         caller: of the user's own controller, None without any.
+        failed: what functions of the user's laws raised.
     """
 
     m: Any
     s: Any
     engine: str
+    failed: list[BaseException]
 
     def __init__(self, scenario: Scenario, mover: Mover, buffers: Buffers):
-        self.buffers, self.mover = buffers, mover
+        self.buffers, self.mover, self.failed = buffers, mover, []
         self.take(scenario)
         self.begin(scenario)
 
@@ -119,6 +122,18 @@ class Row:
         for law, z in zip(self.laws, laws, strict=False):
             law.z[law.first :] = z[law.first :]
         self.go_on()
+
+    @property
+    def is_called(self) -> bool:
+        """Whether steps call functions of the user, which may fail."""
+        return self.caller is not None or bool(self.laws)
+
+    def check(self) -> None:
+        """Raises what functions of the user raised."""
+        if self.failed:
+            raise self.failed[0]
+        if self.caller is not None:
+            self.caller.check()
 
     # ---- what depends on who advances it
 
@@ -209,7 +224,7 @@ class PlainRow(Row):
     def put_functions(self) -> None:
         self.m.control = self.caller
         for slot, law in zip(self.m.law, self.laws, strict=False):
-            slot.load, slot.moved, slot.force = law.module.load, law.module.moved, law.module.force
+            slot.load, slot.moved, slot.force = kept(law.module, self.failed)
             slot.z, slot.scratch = memoryview(law.z), memoryview(law.z.copy())
             slot.size = len(law.z)
 
@@ -297,7 +312,7 @@ class NativeRow(Row):
             scratch = law.z.copy()
             slot.z, slot.scratch, slot.size = law.z.ctypes.data, scratch.ctypes.data, len(law.z)
             both = {x.ctypes.data: memoryview(x) for x in (law.z, scratch)}
-            for name, kind, function in called_by_address(law.module, both):
+            for name, kind, function in called_by_address(kept(law.module, self.failed), both):
                 setattr(slot, name, self._address(kind, function))
 
     def _address(self, kind: Any, function: Any) -> Any:
@@ -342,14 +357,47 @@ MOVED = ctypes.CFUNCTYPE(None, PLACE, *[FLOAT] * 5)
 FORCE = ctypes.CFUNCTYPE(None, PLACE, *[FLOAT] * 4, ctypes.POINTER(FLOAT))
 
 
-def called_by_address(law: Any, at: dict[int, Any]) -> Any:
+def called_by_address(functions: Any, at: dict[int, Any]) -> Any:
     """The functions of a law of a user, as compiled code calls them: name, type, function.
 
     Args:
-        law: the module.
-        at: its numbers by their address.
+        functions: as from `kept`.
+        at: numbers of the law by their address.
     """
+    load, moved, force = functions
     kick = layout.struct_of(records.Kick)
-    yield "load", LOAD, lambda z, k: law.load(at[z], kick.from_address(k))
-    yield "moved", MOVED, lambda z, *numbers: law.moved(at[z], *numbers)
-    yield "force", FORCE, lambda z, *numbers: law.force(at[z], *numbers)
+    yield "load", LOAD, lambda z, k: load(at[z], kick.from_address(k))
+    yield "moved", MOVED, lambda z, *numbers: moved(at[z], *numbers)
+    yield "force", FORCE, lambda z, *numbers: force(at[z], *numbers)
+
+
+def kept(law: Any, failed: list[BaseException]) -> Any:
+    """load, moved and force of a law of a user, whose exceptions are kept: the run ends by NaN.
+
+    Compiled code would drop them; in CPython one of arithmetic would be that of a straight arm.
+
+    Args:
+        law: the module.
+        failed: gets the exceptions.
+    """
+
+    def tried(function: Any, *arguments: Any) -> bool:
+        try:
+            if not failed:
+                function(*arguments)
+        except BaseException as error:  # Ctrl-C too
+            failed.append(error)
+        return not failed
+
+    def load(z: Any, k: Any) -> None:
+        if not tried(law.load, z, k):
+            k.x.f = k.y.f = math.nan
+
+    def moved(z: Any, *numbers: float) -> None:
+        tried(law.moved, z, *numbers)
+
+    def force(z: Any, px: float, py: float, vx: float, vy: float, out: Any) -> None:
+        if not tried(law.force, z, px, py, vx, vy, out):
+            out[0] = out[1] = math.nan
+
+    return load, moved, force

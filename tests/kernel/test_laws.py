@@ -1,7 +1,9 @@
 """Laws of the clay in modules of their own, in every method, against independent solutions."""
 
 import dataclasses
+import itertools
 import pickle
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from tests.oracles.hardening_law import DAMPING, WAY
 
 CLAY = 5.0  # [N.s/m] of the viscous clay around the law
 ARRAYS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
+CONTRACT = "numbers", "refuses", "start", "load", "moved", "force"
 METHODS = {
     "continuous": dict(),
     "accurate": dict(integrator="accurate", dt=2e-3),
@@ -203,3 +206,33 @@ def test_batches_carry_the_law(both):
     single = np.array([hc.simulate(many[i], engine="python").p[-1] for i in at])
     np.testing.assert_array_equal(ends["p"][at], single)
     assert not np.array_equal(single, single[0])
+
+
+FAILS = {
+    "load": lambda z, k: 1 / 0,
+    "moved": lambda z, px, py, vx, vy, h: 1 / 0,
+    "force": lambda z, px, py, vx, vy, out: 1 / 0,
+}
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+@pytest.mark.parametrize("function", FAILS)
+def test_what_a_law_raises_ends_the_run_and_is_raised(function, engine, monkeypatch, capfd):
+    functions = {name: getattr(drag_law, name) for name in CONTRACT}
+    law = SimpleNamespace(**functions | {function: later(functions[function], FAILS[function])})
+    monkeypatch.setattr(user_laws, "TABLE", [law])
+    for s in (scene(), scene(control="sampled", render="physical")):
+        with pytest.raises(ZeroDivisionError):
+            hc.simulate(s, engine=engine)
+        with pytest.raises(ZeroDivisionError), hc.Simulation(s, engine=engine) as one:
+            while one.outcome is None:
+                one.step()
+    with pytest.raises(ZeroDivisionError):
+        hc.simulate_batch([scene(force=(0.1 * i, 0.0)) for i in range(6)], keep="summaries")
+    assert not capfd.readouterr().err
+
+
+def later(plain, fails):
+    """A function that fails at each third call and then no more."""
+    calls = itertools.count(1)
+    return lambda *arguments: (fails if next(calls) % 3 == 0 else plain)(*arguments)
