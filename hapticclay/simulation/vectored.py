@@ -104,7 +104,7 @@ class VectoredRuns:
             scenario: what it runs from now on; None for what it was given last.
         """
         run = self.runs[k]
-        if scenario is None and not self.changed[k] and run.drives is None and not run.row.is_called:
+        if scenario is None and not self.changed[k] and not run._prepares:
             run.restart()
             run.scenario = self.given[k]
             run.push_evenly((0.0, *scene.steady_force(run.scenario), 0.0, 0.0))
