@@ -151,19 +151,30 @@ class BatchPool:
     def run(self, scenario: Scenario) -> tuple[Run, float]:
         """Makes a run.
 
+        Args:
+            scenario: what to run.
+
         Returns:
             The run and the seconds it took.
         """
         return self._go(scenario, self.every, False)
 
     def brief(self, scenario: Scenario) -> tuple[Any, ...]:
-        """The end of a run, without its samples."""
+        """The end of a run, without its samples.
+
+        Args:
+            scenario: what to run.
+        """
         return self._go(scenario, LAST_ONLY, True)[0].brief()
 
     def many(
         self, scenarios: Sequence[Scenario], keys: Sequence[Any]
     ) -> tuple[list[tuple[np.ndarray, dict[str, Any]]], list[int]]:
         """Makes short runs of one kind together, without their samples.
+
+        Args:
+            scenarios: what to run.
+            keys: of each, from `kind_key`.
 
         Returns:
             As Lane.make.

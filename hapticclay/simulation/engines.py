@@ -54,7 +54,11 @@ def made_by() -> str:
 
 
 def tell(why: str) -> None:
-    """Says once that runs are slow, why, and what helps."""
+    """Says once that runs are slow, why, and what helps.
+
+    Args:
+        why: there is no compiled kernel.
+    """
     global _told
     if not _told:
         _told = True

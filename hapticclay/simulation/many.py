@@ -94,7 +94,11 @@ class Pattern:
         self.is_made = not self.row.m.formed
 
     def models(self, d: Draws) -> tuple[np.ndarray, list[np.ndarray]]:
-        """The models of runs, and the arrays that they name."""
+        """The models of runs, and the arrays that they name.
+
+        Args:
+            d: their differences.
+        """
         out, kept = np.repeat(self.row.models, len(d.gain)), []
         out["ox"], out["oy"] = d.origin.T
         axis = out["axis"]
@@ -207,7 +211,11 @@ def draws_of(jobs: Sequence[Scenario]) -> Draws:
 
 
 class Lane:
-    """Makes many runs in one thread."""
+    """Makes many runs in one thread.
+
+    Args:
+        place: where they are made.
+    """
 
     def __init__(self, place: Place):
         self.place, self.known = place, dict[Any, Pattern]()
@@ -253,6 +261,10 @@ class Lane:
 
     def group(self, p: Pattern, d: Draws) -> tuple[dict[str, Any], np.ndarray]:
         """Makes runs of one kind.
+
+        Args:
+            p: its pattern.
+            d: the differences of the runs.
 
         Returns:
             Fields of the summaries of the good ones; which are good, shape (n,).

@@ -95,7 +95,11 @@ def has_map(s: Scenario, m: Any) -> bool:
 
 
 def warm_periods(m: Any) -> int:
-    """Periods after which the rings of the hardware are full."""
+    """Periods after which the rings of the hardware are full.
+
+    Args:
+        m: the model of a scene.
+    """
     late = delay_in_samples(m.delay, m.Ts)[0] if m.delay > 0.0 else -1
     return max(SETTLED, m.window, late + 1) if m.ratio else SETTLED
 
@@ -104,7 +108,11 @@ def warm_periods(m: Any) -> int:
 
 
 def number_of(*names: Any) -> int:
-    """Index of a number of a state, by names and indices that lead to it."""
+    """Index of a number of a state.
+
+    Args:
+        names: fields and indices that lead to it.
+    """
     kind, at = layout.dtype_of(records.State), 0
     for name in names:
         if isinstance(name, int):
@@ -180,7 +188,11 @@ def coordinates(m: Any, i: int) -> list[int]:
 
 
 def rings_of(m: Any) -> list[Ring]:
-    """The rings of the hardware, and the state of the user's own controller."""
+    """The rings of the hardware, and the state of the user's own controller.
+
+    Args:
+        m: the model of a scene.
+    """
     found = []
     if m.window:
         found.append(Ring("angles", "oldest", "", 3, ((1,), (2,))))
@@ -208,7 +220,11 @@ class Copies(NamedTuple):
     rings: list[np.ndarray]
 
     def repeated(self, n: int) -> Copies:
-        """Each copy n times."""
+        """Each copy several times.
+
+        Args:
+            n: how often.
+        """
         return Copies(np.repeat(self.states, n), [np.repeat(x, n, axis=0) for x in self.rings])
 
     @property

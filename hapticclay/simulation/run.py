@@ -68,7 +68,11 @@ class NeedsMonitor(Exception):
 
 
 class Place:
-    """Where successive runs are made: the engines that move their arms, and what they fill."""
+    """Where successive runs are made: the engines that move their arms, and what they fill.
+
+    Args:
+        movers: the engines; its own if None.
+    """
 
     def __init__(self, movers: mover.Movers | None = None):
         self.movers, self.buffers = movers or mover.Movers(), Buffers()
@@ -116,6 +120,7 @@ class Run:
         every: keep each every-th sample, and the last.
         engine: who makes the steps, "python" or "native".
         place: where it is made; a place of its own if None.
+        **kept: how it is made, and what is kept; of these
         brief: keep no samples, for `brief` alone.
         watched: let the monitor check all rows; else NeedsMonitor is raised where it must check
             rows that are not kept.
@@ -192,6 +197,11 @@ class Run:
         return self.row.s.i
 
     @property
+    def q(self) -> tuple[float, float]:
+        """Present angles of shoulder and elbow [rad]."""
+        return self.row.s.q1, self.row.s.q2
+
+    @property
     def filled(self) -> int:
         """Number of samples not judged yet."""
         return self.row.s.row
@@ -265,7 +275,11 @@ class Run:
         s.steps = s.crossing = s.stopped = 0
 
     def draw(self, n: int) -> None:
-        """Draws the random effects on the control samples of the next n whole steps."""
+        """Draws the random effects on the next control samples.
+
+        Args:
+            n: whole steps in which they lie.
+        """
         m, k = self.row.m, self.row.s.now.k
         if not m.chance:
             return
@@ -280,7 +294,11 @@ class Run:
         self._noise.forget(k)
 
     def take_over(self, controller: Controller) -> None:
-        """Lets the user's own controller act, before the first step of a sampled run."""
+        """Lets the user's own controller act, before the first step of a sampled run.
+
+        Args:
+            controller: of the user.
+        """
         self._controller = controller
         self.row.take(self.scenario, controller)
         self.row.begin(self.scenario)
@@ -303,7 +321,11 @@ class Run:
                 break
 
     def restore(self, saved: Saved) -> None:
-        """Returns to a sample; the record is not changed."""
+        """Returns to a sample; the record is not changed.
+
+        Args:
+            saved: from `row.saved` there.
+        """
         self.row.restore(saved)
         self._shown = None
 
@@ -324,7 +346,11 @@ class Run:
         return Snapshot(self.scenario, saved, self._saved, buffers.rows[:n].copy(), rendered, kept)
 
     def return_to(self, x: Snapshot) -> None:
-        """Returns to a snapshot of a run of this scenario, or of one that it was changed from."""
+        """Returns to a snapshot.
+
+        Args:
+            x: of a run of this scenario, or of one that it was changed from.
+        """
         if x.scenario != self.scenario:
             self.scenario = x.scenario
             self.row.take(x.scenario, self._controller)
@@ -335,13 +361,21 @@ class Run:
             setattr(self, name, value)
 
     def change(self, scenario: Scenario) -> None:
-        """Continues with another gain, operator, force or clay between the same borders."""
+        """Continues in another scene.
+
+        Args:
+            scenario: with another gain, operator, force or clay between the same borders.
+        """
         self.scenario = self.watch.scenario = scenario
         self.row.change(scenario, self._controller)
         self._shown = None
 
     def go(self, progress: Callable[[float, float], bool | None] | None) -> None:
-        """Runs to the end, until progress returns True, or until sample `pause`."""
+        """Runs to the end, or until sample `pause`.
+
+        Args:
+            progress: as in `simulate`.
+        """
         while self.outcome is None and self.i < self.pause:
             self.advance(int(min(CHUNK - 1, self.pause - self.looked)))
             if self.filled >= CHUNK - 1 or self.outcome:
@@ -350,7 +384,10 @@ class Run:
                 self.flush()
 
     def hop(self, n: int) -> bool:
-        """Makes n steps where there is nothing to prepare, nor a check among them.
+        """Makes steps where there is nothing to prepare, nor a check among them.
+
+        Args:
+            n: how many.
 
         Returns:
             Whether they are made, or the run is over.
@@ -380,12 +417,20 @@ class Run:
         self.flush()
 
     def change_force(self, force: tuple[float, float]) -> None:
-        """Continues under another constant muscle force."""
+        """Continues under another constant muscle force.
+
+        Args:
+            force: the force, (x, y) [N].
+        """
         self.scenario = with_checked(self.scenario, force=force)
         self.push_evenly((0.0, *scene.steady_force(self.scenario), 0.0, 0.0))
 
     def change_gain(self, gain: tuple[float, float]) -> None:
-        """Continues with another gain."""
+        """Continues with another gain.
+
+        Args:
+            gain: K of x and y [1/kg].
+        """
         changed = with_checked(self.scenario, gain=gain)
         if scene.takes_gain(self.row.m):
             self.scenario = self.watch.scenario = changed
@@ -458,7 +503,12 @@ class Run:
         return list(self._shown)
 
     def torque_reached(self, n: int, k: int) -> list[float]:
-        """As `torque_reached`, in the last rows of those not judged yet."""
+        """As `torque_reached`, in the last rows of those not judged yet.
+
+        Args:
+            n: number of rows, at most.
+            k: how many reach it.
+        """
         end = self.filled
         return torque_reached(self.place.buffers.rows[max(end - n, 0) : end], k).tolist()
 
@@ -726,6 +776,14 @@ def completed(
     brief: bool = False,
 ) -> tuple[Run, float]:
     """Makes a run; repeats it if the monitor must check rows that are not kept.
+
+    Args:
+        scenario: what to run.
+        every: keep each every-th sample, and the last.
+        engine: who makes the steps, "python" or "native".
+        place: where it is made.
+        progress: as in `simulate`.
+        brief: keep no samples, for `brief` alone.
 
     Returns:
         The run and the seconds it took.

@@ -139,7 +139,7 @@ class Window:
         frames, anew = play.frames[max(self.shown - 1, 0) :], self.shown == 0
         self.shown = len(play.frames)
         live = isinstance(play, Session)
-        angles = play.run.data.qpos.tolist() if live else play.source.q[play.n].tolist()
+        angles = list(play.run.q) if live else play.source.q[play.n].tolist()
         writing, now = None, time.perf_counter()
         if now - self.written >= WRITE_TIME:
             self.written, writing = now, self._writing()

@@ -9,6 +9,7 @@ import pytest
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model import support
+from tests.views.test_clay_laws import CLAYS
 
 METHODS = {
     "fast": {},
@@ -20,6 +21,8 @@ LAW = {  # fields of a Profile
     "viscous": {}, "growth": dict(growth=(0.0, 5.0)), "yield by axis": dict(Fy=(0.0, 0.5)),
     "springs": dict(springs=(hc.Spring(), hc.Spring(k=100.0))),
 }  # fmt: skip
+OF_CLAY = ("smooth", "cells", "rotated axes", "yield along the motion", "groove")
+ADDED = {name: clay.x for name, clay in CLAYS.items() if name not in (*LAW, *OF_CLAY)}
 WIRED = {
     "hardware": {}, "jitter": dict(jitter=1e-5), "dropouts": dict(dropout_probability=0.1),
     "encoder": dict(encoder=65536), "velocity by difference": dict(velocity="difference"),
@@ -46,13 +49,18 @@ def law_of(name):
         return hc.Smooth((0.0, 0.1), (-0.1, 0.1), ((5.0, 20.0), (5.0, 20.0)))
     if name == "cells":
         return hc.Grid((0.02,), (0.0,), ((1.0, 2.0), (3.0, 20.0)))
-    return hc.Profile((0.02,), (5.0, 20.0), **LAW.get(name, {}))
+    return ADDED.get(name) or hc.Profile((0.02,), (5.0, 20.0), **LAW.get(name, {}))
+
+
+def is_of_axis(name):
+    """Whether a trait is the law of an axis."""
+    return name in LAW or name in ADDED or name in ("smooth", "cells")
 
 
 def clay_of(names):
     """Clay with some traits: the law of the first lies along x, that of the second along y."""
     if "groove" in names:
-        others = [law_of(x) for x in names if x in LAW or x in ("smooth", "cells")]
+        others = [law_of(x) for x in names if is_of_axis(x)]
         law = others[0] if others else hc.Profile((), (0.0,))
         if "yield along the motion" in names:
             law = hc.Profile((0.02,), (5.0, 20.0), **LAW["yield by axis"])
@@ -63,7 +71,7 @@ def clay_of(names):
         )
     along, own = (
         "yield along the motion" in names,
-        [x for x in names if x in LAW or x in ("smooth", "cells")],
+        [x for x in names if is_of_axis(x)],
     )
     laws = [law_of(own[0] if own else "viscous"), law_of(own[-1] if own else "viscous")]
     if along and "cells" in own:

@@ -131,7 +131,7 @@ def test_first_view_holds_arm_and_clay(scenario, width, height):
         shoulder = [0.06 * ring + (0.0, 0.0, stage.GROUND), 0.042 * ring + (0.0, 0.0, 0.022)]
         x, y = np.add(s.start, s.origin)
         hand = np.array([(x, y, 0.07), (x + 0.12, y, 0.052), (x, y + 0.12, 0.052)])
-        q = page.session.run.data.qpos[0]
+        q = page.session.run.q[0]
         elbow = 0.026 * ring + (constants.L1 * np.cos(q), constants.L1 * np.sin(q), 0.024)
         corners = [
             (cx + s.origin[0], cy + s.origin[1], stage.GROUND + cz)

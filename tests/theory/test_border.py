@@ -25,7 +25,7 @@ REAL = st.tuples(st.sampled_from([1.0, 1.0, -1.0, 0.0]), SIZE).map(lambda x: [1.
 UNDAMPED = hc.Compensator((1.0,), (1.0, 30.0, 122500.0, 3675000.0))
 
 
-def coefficients(factors):
+def coefficients(factors) -> np.ndarray:
     out = np.ones(1)
     for f in factors:
         out = np.convolve(out, f)
