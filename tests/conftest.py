@@ -12,7 +12,7 @@ import signal
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import Phase, settings
 
 os.environ.setdefault("MPLBACKEND", "agg")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: workers share the cores
@@ -32,7 +32,11 @@ for name, handler in (("SIGINT", signal.default_int_handler), ("SIGHUP", signal.
 
 # deterministic but in a hunt, no deadline: run times on shared machines mean nothing
 settings.register_profile(
-    "default", deadline=None, derandomize=not HUNTS, max_examples=MORE * EXAMPLES
+    "default",
+    deadline=None,
+    derandomize=not HUNTS,
+    max_examples=MORE * EXAMPLES,
+    phases=[x for x in Phase if x is not Phase.explain],  # which takes minutes where runs are tried
 )
 settings.load_profile("default")
 HERE = Path(__file__).parent

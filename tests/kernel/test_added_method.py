@@ -36,11 +36,13 @@ RUN = """
 import dataclasses
 import numpy as np
 import hapticclay as hc
+from hapticclay.kernel import native
 
+assert not native.is_there(), "a kernel built from other sources is refused"
 hand = dict(operator=hc.Operator(), force=(2.0, 0.3))
 s = hc.constant_cut(**hand, clay=(0.005, 0.02), t_max=0.4, dt=1e-3)
 coarse, fine, short = (
-    hc.simulate(dataclasses.replace(s, integrator=x, dt=dt), engine="python")
+    hc.simulate(dataclasses.replace(s, integrator=x, dt=dt))
     for x, dt in (("fast", 1e-3), ("fine", 1e-3), ("fast", 2.5e-4))
 )
 assert len(fine.t) == len(coarse.t) and 3.9 * coarse.steps < fine.steps
@@ -54,7 +56,7 @@ for name in ("p", "v", "fe", "tau"):
     assert np.abs(a - b).max() > 100.0 * away
 assert abs(fine.energy["residual"] - short.energy["residual"]) < 1e-12
 assert "fine" in hc.Scenario(integrator="fine").__repr__()
-with hc.Simulation(dataclasses.replace(s, integrator="fine"), engine="python") as one:
+with hc.Simulation(dataclasses.replace(s, integrator="fine")) as one:
     while one.outcome is None:
         one.step()
 np.testing.assert_array_equal(one.record().p, fine.p)
