@@ -76,7 +76,7 @@ def outweighs(time: float, kind: Any) -> bool:
     compiled = sys.modules.get("hapticclay.stepping.compiled")
     if compiled is None:
         time -= IMPORTING
-    if time < loading_time(kind):  # not even to load it: no look at the disk
+    if time < loading_time(kind) or not has_numba():  # not even to load it: no look at the disk
         return False
     return time >= ready_time(kind, started=compiled is not None and bool(compiled.ready))
 
