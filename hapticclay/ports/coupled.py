@@ -218,7 +218,7 @@ def render(
     *,
     coupling: Coupled = PLAIN_COUPLING,
     limits: Limits = PLAIN,
-    engine: str = "python",
+    engine: str = "auto",
 ) -> Rendered:
     """Replaces the hand of a scenario by a device, real or simulated, without a window.
 

@@ -159,7 +159,7 @@ class SimulatedDevice:
         self._hand = None if hand is None else _follower(hand, self.scenario)
         self._arm = DrivenArm(self.scenario, largest_force)
         driven = replace(self.scenario, controller=self._arm.controller)
-        self._simulation = Simulation(driven, engine="python")
+        self._simulation = Simulation(driven)
 
     @property
     def t(self) -> float:
