@@ -2,8 +2,8 @@ cimport cython
 from .records cimport Kick, Model, State
 from ..formulas cimport cmath as math
 from . cimport kick
+from . cimport ledger
 from . cimport memory
-from . cimport rows
 from . cimport viscous
 
 cdef double GROWTH

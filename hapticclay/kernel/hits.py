@@ -2,7 +2,7 @@
 
 import math
 
-from . import kick, memory, rows, viscous
+from . import kick, ledger, memory, viscous
 
 GROWTH = 1.01  # growth of each step of a hit over the one before
 
@@ -22,7 +22,7 @@ def strike(m, s, after):
     e, halved = s.e, s.before > 0.0
     if halved:
         kick.by_servo(m, s, e, 0.0)
-        rows.add_work(m, s.work, s.early, e, e.o1, e.o2, s.now)
+        ledger.add_work(m, s.work, s.early, e, e.o1, e.o2, s.now)
         swap(m, s, e)
     kick.by_servo(m, s, s.k, first)
     if kick.is_limited(m, s.k):

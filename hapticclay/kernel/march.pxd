@@ -30,3 +30,4 @@ cdef bint is_finite(Point z) noexcept nogil
 cdef void write(Model m, State s) noexcept nogil
 cdef void take(Model m, State s) noexcept nogil
 cdef void age_modes(Model m, State s) noexcept nogil
+cdef void feel_behind(Model m, State s, double h) noexcept nogil

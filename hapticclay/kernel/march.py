@@ -249,3 +249,8 @@ def age_modes(m, s):
         a.ended, a.ends = a.ends, 0.0
         if a.stuck != before and (i == 0 or m.modal == 1):
             yielding.note_stop(m, s, 2.0 if m.modal == 2 else 1.0 * i, a.stuck, 0.0)
+
+
+def feel_behind(m, s, h):
+    """What yielding clay does at the end of the step tried, of length h, in its modes."""
+    instant.evaluate(m, s, s.a.end, h, -1, s.a.now)

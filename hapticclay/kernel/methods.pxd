@@ -1,9 +1,9 @@
 cimport cython
-from .records cimport Kick, Model, State
+from .records cimport Model, State
 from . cimport arm
-from . cimport ends
 from . cimport kick
 from . cimport march
+from . cimport onset
 from . cimport rows
 from . cimport sampled
 from . cimport servo
@@ -14,7 +14,6 @@ cdef long CONTINUOUS, SAMPLED, ACCURATE
 
 cdef void act(Model m, State s) noexcept nogil
 cdef void attempt(Model m, State s, double after) noexcept nogil
-cdef void repeat(Model m, State s, Kick k, double after) noexcept nogil
 cdef (double, double) place_behind(Model m, State s, double after) noexcept nogil
 cdef bint is_sound(Model m, State s) noexcept nogil
 cdef void keep(Model m, State s, double after, bint shows) noexcept nogil

@@ -7,7 +7,7 @@
 | it may end | at a sample | at an event too | within a sample |
 """
 
-from . import arm, ends, kick, march, rows, sampled, servo, signals, yielding
+from . import arm, kick, march, onset, rows, sampled, servo, signals, yielding
 
 CONTINUOUS, SAMPLED, ACCURATE = range(3)
 
@@ -26,14 +26,6 @@ def attempt(m, s, after):
         sampled.by_hold(m, s, s.k, after)
     else:
         kick.by_servo(m, s, s.k, after)
-
-
-def repeat(m, s, k, after):
-    """A kick across the sample, whatever begins there."""
-    if m.method == SAMPLED:
-        sampled.across(m, s, k, after)
-    else:
-        kick.by_servo(m, s, k, after)
 
 
 def place_behind(m, s, after):
@@ -100,7 +92,7 @@ def arrive(m, s):
     if m.method == ACCURATE:
         arm.handle_at(m, k, s.q1, s.q2, s.w1, s.w1 + s.w2)
         return k.x.v, k.y.v
-    repeat(m, s, k, 0.0)
+    rows.repeat(m, s, k, 0.0)
     vx, vy, _, _ = rows.arrived(m, s, kick.velocity(m, k, 0), kick.velocity(m, k, 1), 0.0, 0.0)
     return vx, vy
 
@@ -115,5 +107,5 @@ def pace(m, s, target, after, on_grid):
 def bound(m, s, after):
     """Length of a step, bounded by what begins with it [s]."""
     if m.method == ACCURATE and m.modal:
-        return ends.act(m, s, after)
+        return onset.act(m, s, after)
     return after

@@ -1,10 +1,10 @@
 cimport cython
-from .records cimport Kick, Machine, Model, State, Work
+from .records cimport Kick, Model, State
 from ..formulas cimport arm as arm_law
 from . cimport hand
 from . cimport kick
 from . cimport laws
-from . cimport methods
+from . cimport ledger
 from . cimport own_laws
 from . cimport sampled
 from . cimport springs
@@ -15,7 +15,6 @@ cdef long ROW
 @cython.locals(yields=cython.bint)
 cdef void write(Model m, State s, Kick k, double after) noexcept nogil
 cdef void write_force(Model m, State s, Kick k, long end, double vx, double vy, double fx, double fy) noexcept nogil
+cdef void repeat(Model m, State s, Kick k, double after) noexcept nogil
 cdef (double, double, double, double) arrived(Model m, State s, double vx, double vy, double fx, double fy) noexcept nogil
-cdef void add_work(Model m, Work of, Work to, Kick k, double w1, double w2, Machine machine) noexcept nogil
-cdef void add_hardware_work(Model m, Work of, Work to, Kick k, double w1, double w2, Machine machine) noexcept nogil
 cdef void keep(Model m, State s, Kick k, double after, bint shows) noexcept nogil

@@ -1,7 +1,7 @@
-"""What a run keeps of a kick: its row of the record, and its entry in the ledger."""
+"""What a run keeps of a kick: its row of the record, and its entry in the ledger of energy."""
 
 from ..formulas import arm as arm_law
-from . import hand, kick, laws, methods, own_laws, sampled, springs, viscous
+from . import hand, kick, laws, ledger, own_laws, sampled, springs, viscous
 
 ROW = 16  # floats of a row: q, p, v, fh, tau, delta, b, q', two axes each
 
@@ -52,6 +52,14 @@ def write_force(m, s, k, end, vx, vy, fx, fy):
         out[n + 2] = m.removed[0] + m.removed[1]
 
 
+def repeat(m, s, k, after):
+    """A kick across the sample, whatever begins there."""
+    if m.ratio:
+        sampled.across(m, s, k, after)
+    else:
+        kick.by_servo(m, s, k, after)
+
+
 def arrived(m, s, vx, vy, fx, fy):
     """Velocity and force of yielding at the end of a step, from those of half a kick.
 
@@ -61,44 +69,12 @@ def arrived(m, s, vx, vy, fx, fy):
     if not (m.acts and m.special and m.stiff) or s.before == 0.0:
         return vx, vy, fx, fy
     k = s.e
-    methods.repeat(m, s, k, s.before)
+    repeat(m, s, k, s.before)
     if k.x.soft > 0.0:
         vx, fx = kick.velocity(m, k, 0), k.x.sf if m.flow else 0.0
     if k.y.soft > 0.0:
         vy, fy = kick.velocity(m, k, 1), k.y.sf if m.flow else 0.0
     return vx, vy, fx, fy
-
-
-# ---- the ledger ----------------------------------------------------------------------------------
-
-
-def add_work(m, of, to, k, w1, w2, machine):
-    """The ledger `of` with the works of a kick, into `to`.
-
-    w1 and w2 are the joint rates before it, `machine` is the one whose torques act in it.
-    """
-    x, y, H = k.x, k.y, k.H
-    vx, vy = 0.5 * (x.v + x.u), 0.5 * (y.v + y.u)
-    muscle = H * (x.uh * vx + y.uh * vy)
-    motors = 0.5 * H * (k.tau1 * (w1 + k.w1) + k.tau2 * (w2 + k.w2))
-    clay = H * (x.fe * vx + y.fe * vy)
-    taken = H * (hand.damping_force(m, k, 0) * vx + hand.damping_force(m, k, 1) * vy)
-    to.muscle, to.motors, to.clay = of.muscle + muscle, of.motors + motors, of.clay + clay
-    to.hand, to.through = of.hand + taken, of.through + (abs(muscle) + abs(motors))
-    if m.hardware:
-        add_hardware_work(m, of, to, k, w1, w2, machine)
-
-
-def add_hardware_work(m, of, to, k, w1, w2, machine):
-    """The same of hardware, and of clay that the motors hold."""
-    a, b, x, y, H = machine.x, machine.y, k.x, k.y, k.H
-    vx, vy = 0.5 * (x.v + x.u), 0.5 * (y.v + y.u)
-    r1, r2 = 0.5 * (w1 + k.w1), 0.5 * (w2 + k.w2)
-    to.friction = of.friction - H * (k.slip1 * r1 + k.slip2 * r2)
-    to.guard = of.guard + H * (a.guard * vx + b.guard * vy)
-    to.coupling = of.coupling + H * (a.pull * (vx - a.pull_rate) + b.pull * (vy - b.pull_rate))
-    if m.renders:
-        to.rendered = of.rendered + H * (a.force * vx + b.force * vy)
 
 
 def keep(m, s, k, after, shows):
@@ -107,6 +83,6 @@ def keep(m, s, k, after, shows):
         write(m, s, k, after)
         s.row += 1
     if sampled.is_early(s, after):
-        add_work(m, s.early, s.work, k, s.e.w1, s.e.w2, s.next)
+        ledger.add_work(m, s.early, s.work, k, s.e.w1, s.e.w2, s.next)
     else:
-        add_work(m, s.work, s.work, k, s.w1, s.w2, s.now)
+        ledger.add_work(m, s.work, s.work, k, s.w1, s.w2, s.now)

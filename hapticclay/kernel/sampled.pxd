@@ -10,8 +10,8 @@ from . cimport hand
 from . cimport hardware
 from . cimport kick
 from . cimport laws
+from . cimport ledger
 from . cimport memory
-from . cimport rows
 from . cimport servo
 from . cimport signals
 from . cimport viscous

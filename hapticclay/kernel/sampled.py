@@ -16,8 +16,8 @@ from . import (
     hardware,
     kick,
     laws,
+    ledger,
     memory,
-    rows,
     servo,
     signals,
     viscous,
@@ -107,7 +107,7 @@ def event(m, s, samples, now):
     if s.before > 0.0:
         across(m, s, e, 0.0)
         s.fh1, s.fh2 = hand.force(m, e, 0), hand.force(m, e, 1)
-        rows.add_work(m, s.work, s.early, e, e.o1, e.o2, s.now)
+        ledger.add_work(m, s.work, s.early, e, e.o1, e.o2, s.now)
     else:
         rest(m, s, e)
         memory.copied(s.early, s.work)

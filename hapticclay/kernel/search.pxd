@@ -1,6 +1,6 @@
 cimport cython
 from .records cimport Model, State
-from . cimport ends
+from . cimport march
 from . cimport methods
 from . cimport modes
 

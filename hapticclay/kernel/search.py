@@ -1,6 +1,6 @@
 """The length at which a step first passes a border, or outlasts a mode."""
 
-from . import ends, methods, modes
+from . import march, methods, modes
 
 MODE_X = 2  # from here on, what is looked for is the end of a mode; before, a border
 
@@ -9,7 +9,7 @@ def gap_behind(m, s, h, what, border):
     """Distance by which a step of length h would pass a border [m]; of modes see modes.gap."""
     methods.attempt(m, s, h)
     if what >= MODE_X:
-        ends.feel_behind(m, s, h)
+        march.feel_behind(m, s, h)
         return modes.gap(m, s, s.a.now.grip, what - MODE_X)
     x, y = methods.place_behind(m, s, h)
     return (y if what else x) - border
