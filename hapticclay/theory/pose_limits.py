@@ -62,6 +62,9 @@ class PoseLimits:
     Attributes:
         scenario: the run.
         known: limits of x and of y so far.
+
+    Args:
+        scenario: the run.
     """
 
     def __init__(self, scenario: Scenario):
