@@ -21,6 +21,7 @@ from .studies.port_energy import taken_energy as taken_energy
 from .studies.port_energy import zigzag as zigzag
 from .studies.wall_lines import Limit as Limit
 from .studies.wall_runs import Press as Press
+from .studies.wall_runs import settles as settles
 from .studies.zwidth import ZRegion as ZRegion
 from .studies.zwidth import ZWidth as ZWidth
 from .studies.zwidth import zwidth as zwidth

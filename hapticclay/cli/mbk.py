@@ -139,6 +139,9 @@ def device_table(found: DeviceMBK) -> str:
         f"dynamic range from the free device to {wall}: {r.decibels[0]:.3g} dB at {low:.3g} Hz, "
         f"{r.decibels[-1]:.3g} dB at {high:.3g} Hz, mean {r.mean:.3g} dB",
     ]
+    device = r.stiffest.device
+    if device.friction or device.quantum or r.stiffest.unilateral:
+        lines.append("all of the linear loop: friction, encoder and surface are ignored")
     return "\n".join(lines)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
     from ..scene.scenario import Scenario
     from ..simulation.record import Record
 
-EVERYWHERE = (-math.inf, -math.inf), (math.inf, math.inf)  # corners of all clay [m]
-MOST_CLAYS = 33  # dampings whose gain limits are computed
 MOST_ROWS = 6  # of a kind that the table shows
 CHOSEN = "is chosen by --error: leave it out"
 
@@ -72,27 +69,23 @@ class RunCommand:
 
 
 def unstable_axes(scenario: Scenario) -> list[str]:
-    """A line if the linear loop of an axis, in continuous time, is unstable in some of the clay.
+    """A line if the linear loop of an axis, in continuous time, is unstable somewhere ahead.
 
-    Clay that is not viscous is left out: the linear limit does not apply to it.
+    The limit is the least over clay and poses of the path. Clay that is not viscous is left out:
+    the linear limit does not apply to it.
 
     Args:
         scenario: the run.
     """
-    from ..theory import gain_limits
+    from ..theory.pose_limits import PoseLimits
 
-    clay = scenario.clay
-    if clay is None or not clay.viscous:
+    if scenario.clay is None or not scenario.clay.viscous:
         return []
-    told = []
+    limits, told = PoseLimits(scenario), []
     for i, axis in enumerate(AXES):
-        laws = clay.laws_on(i)
-        values = sorted({b for law in laws for b in law.within(*EVERYWHERE)})
-        step = max(1, -(-len(values) // MOST_CLAYS))
-        limits = [(gain_limits.continuous_limit(scenario, axis, b), b) for b in values[::step]]
-        limit, b = min(limits, default=(math.inf, 0.0))
-        if scenario.gain[i] > limit:
-            told.append(f"gain[{axis}] = {scenario.gain[i]:g} > {limit:.4g} at b = {b:g} N.s/m")
+        limit = limits.ahead(i)
+        if scenario.gain[i] > limit.K:
+            told.append(f"gain[{axis}] = {scenario.gain[i]:g} > {limit.K:.4g} {limit}")
     return [f"the linear loop is unstable: {', '.join(told)}"] if told else []
 
 

@@ -18,7 +18,7 @@ from .unused import Unused
 
 if TYPE_CHECKING:
     from ..studies.wall_lines import Wall
-    from ..studies.zwidth import ZWidth
+    from ..studies.zwidth import ZRegion, ZWidth
 
 ZWIDTH_SCHEMA = "hapticclay-zwidth-1"
 
@@ -151,6 +151,7 @@ def zwidth_table(found: ZWidth) -> str:
     head = ["region", "K at least B", "largest K", "largest B", "area", "verdict", "from exact"]
     lines = [console.text_table(rows, head, "lrrrrll")]
     lines.append("K [N/m], B [N.s/m], area [N^2.s/m^2]")
+    lines += [_top_told(r) for r in found.regions if len(r.B) > 1]
     if not math.isnan(found.gap()):
         lines.append(f"runs against the exact linear loop: within {100.0 * found.gap():.2g} %")
     if rough := [r for r in found.regions if not r.linear]:
@@ -162,3 +163,9 @@ def zwidth_table(found: ZWidth) -> str:
     below = found.violations()
     lines += below or ["no run was unstable below a line that is sufficient"]
     return "\n".join(lines)
+
+
+def _top_told(r: ZRegion) -> str:
+    """Where the largest K lies: between the tested dampings it is not known."""
+    name, (low, high) = f"{r.name}: " if r.name else "", r.top_between
+    return f"{name}between B = {low:.4g} and {high:.4g}, of {len(r.B)} tried, K may be larger"

@@ -198,7 +198,7 @@ def _buffers(kept: Path, which: range) -> list[Any]:
         rows = _episode_in(_file_of(kept, i))
         if rows is None:
             raise OSError(f"{_file_of(kept, i)} has gone while the data set was written")
-        lists = {name: list(x) for name, x in rows.items()}
+        lists: dict[str, Any] = {name: list(x) for name, x in rows.items()}
         found.append(EpisodeBuffer(id=i, seed=settings["seed"] + i, infos={}, **lists))
     return found
 

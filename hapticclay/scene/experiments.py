@@ -203,7 +203,9 @@ class ConstantCut(PathExperiment):
     """The cut with constant volume (Sec. 4.1, Figs. 7, 8): along +x through a slab of clay.
 
     With the default gain the linear loop of the y axis is unstable for 219 < b < 1043 N.s/m
-    (251 < b < 1004 with the hand Th); that of the x axis is stable for every b.
+    (251 < b < 1004 with the hand Th); that of the x axis is stable for every b. That holds at the
+    nominal pose, and with inertia shaping. Without it other poses couple the axes, and the loop is
+    unstable somewhere on the way for 199 < b < 1353 N.s/m (226 < b < 1319 with the hand).
 
     Attributes:
         b: damping of the clay on both axes [N.s/m], 0 to 1e9 (Eq. 21).

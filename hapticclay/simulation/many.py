@@ -271,7 +271,7 @@ class Lane:
         """
         models, kept = p.models(d)
         n = len(models)
-        states = np.zeros(n, layout.dtype_of(records.State))
+        states: Any = np.zeros(n, layout.dtype_of(records.State))
         outs = np.zeros(n, layout.dtype_of(records.Summary))
         starts = np.ascontiguousarray(d.starts, float)
         models["engine"] = self.place.movers.of(p.scenario).row.ctypes.data

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..arguments import named
-from ..model.clay import Clay
 from ..model.constants import AXES
 from ..model.signals import Multisine
 from ..model.traits import Hold
 from ..scene.scenario import Scenario
-from ..theory import gain_limits
+from ..theory.pose_limits import PlacedLimit, PoseLimits
 
 LIMITS = "oscillation against the torque limits"
 FOLD = math.sin(math.radians(1.0))  # out of reach: elbow within 1 degree of stretched or folded
@@ -30,7 +29,6 @@ MEMORY = 200  # swings stored
 STILL = 1e-5  # [m/s] a handle slower than this ...
 WHILE = 1.0  # ... for so long at the time limit is stalled; motors at their limits, saturated [s]
 QUIET = 9 + SWINGS + 1  # numbers per axis that `is_quiet` carries from one call to the next
-MOST_CLAYS = 33  # clays per axis whose gain limits are computed; of more, the nearest of so many
 OFTEN = 0.1  # share of the last WHILE at the torque limits that makes an unstable run a limit cycle
 
 
@@ -65,7 +63,7 @@ class StabilityMonitor:
         # of the present growth: size [m/s], whether a motor was in its limit, samples
         self.swings: list[list[tuple[float, bool, int]]] = [[], []]
         self.largest = [0.0, 0.0]  # swing so far [m/s]
-        self._limits: dict[tuple[int, float], float] = {}  # of axis and clay, worked out so far
+        self._limits = PoseLimits(scenario)
 
     def look(self, rows: np.ndarray, first: int) -> tuple[int, Outcome | None]:
         """Judges the next rows.
@@ -271,32 +269,12 @@ class StabilityMonitor:
     def _blame(self, axes: list[int]) -> str:
         return AXES[max(axes, key=lambda i: self.swings[i][-1][0])] if axes else ""
 
-    def _limit(self, i: int, values: list[float]) -> tuple[float, float]:
-        """The clay with the lowest gain limit of the linear loop of axis i, and this limit."""
-        for b in values:
-            if (i, b) not in self._limits:
-                self._limits[i, b] = gain_limits.continuous_limit(self.scenario, AXES[i], b)
-        return min(((b, self._limits[i, b]) for b in values), key=lambda x: x[1])
-
-    def _dampings(self, i: int, visited: bool) -> list[float]:
-        """Dampings that may resist axis i [N.s/m]: of all clay, or of that visited.
-
-        Of more than MOST_CLAYS in all, the nearest of so many between least and most are used: the
-        visited range grows with each check, and must not add new values for ever.
-        """
-        clay = self.scenario.clay
-        if clay is None:
-            return [0.0]
-        everywhere = [-math.inf] * 2, [math.inf] * 2
-        levels = _within(clay, i, *everywhere)
-        values = _within(clay, i, self.least, self.most) if visited else levels
-        if len(levels) <= MOST_CLAYS:
-            return values.tolist()
-        few = np.linspace(levels[0], levels[-1], MOST_CLAYS)
-        return np.unique(few[np.abs(values[:, None] - few).argmin(axis=1)]).tolist()
+    def _visited(self, i: int) -> PlacedLimit:
+        """The lowest gain limit of axis i where the handle has been."""
+        return self._limits.least(i, (self.least[0], self.least[1]), (self.most[0], self.most[1]))
 
     def _above_limit(self, i: int) -> bool:
-        return self.scenario.gain[i] > self._limit(i, self._dampings(i, True))[1]
+        return self.scenario.gain[i] > self._visited(i).K
 
     def _raise_limit(self) -> str:
         shoulder, elbow = self.scenario.torque_limit
@@ -305,11 +283,12 @@ class StabilityMonitor:
     def _advice(self, axis: str) -> str:
         s = self.scenario
         i = AXES.index(axis)
-        b, limit = self._limit(i, self._dampings(i, False))
-        if s.gain[i] > limit:
+        limit = min((self._limits.ahead(i), self._visited(i)), key=lambda x: s.gain[i] <= x.K)
+        if s.gain[i] > limit.K:
+            shape = ", or turn shaping on" if self._limits.stable_if_shaped(i, limit.b) else ""
             return (
-                f"lower gain[{axis}] from {s.gain[i]:g} to less than {limit:.4g}, "
-                f"the limit of the linear loop at b = {b:g} N.s/m"
+                f"lower gain[{axis}] from {s.gain[i]:g} to less than {limit.K:.4g}, "
+                f"the limit of the linear loop {limit}{shape}"
             )
         if any(x[1] for x in self.swings[i]):
             return f"{self._raise_limit()}: the motors saturate"
@@ -326,13 +305,6 @@ class RangeMonitor(StabilityMonitor):
 
     def _unstable(self, rows: np.ndarray) -> None:
         return None
-
-
-def _within(clay: Clay, i: int, low: list[float], high: list[float]) -> np.ndarray:
-    """Dampings that may resist axis i in a box [N.s/m], ascending."""
-    laws = clay.laws_on(i)
-    corners = (low[0], low[1]), (high[0], high[1])
-    return np.unique([b for law in laws for b in law.within(*corners)])
 
 
 def at_rest(seen: Any, moved: Any, unbound: Any, dt: float) -> tuple[Any, Any]:

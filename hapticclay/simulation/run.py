@@ -498,8 +498,8 @@ class Run:
             none = [math.nan] * (rows.ROW + 2)
             return none if self.last_row is None else [*self.last_row, *self.last_force()]
         if self._shown is None:
-            found = self.ahead().tolist()
-            self._shown = found
+            self._shown = self.ahead().tolist()
+        assert self._shown is not None
         return list(self._shown)
 
     def torque_reached(self, n: int, k: int) -> list[float]:

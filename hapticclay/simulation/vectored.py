@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
+from typing import Any
 
 import numpy as np
 
@@ -46,8 +47,8 @@ class VectoredRuns:
         self.movers = [mover.Movers() for _ in range(workers)]
         self.pool: ThreadPoolExecutor | None = None
         native = engine == "native"
-        self.models = np.zeros(n * native, layout.dtype_of(records.Model))
-        self.states = np.zeros(n * native, layout.dtype_of(records.State))
+        self.models: Any = np.zeros(n * native, layout.dtype_of(records.Model))
+        self.states: Any = np.zeros(n * native, layout.dtype_of(records.State))
         self.spares = [one(records.State) for _ in range(workers * native)]
         self.engines = np.zeros((workers, n), np.int64)  # addresses, by thread and run
         self.kept: list[list[mover.Mover]] = [[] for _ in scenarios]  # what lies there

@@ -14,7 +14,7 @@ from ..model.constants import TS
 from ..scene.virtual_wall import Device, VirtualWall
 from ..theory import gain_crossings, loop_passivity, stability_margins, wall_limits
 from ..theory.loops import TIMING
-from ..theory.roots import bisect, first_failure
+from ..theory.roots import first_failure
 from . import boundary
 from .boundary import PushedLoop, nominal_limit
 
@@ -276,10 +276,13 @@ def _late(loop: PushedLoop) -> str:
 
 
 def _largest_gain(holds: Callable[[float], bool], low: float = 1e-2, high: float = 1e3) -> float:
-    """Largest K from low on up to which a property holds; 0 if not at low, inf if up to high."""
-    if not holds(low):
-        return 0.0
-    return math.inf if holds(high) else bisect(holds, low, high)[0]
+    """Largest K from low on up to which a property holds; 0 if not at low, inf if up to high.
+
+    The property may fail and hold again: the first failure counts, unless it is narrower than
+    1.5 times in K.
+    """
+    low, failing = first_failure(holds, np.geomspace(low, high, 31).tolist(), rtol=1e-9)
+    return math.inf if failing == math.inf else low
 
 
 def _unstable_damping(loop: PushedLoop, Ts: float | None, delay: float) -> float:

@@ -14,7 +14,7 @@ from ..model.constants import AXES
 from ..scene.experiments import parameter_unit
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
-from ..theory import gain_limits
+from ..theory.pose_limits import PoseLimits
 from .sampling import Sweep
 
 CROSSINGS_KEPT = 3  # crossings that have columns of their own
@@ -32,7 +32,7 @@ RESULT_COLUMNS = {  # unit, what it is; crossing1 and x stand for their likes
     "b_x": ("N.s/m", "damping of the stiffest clay that the handle met"),
     "fe_over_v_x": ("N.s/m", "force of that clay over the velocity, where the speed is steady"),
     "speed_x": ("m/s", "steady speed in that clay"),
-    "gain_margin_x": ("factor on K", "gain limit of the linear loop in that clay, over K"),
+    "gain_margin_x": ("factor on K", "least gain limit of the linear loop in that clay, over K"),
     "energy_residual": ("share of the energy put through", "residual of the energy balance"),
     "wall_time": ("s", "run time"),
 }
@@ -84,13 +84,22 @@ def result_row(
         clay = r and r.scenario.clay
         linear = not clay or clay.viscous
         if r and linear and r.scenario.gain[i] > 0.0:
-            limit = gain_limits.continuous_limit(r.scenario, axis, entry.get("b", 0.0))
-            margin = limit / r.scenario.gain[i]
+            margin = _least_limit(r, axis, deepest) / r.scenario.gain[i]
         out[f"gain_margin_{axis}"] = margin
     through = r.energy.get("throughput", 0.0) if r else 0.0
     out["energy_residual"] = abs(r.energy["residual"]) / through if r and through else nan
     out["wall_time"] = r.wall_time if r else nan
     return out
+
+
+def _least_limit(r: Record, axis: str, stretch: dict[str, Any] | None) -> float:
+    """The least gain limit of the linear loop over a stretch of a run, else at its start."""
+    s, i, limits = r.scenario, AXES.index(axis), PoseLimits(r.scenario)
+    if stretch is None:
+        return limits.at(i, s.start, (0.0, 0.0))
+    rows = (r.t >= stretch["from_s"]) & (r.t <= stretch["to_s"])
+    low, high = r.p[rows].min(axis=0), r.p[rows].max(axis=0)
+    return limits.least(i, (low[0], low[1]), (high[0], high[1])).K
 
 
 def run_point(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..errors import Bound, check_fields
 from ..model.shapes import Constant
 from ..model.spring import STIFFNESS_MAX
@@ -257,6 +257,26 @@ def growth_reading(wall: VirtualWall, span: float = 1.0) -> tuple[int, float, fl
     n = math.ceil(span * min(n, MOST_SAMPLES + 12.0 * order))
     kept = max(READ, 6.0 * order)
     return n, wall.Ts * max(1.0, n / kept), SLOWEST * omega
+
+
+@checked
+def settles(wall: VirtualWall, press: Press = PRESS) -> bool:
+    """Whether a wall is stable in a run, with the friction, encoder and surface of its device.
+
+    This is the verdict of `zwidth` on one wall. A linear loop settles if its oscillation decays.
+    Any other wall must come to rest after a push: see `Press`. `stable_wall` judges the linear loop
+    alone, which may be stable where an encoder keeps the wall from rest.
+
+    Args:
+        wall: the wall with its K.
+        press: push and criterion of rest for a loop that is not linear.
+
+    Raises:
+        ParameterError: wall is not a wall, or a value is out of its bounds.
+    """
+    if is_linear(wall):
+        return growth_rates([wall])[0] <= 0.0
+    return come_to_rest([wall], press)[0]
 
 
 def come_to_rest(walls: Sequence[VirtualWall], press: Press = Press()) -> list[bool]:

@@ -110,8 +110,19 @@ class ZRegion:
 
     @property
     def largest_K(self) -> float:
-        """Largest K of the region [N/m]."""
+        """Largest K of the region at the tested B [N/m]; see `top_between`."""
         return max(self.K)
+
+    @property
+    def top_B(self) -> float:
+        """The tested B of the largest K [N.s/m]."""
+        return self.B[int(np.argmax(self.K))]
+
+    @property
+    def top_between(self) -> tuple[float, float]:
+        """Values of B next to that of the largest K; the boundary in between may be higher."""
+        i = int(np.argmax(self.K))
+        return self.B[max(i - 1, 0)], self.B[min(i + 1, len(self.B) - 1)]
 
     @property
     def largest_B(self) -> float:
@@ -174,8 +185,8 @@ class ZWidth(Result):
     def headline(self) -> str:
         """Largest stiffness and damping of each region, in one line."""
         told = (
-            f"{f'{r.name}: ' if r.name else ''}K to {r.largest_K:.4g} N/m, B to "
-            f"{r.largest_B:.4g} N.s/m"
+            f"{f'{r.name}: ' if r.name else ''}K to {r.largest_K:.4g} N/m at B = {r.top_B:.4g}, "
+            f"B to {r.largest_B:.4g} N.s/m"
             for r in self.regions
         )
         return "; ".join(told)
@@ -215,6 +226,8 @@ class ZWidth(Result):
             "verdict": [r.verdict for r in self.regions],
             "K at the least B [N/m]": [r.K[0] for r in self.regions],
             "largest K [N/m]": [r.largest_K for r in self.regions],
+            "may be larger from B [N.s/m]": [r.top_between[0] for r in self.regions],
+            "to B [N.s/m]": [r.top_between[1] for r in self.regions],
             "largest B [N.s/m]": [r.largest_B for r in self.regions],
             "area [N^2.s/m^2]": [r.area for r in self.regions],
             "gap to exact": [r.gap() for r in self.regions],

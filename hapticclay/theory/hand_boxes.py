@@ -223,10 +223,12 @@ def _exact_worst_case(loop: Loop, box: Box) -> tuple[float, float, Operator | No
     if len(corners) == 1:
         return limit, omega, worst
     top = min(limit, 1e6)
-    if limit == 0.0 or (limit == math.inf and stable(top)):
+    if limit == 0.0:
         return limit, math.nan, worst
     # A window narrower than 20 % in K may be missed, but no limit of a corner.
-    grid = [*np.geomspace(1e-4 * top, top, 49)[:-1].tolist(), (1.0 + 1e-6) * top]
+    decades = 4 if limit < math.inf else 9  # one stable K says nothing of smaller ones
+    grid = np.geomspace(10.0**-decades * top, top, 12 * decades + 1)[:-1].tolist()
+    grid.append((1.0 + 1e-6) * top)
     high = first_failure(stable, grid, below=0.0)[1]
     if high < (1.0 - 1e-7) * limit:  # the resolution of `critical_hand`
         critical = critical_hand(replace(loop, K=high), box)

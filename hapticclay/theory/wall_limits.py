@@ -40,6 +40,9 @@ def stable_wall(wall: VirtualWall) -> bool:
     Every eigenvalue of the sampled loop lies within the unit circle. Without springs (K = 0, none
     in the hand) the eigenvalue at z = 1, free motion of the handle, does not count.
 
+    The verdict ignores friction, encoder and surface. With these a wall may never come to rest
+    though its linear loop is stable: `settles` judges it by a run.
+
     Args:
         wall: the wall with its K; friction, quantum and surface are ignored.
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass
 
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
 from ..simulation.monitor import Outcome
-from ..theory import gain_limits
+from ..theory.pose_limits import PoseLimits
 
 CALM_TIME = 1.0  # [s] without growing oscillation after which an unstable arm counts as calm
 
@@ -92,14 +91,16 @@ def _limits_told(limit: tuple[float, float], stable: bool) -> str:
     return f"; limit of K{axis} here: {', '.join(f'{most:.3g}' for most in known.values())}"
 
 
-def live_gain_limits(scenario: Scenario, b: tuple[float, float]) -> tuple[float, float]:
+def live_gain_limits(
+    limits: PoseLimits, p: tuple[float, float], b: tuple[float, float]
+) -> tuple[float, float]:
     """Returns the gain limit of the linear loop on each axis [1/kg], inf for none.
 
-    It applies to continuous time at the nominal pose.
+    It applies to continuous time with the handle where it is.
 
     Args:
-        scenario: the run.
-        b: damping of the clay at the handle [N.s/m].
+        limits: of the run.
+        p: position of the handle [m].
+        b: damping of the clay there [N.s/m].
     """
-    x, y = map(functools.partial(gain_limits.continuous_limit, scenario), AXES, b)
-    return x, y
+    return limits.at(0, p, b), limits.at(1, p, b)

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..simulation.record import Record
 from ..studies.removal import TOOL, Tool
+from ..theory.pose_limits import PoseLimits
 from .clock import Clock
 from .frame import Frame, Listener, Partner
 from .live_verdict import LiveVerdict, is_viscous, live_gain_limits, live_verdict
@@ -46,6 +47,7 @@ class Replay:
         """Restarts at the first sample."""
         self.paused, self.clock, self.t, self.n = False, Clock(), 0.0, 0
         self.frames = [self._frame(0)]
+        self._limits = PoseLimits(self.scenario)
 
     @property
     def ended(self) -> str:
@@ -92,7 +94,7 @@ class Replay:
         r, n, s = self.source, self.n, self.scenario
         found = r.outcome.code in ("diverged", "limit cycle") and r.t[n] >= r.outcome.time
         known = s.control == "continuous" and is_viscous(s, self.frames[-1].p)
-        limit = live_gain_limits(s, self.b) if known else None
+        limit = live_gain_limits(self._limits, self.frames[-1].p, self.b) if known else None
         return live_verdict(self.gain, limit, r.outcome if found else None, True)
 
     def _frame(self, n: int) -> Frame:

@@ -19,6 +19,7 @@ from ..scene.scenario import Scenario
 from ..simulation import monitor
 from ..simulation.record import Record
 from ..studies.removal import TOOL, Tool, removed
+from ..theory.pose_limits import PoseLimits
 from .clock import FRAME_TIME, LATE_EDGES, Clock
 from .frame import Frame, Listener, Partner
 from .live_run import PULL_MARGIN, LiveRun, played
@@ -81,6 +82,7 @@ class Session:
         self.point: tuple[float, float] | None = None
         self._damping = 1.0
         self.frames: list[Frame] = []
+        self._limits = PoseLimits(self.scenario)
         self._carry = 0.0
         self._swung = -math.inf  # time of the last growing oscillation [s]
         self._look()
@@ -132,7 +134,10 @@ class Session:
     def verdict(self) -> LiveVerdict:
         """Judges the stability of the loop by the monitor of the run and the gain limit."""
         s, onset = self.scenario, self.run.watch.onset
-        limit = live_gain_limits(s, self.b) if is_viscous(s, self.frames[-1].p) else None
+        if self._limits.scenario is not s:
+            self._limits = PoseLimits(s)
+        p = self.frames[-1].p
+        limit = live_gain_limits(self._limits, p, self.b) if is_viscous(s, p) else None
         return live_verdict(self.gain, limit, onset, self.t - self._swung < CALM_TIME)
 
     def pull(self, point: tuple[float, float] | None) -> None:

@@ -219,7 +219,8 @@ def test_rows_say_what_the_runs_said(tmp_path):
         "speed_x"
     ] == pytest.approx(0.01, rel=1e-3)
     assert (
-        rows[0]["gain_margin_y"] == pytest.approx(0.7748 / 0.5, rel=1e-4)
+        # of the worst pose in the clay, its far end: somewhat below the nominal 0.7748 / 0.5
+        0.99 * 0.7748 / 0.5 < rows[0]["gain_margin_y"] < 0.7748 / 0.5
         and rows[1]["gain_margin_y"] < 1.0
     )
     assert rows[1]["axis"] == "y" and rows[0]["energy_residual"] < 1e-12
