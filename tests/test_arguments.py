@@ -29,7 +29,15 @@ def junk_function(*args, **given):
     return None
 
 
+def deep_list():
+    value = [1.0]
+    for _ in range(3000):
+        value = [value]
+    return value
+
+
 JUNK = [1, "x", None, object(), [], {}, math.nan, 10**400, np.array([]), junk_function]
+JUNK += [np.array(1.0), np.array(None, dtype=object), deep_list(), "x" * 3000, 1j]
 
 
 class Enough(BaseException):

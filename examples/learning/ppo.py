@@ -184,7 +184,7 @@ def options(what: str) -> argparse.Namespace:
     parser.add_argument("--env", default="CutLine-v0")
     parser.add_argument("--steps", type=int, default=300_000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--engine", default="native")
+    parser.add_argument("--engine", default="auto")
     parser.add_argument("--film", action="store_true")
     parser.add_argument("--out", type=Path, default=Path("out/learning"))
     return parser.parse_args()

@@ -3,7 +3,7 @@ Your own controller
 ===================
 
 A function of the measured values replaces compensator and servo. Here it is PD control of the
-joints towards an oscillating target. It is compiled with the run if numba is installed.
+joints towards an oscillating target. Python calls it once a control sample.
 """
 
 import math

@@ -34,7 +34,7 @@ for name, grip in grips.items():
         t_max=4.0,
         dt=1e-3,
     )
-    record = hc.simulate(scenario, engine="python")
+    record = hc.simulate(scenario)
     held = record.held()[:, 0].mean()
     print(
         f"{name}: at rest {100 * held:.0f} % of the time, {1e3 * record.v.max():.0f} mm/s at most"

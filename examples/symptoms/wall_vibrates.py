@@ -31,7 +31,7 @@ press = hc.Constant((2.0, 0.0))  # N
 fig, axes = plt.subplots(3, 1, sharex=True, sharey=True, figsize=(6.4, 5.2))
 for ax, (name, tried) in zip(axes, walls.items(), strict=True):
     scenario = tried.scenario(0.6, push=0.05, start=-0.005, muscle=press)  # s, m/s, m
-    record = hc.simulate(scenario, engine="python")
+    record = hc.simulate(scenario)
     ax.axhspan(0.0, 4.0, color="0.92")
     late = record.p[record.t > 0.5, 0]
     print(f"{name}, {1e3 * np.ptp(late):.2f} mm from peak to peak at the end")

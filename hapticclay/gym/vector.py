@@ -250,7 +250,7 @@ class TaskVectorEnv(VectorEnv):
         return self._episodes.truth_of(integer("i", i, 0, self.num_envs - 1))
 
     def __reduce_ex__(self, protocol: Any) -> Any:
-        """Refused: the copies run in threads and machine code.
+        """Refused: the copies run in threads.
 
         Raises:
             TypeError: always.

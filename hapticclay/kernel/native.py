@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import functools
 import importlib
+import os
 import zlib
 from array import array
-from collections.abc import Iterator
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import Any
@@ -27,29 +27,29 @@ WAY_IN = "kernel/machine"
 
 def compiled() -> list[str]:
     """Names of the modules that are compiled, such as kernel/path."""
-    names = (f"{x.parent.name}/{x.stem}" for room in ROOMS for x in _in(room, "*.pxd"))
-    return [x for x in names if x not in IN_C and (PACKAGE / f"{x}.py").is_file()] + [WAY_IN]
-
-
-def _in(room: str, pattern: str) -> list[Path]:
-    return sorted((PACKAGE / room).glob(pattern))
-
-
-def sources() -> Iterator[str]:
-    """Files that make the compiled kernel what it is, such as kernel/path.py."""
-    for name in compiled()[:-1]:
-        yield f"{name}.py"
+    names = []
     for room in ROOMS:
-        yield from (
-            f"{room}/{x.name}" for pattern in ("*.pxd", "*.pyx") for x in _in(room, pattern)
-        )
-    yield from DECLARATIONS
+        there = set(os.listdir(PACKAGE / room))
+        stems = sorted(x[:-4] for x in there if x.endswith(".pxd"))
+        names += [f"{room}/{x}" for x in stems if f"{x}.py" in there]
+    return [x for x in names if x not in IN_C] + [WAY_IN]
 
 
-def checksum(file: Path) -> int:
-    """Checksum of a file, whatever its lines end with."""
-    text = file.read_bytes()
-    return zlib.crc32(text.replace(b"\r\n", b"\n") if file.suffix[:3] == ".py" else text)
+def sources() -> list[str]:
+    """Files that make the compiled kernel what it is, such as kernel/path.py."""
+    files = [f"{x}.py" for x in compiled()[:-1]]
+    for room in ROOMS:
+        there = sorted(os.listdir(PACKAGE / room))
+        files += [f"{room}/{x}" for x in there if x.endswith((".pxd", ".pyx"))]
+    return [*files, *DECLARATIONS]
+
+
+def checksum(file: str | Path) -> int:
+    """Checksum of a file, whatever the lines of a source end with."""
+    with open(file, "rb") as f:
+        text = f.read()
+    is_source = str(file).endswith((".py", ".pyx", ".pxd"))
+    return zlib.crc32(text.replace(b"\r\n", b"\n") if is_source else text)
 
 
 @functools.cache
@@ -82,9 +82,9 @@ def check_sources(known: dict[str, int]) -> None:
     Raises:
         ImportError: one differs, and which.
     """
-    there = set(sources())
+    there, root = set(sources()), str(PACKAGE)
     for name in sorted(there | set(known)):
-        if name not in there or known.get(name) != checksum(PACKAGE / name):
+        if name not in there or known.get(name) != checksum(f"{root}/{name}"):
             raise ImportError(f"built from other sources: {name} has changed")
 
 

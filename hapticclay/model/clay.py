@@ -53,7 +53,9 @@ def slab(resists: float | Flow, start: float | None = None, end: float | None = 
         ParameterError: a value is out of bounds, or only one border is given.
     """
     if (start is None) != (end is None):
-        raise ParameterError("end", end, f"must be a border where start is one: start = {start}")
+        raise ParameterError(
+            "end", end, "must be a border where start is one, and None where it is None"
+        )
     if isinstance(resists, str) and not is_quantity(resists):
         bound = f"must be a damping, or a flow as hc.materials.material({resists!r}) returns"
         raise ParameterError("resists", resists, bound)

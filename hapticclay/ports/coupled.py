@@ -231,7 +231,7 @@ def render(
         duration: length of the session [s], > 0, at most 3600.
         coupling: between device and simulated handle.
         limits: of force and time.
-        engine: as in `simulate`; "native" compiles before the session.
+        engine: as in `simulate`.
 
     Returns:
         Record, exchanges and their timing. The notes of the record also contain the timing.

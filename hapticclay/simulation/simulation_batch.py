@@ -31,15 +31,16 @@ class SimulationBatch:
                 sims.advance(55, force=policy(sims.p, sims.v))
                 sims.reset(sims.ended)
 
-    Runs may differ in anything. Compiled, all runs of one kind advance in one call on all cores.
-    Results are arrays over runs, copied at each access. No record is kept: a run holds at most its
-    last 4095 samples, for the monitor, half a megabyte.
+    Runs may differ in anything. Compiled, all advance in one call on all cores, but for runs under
+    a varying force or command, or with a controller of your own. Results are arrays over runs,
+    copied at each access. No record is kept: a run holds at most its last 4095 samples, for the
+    monitor, half a megabyte.
 
     A run that has ended stays at its last good sample until `reset`.
 
     Args:
         scenarios: what to run, one per run.
-        engine: as in `simulate`; "auto" compiles once the requested steps make it worthwhile.
+        engine: as in `simulate`.
         workers: threads of compiled steps; None for one per core.
         monitored: as in `Simulation`.
 

@@ -81,7 +81,7 @@ class Simulation:
 
     Args:
         scenario: what to run.
-        engine: as in `simulate`; "auto" compiles once the requested steps make it worthwhile.
+        engine: as in `simulate`.
         recorded: whether a record is kept; else at most the last 4095 samples, for the monitor.
         monitored: whether the run ends when an axis is judged unstable; else it ends only at its
             limits, out of reach or above 20 m/s, and `diverging` is False. For muscle forces that

@@ -296,7 +296,10 @@ def _law_names(laws: Sequence[str] | str) -> list[str]:
     if not isinstance(laws, Sequence):
         raise ParameterError("laws", laws, "must be names of laws")
     laws = (laws,) if isinstance(laws, str) else tuple(laws)
-    names = {known.get(_plain_name(x)) or choice("laws", x, tuple(FLOW_LAWS)) for x in laws}
+    names = {
+        (isinstance(x, str) and known.get(_plain_name(x))) or choice("laws", x, tuple(FLOW_LAWS))
+        for x in laws
+    }
     if not names:
         raise ParameterError("laws", laws, f"must name one of {', '.join(FLOW_LAWS)}")
     return [x for x in FLOW_LAWS if x in names]

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..display import brief
-from ..errors import ParameterError, number
+from ..errors import ParameterError, array_of, number
 from ..model.hardware import Hardware
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import VirtualWall
@@ -267,7 +267,7 @@ def passive_region(
         number(f"delays.{i}", delay, 0.0, 100.0)
     Ts = wall.Ts * np.geomspace(1.0 / REGION_SPAN, REGION_SPAN, REGION_POINTS)
     Ts = Ts[Ts <= 1.0]
-    some = wall.Ts * np.array((0.25, 1.0, 4.0)) if run_Ts is None else np.array(run_Ts)
+    some = wall.Ts * np.array((0.25, 1.0, 4.0)) if run_Ts is None else array_of("run_Ts", run_Ts)
 
     def at(T: float, delay: float) -> VirtualWall:
         return replace(wall, Ts=float(T), delay=delay * float(T))

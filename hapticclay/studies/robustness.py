@@ -254,7 +254,7 @@ def measure_cost(trials: Trials, left: int, out: Path | None = None, workers: in
     """
     threads = None if workers == 1 else 1
     points = trials.points(0)[:PROBED]
-    trials.judge(points[:4], threads)  # the first run loads and compiles
+    trials.judge(points[:4], threads)  # the first run imports
     begin = time.perf_counter()
     trials.judge(points, threads)
     each = (time.perf_counter() - begin) / len(points) / workers

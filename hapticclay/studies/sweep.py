@@ -225,7 +225,7 @@ def _run_here(work: Work, out: str, crew: int) -> Generator[int, None, None]:
     if crew == 1:
         while work.left:
             yield _made_in_turn(work, out)
-    elif work.free and work.left:  # it may be all, and what is compiled here is compiled for all
+    elif work.free and work.left:  # it may be all
         yield _made_in_turn(work, out)
     if work.left:
         yield from _run_in_processes(work, out, crew)
@@ -350,7 +350,7 @@ def estimate_time(sweep: Sweep) -> tuple[float, float]:
     Args:
         sweep: the sweep.
     """
-    probed(sweep, 0.0)  # the first run loads and compiles
+    probed(sweep, 0.0)  # the first run imports
     rows, spent = probed(sweep, PROBE_TIME)
     each = spent / len(rows)
     if sweep.chunk is None:

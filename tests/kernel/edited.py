@@ -16,7 +16,7 @@ def run_edited(folder, edits, program):
 
     Args:
         folder: an empty one.
-        edits: by file of the package, what stands there, and what then.
+        edits: by file of the package, what stands there, and what then; or the text of a new file.
         program: its source.
     """
     no_caches = shutil.ignore_patterns("__pycache__")
@@ -24,6 +24,10 @@ def run_edited(folder, edits, program):
     shutil.copytree(PACKAGE.parent / "mjcf", folder / "mjcf")
     for name, changes in edits.items():
         file = folder / "hapticclay" / name
+        if isinstance(changes, str):
+            assert not file.exists()
+            file.write_text(changes)
+            continue
         text = file.read_text()
         for old, new in changes:
             assert text.count(old) == 1, (name, old)
