@@ -269,7 +269,7 @@ def test_a_kick_counts_half_of_the_clay_on_either_side_and_all_of_the_muscle():
     m, s, k = row.m, row.s, row.s.k
     s.x.b, s.y.b = s.x.old, s.y.old = 8.0, 6.0
     kick.begin(k, 1e-3, 1e-3)
-    kick.take_up(s, k)
+    kick.take_up(m, s, k)
     arms.handle_at(m, k, s.q1, s.q2, 0.0, 0.0)
     kick.act(m, s, k)
     assert (k.x.b0, k.y.b0, k.x.b1, k.y.b1) == (4.0, 3.0, 4.0, 3.0)
