@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from ..model import arm
+from ..formulas import arm
 from ..model.constants import AXES
 from ..model.operator import NO_HAND, Operator
 from ..scene.scenario import Scenario

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.model import arm
+from hapticclay.formulas import arm
 from hapticclay.theory import linear_loop
 from hapticclay.theory.loops import TIMING, Loop
 from hapticclay.theory.pose_limits import MOST_KNOWN, PoseLimits
