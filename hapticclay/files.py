@@ -113,7 +113,11 @@ def _kind_of_file(path: str) -> str:
 
 
 class Unfit(OSError):
-    """A path is no regular file, or the file is larger than its reader accepts."""
+    """A path is no regular file, or the file is larger than its reader accepts.
+
+    Args:
+        fault: what is wrong, in words.
+    """
 
     def __init__(self, fault: str):
         super().__init__(errno.EINVAL, fault)
