@@ -25,7 +25,7 @@ from . import common
 
 NEEDS = ("distributed", "pyarrow")
 TASKS = 2000  # empty ones, by which the scheduler is timed
-ASKED = 10.0  # [s] that docs/sweep.md advises for a chunk
+ASKED = 10.0  # [s] that a task of a cluster takes (docs/sweep.md)
 
 
 def job(quick: bool) -> Sweep:

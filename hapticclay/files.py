@@ -116,7 +116,7 @@ class Unfit(OSError):
     """A path is no regular file, or the file is larger than its reader accepts.
 
     Args:
-        fault: which, in words.
+        fault: what is wrong, in words.
     """
 
     def __init__(self, fault: str):

@@ -52,35 +52,51 @@ def started(crew: int) -> Iterator[Callable[..., Future[Any]]]:
         raise ChildProcessError(DAEMON)
     if _has_lost_script():
         raise ChildProcessError(NO_FILE)
-    context = multiprocessing.get_context("spawn")  # the engine's threads do not survive a fork
+    # the engine's threads do not survive a fork
+    context = _Noting(multiprocessing.get_context("spawn"))
     try:
         end, begun = context.Event(), context.Event()
         pool = ProcessPoolExecutor(
-            crew, mp_context=context, initializer=_begin, initargs=(end, begun)
+            crew,
+            mp_context=context,  # type: ignore[arg-type]
+            initializer=_begin,
+            initargs=(end, begun),
         )
     except (OSError, ImportError) as error:  # semaphores live in shared memory
         raise ChildProcessError(_no_semaphores(error)) from None
-    others, workers = set(multiprocessing.active_children()), set()
 
     def submit(*call: Any) -> Future[Any]:
         try:
-            job = pool.submit(*call)
+            return pool.submit(*call)
         except BrokenProcessPool:
             raise
         except (OSError, RuntimeError) as error:  # the latter for a thread
             told = getattr(error, "strerror", None) or error
             fault = f"a worker process cannot be started ({told}): use fewer, or {ALONE}"
             raise ChildProcessError(fault) from None
-        workers.update(multiprocessing.active_children())
-        return job
 
     try:
         yield submit
     except BrokenProcessPool:
-        raise ChildProcessError(_cause(workers - others, begun.is_set())) from None
+        raise ChildProcessError(_cause(context.made, begun.is_set())) from None
     finally:
         end.set()
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+class _Noting:
+    """A context of multiprocessing that notes the processes it makes: a pool hides its own."""
+
+    def __init__(self, context: Any):
+        self.context, self.made = context, []
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.context, name)
+
+    def Process(self, *args: Any, **given: Any) -> Any:
+        """A process, as made by the context."""
+        self.made.append(self.context.Process(*args, **given))
+        return self.made[-1]
 
 
 def _no_semaphores(error: Exception) -> str:
@@ -98,7 +114,7 @@ def _has_lost_script() -> bool:
     return getattr(main, "__spec__", None) is None and bool(file) and not os.path.exists(file)
 
 
-def _cause(workers: set[BaseProcess], begun: bool) -> str:
+def _cause(workers: list[BaseProcess], begun: bool) -> str:
     """Why workers ended, in words."""
     if any(p.exitcode == UNGUARDED for p in workers):
         return NO_GUARD

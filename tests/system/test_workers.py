@@ -63,15 +63,11 @@ def test_a_script_without_main_guard_runs_in_one_process(tmp_path):
     assert run_script(text, tmp_path).returncode == 0
 
 
-def test_a_script_with_main_guard_runs(tmp_path):
-    done = run_script(HEAD + guarded(STUDIES["columns"]), tmp_path)
+def test_a_script_with_main_guard_runs_by_name_too(tmp_path):
+    (tmp_path / "script.py").write_text(HEAD + guarded(STUDIES["columns"]))
+    done = run([sys.executable, "-m", "script"], tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert len(list((tmp_path / "out" / "data").glob("part-*"))) == 4
-
-
-def test_a_module_is_run_by_its_name(tmp_path):
-    (tmp_path / "script.py").write_text(HEAD + guarded(STUDIES["sweep"]))
-    assert run([sys.executable, "-m", "script"], tmp_path).returncode == 0
 
 
 def test_a_script_from_standard_input_is_told_to_be_a_file(tmp_path):
