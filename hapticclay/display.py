@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import html
+import numbers
 from collections.abc import Iterable
 from typing import Any
-
-import numpy as np
 
 TABLE_STYLE = "border-collapse:collapse;margin:0.3em 0;color:inherit;background:transparent"
 FEW = 4  # numbers of a tuple that are all shown
@@ -67,16 +66,22 @@ def brief(value: Any, /) -> str:
 def _brief_value(x: Any) -> str:
     if isinstance(x, bool | str) or x is None:
         return one_line(repr(x))
-    if isinstance(x, int | float | np.number):
+    if isinstance(x, numbers.Complex):  # those of NumPy are, too
         return f"{x:.5g}"
-    if isinstance(x, np.ndarray):
-        shape = " x ".join(map(str, x.shape))
-        finite = x[np.isfinite(x)] if x.dtype.kind in "fiu" else x[:0]
-        if not finite.size:
-            return f"({shape})"
-        return f"({shape}) {finite.min():.5g} to {finite.max():.5g}"
+    if hasattr(x, "__array__"):
+        return _brief_array(x)
     if isinstance(x, tuple | list | dict):
         if isinstance(x, tuple) and len(x) <= FEW and all(isinstance(y, int | float) for y in x):
             return f"({', '.join(map(_brief_value, x))})"
         return f"({len(x)})"
     return type(x).__name__
+
+
+def _brief_array(x: Any) -> str:
+    """Shape of an array, and the range of its finite numbers."""
+    import numpy as np
+
+    shape = " x ".join(map(str, np.shape(x)))
+    values = np.asarray(x)
+    finite = values[np.isfinite(values)] if values.dtype.kind in "fiu" else values[:0]
+    return f"({shape}) {finite.min():.5g} to {finite.max():.5g}" if finite.size else f"({shape})"

@@ -106,7 +106,7 @@ class ImpedanceCommand:
         name = self.source or "constant"
         if file:
             scenario = Scenario.load(file)
-        elif Path(name).exists() or os.sep in name:
+        elif os.path.exists(name) or os.sep in name:
             bound = "must be a file of a wall or a scenario, .toml or .json, or an experiment"
             raise ParameterError("file", name, bound)
         else:

@@ -83,8 +83,8 @@ def ordered(words: Sequence[str]) -> list[str]:
     except ParameterError as error:
         kinds = "a scenario file, .toml or .json"
         kinds += ", or the folder of a record" if recorded else ""
-        if os.sep in word or Path(word).exists():  # a file of another kind, no misspelt name
-            name = "file" if Path(word).is_file() else "path"
+        if os.sep in word or os.path.exists(word):  # a file of another kind, no misspelt name
+            name = "file" if os.path.isfile(word) else "path"
             raise ParameterError(name, word, f"must be {kinds}, or an experiment") from None
         raise ParameterError(error.field, error.value, f"{error.bound} (or give {kinds})") from None
 

@@ -160,9 +160,9 @@ def drawn(seed, most=3.0, **more):
 
 
 def open_by(scene):
-    """Residual over throughput."""
+    """Residual over throughput; 0 where nothing moves."""
     e = hc.simulate(scene, engine="python").energy
-    return abs(e["residual"]) / e["throughput"]
+    return abs(e["residual"]) / e["throughput"] if e["residual"] else 0.0
 
 
 def finer(scene, n):

@@ -204,7 +204,7 @@ def test_smooth_pictures_have_soft_edges():
 def test_bad_input_is_one_line(args, word, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("DISPLAY", ":none")
-    code = app.main([*args, *(["--t-max", "0.1"] if args[1] == "constant" else [])])
+    code = app.main([*args, *(["--t-max", "0.1"] if args[:2] == ["video", "constant"] else [])])
     err = capsys.readouterr().err
     assert code == 2 and err.count("\n") == 1 and word in err
 
