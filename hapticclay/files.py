@@ -14,6 +14,7 @@ import re
 import stat
 import struct
 import tempfile
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable, Iterator
@@ -37,6 +38,8 @@ DAMAGED = (  # what zipfile, its decompressors, NumPy and json raise, and a part
     TypeError,
     AttributeError,
     RuntimeError,
+    SyntaxError,
+    tokenize.TokenError,  # by NumPy, of a damaged head
     struct.error,
     zipfile.BadZipFile,
     zlib.error,
