@@ -12,7 +12,7 @@ SWING_GROWTH = 30.0  # an oscillation that has grown this much, swing by swing, 
 STEP_GROWTH = 2.0  # growth of one swing counts to this factor: a crossed border is no instability
 SWINGS = 6  # consecutive swings that a verdict of growth needs
 SWING_SPACING = 5.0  # samples a swing must last for that: faster is chatter over a border
-CYCLE = 30.0  # consecutive swings into the torque limits that do not decay are a limit cycle
+CYCLE = 30  # consecutive swings into the torque limits that do not decay are a limit cycle
 QUIET = 16  # numbers of an axis
 ROW = 16
 

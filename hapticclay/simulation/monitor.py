@@ -9,6 +9,17 @@ from typing import Any
 import numpy as np
 
 from ..arguments import named
+from ..kernel.watch import (
+    CYCLE,
+    FLOOR,
+    FOLD,
+    SPEED,
+    STEP_GROWTH,
+    STILL,
+    SWING_GROWTH,
+    SWING_SPACING,
+    SWINGS,
+)
 from ..model.constants import AXES
 from ..model.signals import Multisine
 from ..model.traits import Hold
@@ -16,19 +27,9 @@ from ..scene.scenario import Scenario
 from ..theory.pose_limits import PlacedLimit, PoseLimits
 
 LIMITS = "oscillation against the torque limits"
-FOLD = math.sin(math.radians(1.0))  # out of reach: elbow within 1 degree of stretched or folded
-SPEED = 20.0  # [m/s] beyond any hand
-FLOOR = 1e-9  # [m/s] swings below this are rounding
-SWING_GROWTH = 30.0  # an oscillation that has grown this much, swing by swing, is unstable
-STEP_GROWTH = 2.0  # growth of one swing counts to this factor: a crossed border is no instability
-SWINGS = 6  # consecutive swings that a verdict of growth needs
-SWING_SPACING = 5.0  # samples a swing must last for that: faster is chatter over a border
 TRANSFER = 3.0  # swing over that of the other axis whose energy it takes: > sqrt(Lambda_y/Lambda_x)
-CYCLE = 30  # consecutive swings into the torque limits that do not decay are a limit cycle
 MEMORY = 200  # swings stored
-STILL = 1e-5  # [m/s] a handle slower than this ...
-WHILE = 1.0  # ... for so long at the time limit is stalled; motors at their limits, saturated [s]
-QUIET = 9 + SWINGS + 1  # numbers per axis that `is_quiet` carries from one call to the next
+WHILE = 1.0  # [s] at rest for so long at the time limit: stalled; motors at their limits: saturated
 OFTEN = 0.1  # share of the last WHILE at the torque limits that makes an unstable run a limit cycle
 
 
@@ -321,64 +322,6 @@ def at_rest(seen: Any, moved: Any, unbound: Any, dt: float) -> tuple[Any, Any]:
     """
     recent = np.maximum(1, np.minimum(seen, round(WHILE / dt)))
     return seen - 1 - unbound >= recent, seen - 1 - moved >= recent
-
-
-def is_quiet(rows, n, limit1, limit2, swings, seen):
-    """Whether the monitor can have nothing to report on the next n rows: a cheaper test.
-
-    False where a row is no longer good, or where consecutive swings have grown, or have driven a
-    motor into its limit, as much as in an unstable run.
-
-    Args:
-        rows: shape (m, 14), m >= n.
-        n: number of rows.
-        limit1: torque limit of the shoulder [N.m].
-        limit2: torque limit of the elbow [N.m].
-        swings: of each axis, shape (2, QUIET): last two velocities, velocity at the last turn
-            [m/s], size of the last swing [m/s], number of swings that did not shrink, samples since
-            the turn with a motor at its limit, growth of those swings together, at least, how many
-            of the last ones had a motor at its limit; samples up to the last turn and to those
-            before it, one a swing.
-        seen: counts of the monitor, shape (4,): seen, moved, unbound, often.
-    """
-    for j in range(n):
-        row = rows[j]
-        vx, vy = abs(row[4]), abs(row[5])
-        bound = abs(row[8]) >= limit1 or abs(row[9]) >= limit2
-        if not (vx <= SPEED and vy <= SPEED and abs(math.sin(row[1])) >= FOLD):
-            return False
-        if vx > STILL or vy > STILL:
-            seen[1] = seen[0]
-        if bound:
-            seen[3] += 1
-        else:
-            seen[2] = seen[0]
-        seen[0] += 1
-        for i in range(2):
-            s, v = swings[i], row[4 + i]
-            s[5] += bound
-            if (v > s[0]) != (s[0] > s[1]):
-                size = abs(s[0] - s[2])
-                grown = s[4] + 1.0 if size >= (0.8 if s[5] else 1.0) * s[3] else 1.0
-                if size < FLOOR:
-                    grown = 0.0
-                if grown > 1.0 and s[3] > 0.0:
-                    s[6] *= max(1.0, min(size / s[3], STEP_GROWTH))
-                else:
-                    s[6], s[7], s[9] = 1.0, 0.0, s[8]
-                s[7] = s[7] + 1.0 if s[5] else 0.0
-                s[8] = float(seen[0])
-                s[9 + int(grown) % (SWINGS + 1)] = s[8]
-                slow = s[8] - s[9 + (int(grown) + 1) % (SWINGS + 1)] + 2.0 >= SWING_SPACING * SWINGS
-                s[2], s[3], s[4], s[5] = s[0], size if grown else 0.0, grown, 2.0 * bound
-                # except for rounding of the product
-                if grown >= SWINGS and slow and s[6] > 0.999 * SWING_GROWTH:
-                    return False
-                if s[7] >= CYCLE:
-                    return False
-            s[1] = s[0]
-            s[0] = v
-    return True
 
 
 @named
