@@ -294,7 +294,7 @@ class NativeRow(Row):
         super().__init__(scenario, mover, buffers)
 
     def model_of(self, m: Any) -> Any:
-        self.models[:] = 0
+        bytes_of(self.models)[:] = 0
         layout.save(m, self.models[0])
         return layout.view_of(records.Model, self.models)
 
@@ -339,15 +339,22 @@ class NativeRow(Row):
         return self.machine.look(*self.addresses, first, n)
 
     def state(self) -> np.ndarray:
-        return self.states.copy()
+        made = np.empty_like(self.states)
+        bytes_of(made)[:] = bytes_of(self.states)
+        return made
 
     def put_state(self, state: np.ndarray) -> None:
-        self.states[:] = state
+        bytes_of(self.states)[:] = bytes_of(state)
 
 
 def one(record: Any) -> np.ndarray:
     """An array of one record."""
     return np.zeros(1, layout.dtype_of(record))
+
+
+def bytes_of(rows: np.ndarray) -> np.ndarray:
+    """The bytes of rows: NumPy would copy records field by field, which takes 0.1 ms."""
+    return rows.view(np.uint8)
 
 
 PLACE, FLOAT = ctypes.c_void_p, ctypes.c_double
