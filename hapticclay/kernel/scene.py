@@ -79,7 +79,7 @@ def put_arm(m: Any, s: Scenario) -> None:
 def put_axes(m: Any, s: Scenario) -> None:
     """Compensator, servo, hand and muscle of each axis."""
     m.hand, m.longer = int(any(s.operators)), int(s.control == "sampled")
-    force = steady_force(s)
+    force = s.steady_force
     for i, a in enumerate(m.axis):
         a.servo[:] = map(float, s.servo[i].numbers)
         a.K, a.push = float(s.gain[i]), force[i]
@@ -95,15 +95,6 @@ def put_axes(m: Any, s: Scenario) -> None:
     for i, a in enumerate(m.axis):
         z = compensator.moving_states(s.compensators[i], s.velocity[i] / a.servo[0])
         a.z0[:] = [float(x) for x in z]
-
-
-def steady_force(s: Scenario) -> tuple[float, float]:
-    """The constant part of the muscle force, (x, y) [N]."""
-    (x, y), muscle = s.force, s.muscle
-    if muscle is not None and not muscle.varies:
-        more = muscle(0.0)
-        x, y = x + more[0], y + more[1]
-    return float(x), float(y)
 
 
 def takes_gain(m: Any) -> bool:

@@ -246,6 +246,15 @@ class Scenario:
         """Whether the muscle force or the command varies."""
         return any(x is not None and x.varies for x in (self.muscle, self.command))
 
+    @property
+    def steady_force(self) -> tuple[float, float]:
+        """The constant part of the muscle force, (x, y) [N]: `force`, and a constant `muscle`."""
+        (x, y), muscle = self.force, self.muscle
+        if muscle is not None and not muscle.varies:
+            more = muscle(0.0)
+            x, y = x + more[0], y + more[1]
+        return float(x), float(y)
+
     def _check_servo(self) -> None:
         """Refuses a servo too fast for the step; the servo alone would diverge."""
         fastest = max(x.stiffness for servo in self.servo for x in (servo.G, servo.S)) ** 0.5

@@ -423,7 +423,7 @@ class Run:
             force: the force, (x, y) [N].
         """
         self.scenario = with_checked(self.scenario, force=force)
-        self.push_evenly((0.0, *scene.steady_force(self.scenario), 0.0, 0.0))
+        self.push_evenly((0.0, *self.scenario.steady_force, 0.0, 0.0))
 
     def change_gain(self, gain: tuple[float, float]) -> None:
         """Continues with another gain.

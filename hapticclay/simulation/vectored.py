@@ -113,7 +113,7 @@ class VectoredRuns:
         if scenario is None and not self.changed[k] and not is_alone:
             run.restart()
             run.scenario = self.given[k]
-            run.push_evenly((0.0, *scene.steady_force(run.scenario), 0.0, 0.0))
+            run.push_evenly((0.0, *run.scenario.steady_force, 0.0, 0.0))
         else:
             self.given[k] = scenario or self.given[k]
             self.runs[k] = self._new(k, self.given[k], run.place)

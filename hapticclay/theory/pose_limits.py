@@ -164,9 +164,10 @@ class PoseLimits:
             i: axis, 0 for x, 1 for y.
         """
         s = self.scenario
-        pulled = s.length is not None and (s.force[0] > 0.0 or s.driven)
+        force = s.steady_force
+        pulled = s.length is not None and (force[0] > 0.0 or s.driven)
         ends = [(s.start[0], s.length) if pulled else s.start[:1], s.start[1:]]
-        straight = s.force[1] == 0.0 and not s.driven and (pulled or s.force[0] == 0.0)
+        straight = force[1] == 0.0 and not s.driven and (pulled or force[0] == 0.0)
         if not straight and s.clay:
             ends = [(*own, *edges) for own, edges in zip(ends, s.clay.edges, strict=True)]
         reach = s.arm.reach[1]
