@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 import math
 from typing import Any, NamedTuple
 
@@ -330,9 +331,14 @@ class NativeRow(Row):
         self.rooms[0] = room
         self.machine.advance(*self.call, self.rooms.ctypes.data, False)
 
+    @functools.cached_property
+    def spare(self) -> np.ndarray:
+        """A state to try the next step in."""
+        return one(records.State)
+
     def peek(self) -> np.ndarray:
-        shown, spare = np.zeros(SHOWN), one(records.State)
-        self.machine.peek(*self.call, spare.ctypes.data, shown.ctypes.data)
+        shown = np.zeros(SHOWN)
+        self.machine.peek(*self.call, self.spare.ctypes.data, shown.ctypes.data)
         return shown
 
     def is_quiet(self, first: int, n: int) -> bool:
