@@ -36,16 +36,7 @@ class UnknownArgument(ParameterError, TypeError):
 
 
 def known_names(name: str, given: Mapping[str, Any], known: Collection[str]) -> None:
-    """Refuses arguments of unknown names.
-
-    Args:
-        name: name of the callee, for the error.
-        given: arguments by name.
-        known: names that it accepts.
-
-    Raises:
-        UnknownArgument: a name is unknown; the error suggests the nearest name.
-    """
+    """Refuses arguments of unknown names."""
     for word, value in given.items():
         if word not in known:
             near = nearest(word, known)
@@ -54,14 +45,7 @@ def known_names(name: str, given: Mapping[str, Any], known: Collection[str]) -> 
 
 
 def named(made: F) -> F:
-    """Lets a function or a dataclass suggest the nearest name for an unknown argument.
-
-    Args:
-        made: the function, or the class, which is changed in place.
-
-    Raises:
-        UnknownArgument: as `known_names`, by what is returned.
-    """
+    """Lets a function or a dataclass suggest the nearest name for an unknown argument."""
     inner: Any = made.__init__ if isinstance(made, type) else made
 
     @functools.wraps(inner)
@@ -98,12 +82,7 @@ class Words(str):
 
 
 def in_words(signature: inspect.Signature, scope: Mapping[str, Any]) -> inspect.Signature:
-    """A signature with units in place of bounds: `float [N/m]`.
-
-    Args:
-        signature: of the constructor of a dataclass.
-        scope: names in its module.
-    """
+    """A signature with units in place of bounds: `float [N/m]`."""
     return signature.replace(
         parameters=[
             p.replace(annotation=unit_in_words(p.annotation, scope))
@@ -113,12 +92,7 @@ def in_words(signature: inspect.Signature, scope: Mapping[str, Any]) -> inspect.
 
 
 def unit_in_words(hint: Any, scope: Mapping[str, Any]) -> Any:
-    """An annotation with units in place of bounds, and with aliases expanded.
-
-    Args:
-        hint: the annotation, as written.
-        scope: names that may be aliases of annotations.
-    """
+    """An annotation with units in place of bounds, and with aliases expanded."""
     if not isinstance(hint, str):
         return hint
     unit = ""
@@ -158,12 +132,6 @@ def checked(made: F) -> F:
     """As `named`, and refuses arguments that are not of the classes in their annotations.
 
     The function itself checks numbers, words, arrays and tuples, since it knows their bounds.
-
-    Args:
-        made: a function, or a class that does not `check_fields`.
-
-    Raises:
-        ParameterError: an argument is of another class, or unknown; by what is returned.
     """
     inner: Any = made.__init__ if isinstance(made, type) else made
     parameters = list(_parameters(inner).values())
@@ -203,11 +171,7 @@ def _parameters(made: Any) -> Mapping[str, inspect.Parameter]:
 
 @functools.cache
 def argument_kinds(made: Callable[..., Any]) -> dict[str, tuple[Any, ...]]:
-    """Required classes of the arguments of a function; no entry for those it checks itself.
-
-    Args:
-        made: the function, or the class.
-    """
+    """Required classes of the arguments of a function; no entry for those it checks itself."""
     hints = get_type_hints(made)
     found = {name: _classes(hints[name]) for name in _parameters(made) if name in hints}
     return {name: kinds for name, kinds in found.items() if kinds}
@@ -236,11 +200,7 @@ def _in_words(kind: Any) -> str:
 
 
 def function_name(function: Any) -> str:
-    """The name "package.module:name" by which a function can be imported; "" for none.
-
-    Args:
-        function: the function.
-    """
+    """The name "package.module:name" by which a function can be imported; "" for none."""
     name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', '')}"
     with contextlib.suppress(ImportError, AttributeError, ValueError):
         if not name.startswith("__main__") and pkgutil.resolve_name(name) is function:

@@ -74,14 +74,6 @@ class Sheet:
 
         Comma, semicolon or tab separate cells; a byte-order mark, empty lines and lines that begin
         with # are skipped.
-
-        Args:
-            field: name for errors.
-            path: the file.
-
-        Raises:
-            ParameterError: the file is no such table in UTF-8.
-            OSError: the file cannot be read.
         """
         lines = [
             (i, x)
@@ -105,35 +97,17 @@ class Sheet:
         return sheet
 
     def refusal(self, bound: str) -> ParameterError:
-        """An error that names the file.
-
-        Args:
-            bound: what is accepted, in words.
-        """
+        """An error that names the file."""
         return ParameterError(self.field, str(self.path), bound)
 
     def place(self, name: str) -> int:
-        """Index of a column.
-
-        Args:
-            name: its name, which the head has.
-
-        Raises:
-            ParameterError: two columns have it.
-        """
+        """Index of a column."""
         if self.head.count(name) > 1:
             raise self.refusal(f"column {_short(name)} must stand once in the first line")
         return self.head.index(name)
 
     def named(self, names: Sequence[str]) -> dict[str, int]:
-        """Indices of columns by name; a unit in brackets behind it is no part of a name.
-
-        Args:
-            names: names of the columns.
-
-        Raises:
-            ParameterError: a column is missing, or stands twice.
-        """
+        """Indices of columns by name; a unit in brackets behind it is no part of a name."""
         plain = [x if x in names else BRACKETED.sub("", x).strip() for x in self.head]
         if missing := [x for x in names if x not in plain]:
             given = one_line(", ".join(self.head), 60)
@@ -151,15 +125,6 @@ class Sheet:
 
         A unit stands in brackets in the name of a column, as its last word (t_ms), or in a row of
         units below the names.
-
-        Args:
-            places: indices of the columns, by any keys.
-            units: accepted SI units, by the same keys; without any, units are not read.
-
-        Raises:
-            BadCell: a cell is no finite number.
-            ParameterError: a row has another number of cells; a unit is unknown or of another
-                quantity; decimal points and commas are mixed.
         """
         import numpy as np
 
@@ -249,13 +214,7 @@ class Sheet:
 
 
 def unreadable(field: str, path: Path, error: OSError) -> ParameterError:
-    """The error for a file that cannot be read.
-
-    Args:
-        field: name for the error.
-        path: the file.
-        error: what the system says.
-    """
+    """The error for a file that cannot be read."""
     return ParameterError(field, str(path), f"must be a readable file ({error.strerror})")
 
 

@@ -17,32 +17,18 @@ CELL_STYLE = (  # this grey is visible on white and on black
 
 
 def one_line(text: object, most: int = 60) -> str:
-    """A text on one line, cut to a number of characters.
-
-    Args:
-        text: the text; other objects are converted by str.
-        most: characters to keep.
-    """
+    """A text on one line, cut to a number of characters."""
     line = " ".join(printable(text).split())
     return line if len(line) <= most else f"{line[: most - 3]}..."
 
 
 def printable(text: object) -> str:
-    """A text without terminal control characters, except line ends.
-
-    Args:
-        text: the text; another object gives its str.
-    """
+    """A text without terminal control characters, except line ends."""
     return "".join(x if x.isprintable() or x == "\n" else " " for x in str(text))
 
 
 def html_table(title: str, rows: Iterable[tuple[str, str]]) -> str:
-    """A table of names and values in HTML, in the colours of the page around it, dark or light.
-
-    Args:
-        title: caption, plain text.
-        rows: name and value of each row, plain text; line ends are kept.
-    """
+    """A table of names and values in HTML, in the colours of the page around it, dark or light."""
     lines = [
         f'<tr><th style="{CELL_STYLE};font-weight:600">{html.escape(name)}</th>'
         f'<td style="{CELL_STYLE};white-space:pre-line">{html.escape(value)}</td></tr>'
@@ -53,11 +39,7 @@ def html_table(title: str, rows: Iterable[tuple[str, str]]) -> str:
 
 
 def brief(value: Any, /) -> str:
-    """A dataclass or named tuple on one line: numbers, and of arrays their shape and range.
-
-    Args:
-        value: the object.
-    """
+    """A dataclass or named tuple on one line: numbers, and of arrays their shape and range."""
     names = getattr(value, "_fields", None) or [f.name for f in dataclasses.fields(value)]
     parts = (f"{name} {_brief_value(getattr(value, name))}" for name in names)
     return f"<{type(value).__name__}: {', '.join(parts)}>"

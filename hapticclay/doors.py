@@ -12,17 +12,7 @@ import lazy_loader
 def attach(
     package: str, file: str, name: str | None = None, doors: Sequence[str] = ()
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """`lazy_loader.attach_stub`, with the nearest name where there is no such name.
-
-    Args:
-        package: the package that the stub's relative imports start from.
-        file: path of the module; its stub lies beside it.
-        name: dotted name of the module; by default that of the package.
-        doors: modules of the package whose names are suggested too.
-
-    Returns:
-        `__getattr__`, `__dir__` and `__all__` of the module.
-    """
+    """`lazy_loader.attach_stub`, with the nearest name where there is no such name."""
     found, listed, names = lazy_loader.attach_stub(package, file)
     module = name or package
 

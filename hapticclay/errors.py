@@ -108,26 +108,12 @@ def _middle_cut(text: str) -> str:
 
 
 def nearest(word: str, names: Collection[str]) -> list[str]:
-    """The name most like a word, in a list; an empty list if none is.
-
-    Args:
-        word: the word; of a long one the beginning counts.
-        names: the names.
-    """
+    """The name most like a word, in a list; an empty list if none is."""
     return difflib.get_close_matches(word[:MOST_COMPARED], names, n=1)
 
 
 def quantity(field: str, text: str, unit: str = "") -> float | None:
-    """The number of a text like "5 cm", in the unit of a field; None for other texts.
-
-    Args:
-        field: name for the error.
-        text: number and unit.
-        unit: unit of the field, "" for none.
-
-    Raises:
-        ParameterError: the unit is unknown, or has another dimension than the field's.
-    """
+    """The number of a text like "5 cm", in the unit of a field; None for other texts."""
     try:
         return from_unit(text, unit)
     except ValueError as error:
@@ -135,18 +121,7 @@ def quantity(field: str, text: str, unit: str = "") -> float | None:
 
 
 def number_in(field: str, text: object, unit: str = "") -> float:
-    """The number that a text stands for, "5" or "5 cm", in the unit of a field.
-
-    Args:
-        field: name for the error.
-        text: the number, with or without a unit; or a number.
-        unit: unit of the field, "" for none.
-
-    Raises:
-        ParameterError: the unit is unknown, or has another dimension than the field's.
-        ValueError: it is no number.
-        TypeError: likewise.
-    """
+    """The number that a text stands for, "5" or "5 cm", in the unit of a field."""
     given = quantity(field, text, unit) if isinstance(text, str) else None
     return float(text) if given is None else given  # type: ignore[arg-type]
 
@@ -160,19 +135,7 @@ def number(
     above: bool = False,
     unit: str = "",
 ) -> float:
-    """Returns value as a finite float within [low, high], or (low, high] if above.
-
-    Args:
-        field: name for the error.
-        value: the number to check [unit], or a text with a unit of that kind, as in "5 cm".
-        low: smallest value.
-        high: largest value.
-        above: whether low itself is refused.
-        unit: unit of the number.
-
-    Raises:
-        ParameterError: wrong type or unit, NaN, infinite, or out of bounds.
-    """
+    """Returns value as a finite float within [low, high], or (low, high] if above."""
     if type(value) is float and _is_within(value, low, high, above):
         return value
     given = quantity(field, value, unit) if isinstance(value, str) else value
@@ -198,17 +161,7 @@ def _is_within(x: float, low: float, high: float, above: bool) -> bool:
 
 
 def integer(field: str, value: object, low: int, high: int) -> int:
-    """Returns value as an int within [low, high].
-
-    Args:
-        field: name for the error.
-        value: the number to check.
-        low: smallest value.
-        high: largest value.
-
-    Raises:
-        ParameterError: wrong type, or out of bounds.
-    """
+    """Returns value as an int within [low, high]."""
     if type(value) is int and low <= value <= high:
         return value
     if (
@@ -221,26 +174,14 @@ def integer(field: str, value: object, low: int, high: int) -> int:
 
 
 def flag(field: str, value: object) -> bool:
-    """Returns value if it is a bool.
-
-    Args:
-        field: name for the error.
-        value: the value to check.
-
-    Raises:
-        ParameterError: it is not a bool.
-    """
+    """Returns value if it is a bool."""
     if not isinstance(value, bool):
         raise ParameterError(field, value, "must be True or False")
     return value
 
 
 def is_series(value: object) -> bool:
-    """Whether a value can be iterated over and is no text; a NumPy scalar only seems so.
-
-    Args:
-        value: the value.
-    """
+    """Whether a value can be iterated over and is no text; a NumPy scalar only seems so."""
     plain = isinstance(value, Iterable) and not isinstance(value, str | bytes)
     return plain and getattr(value, "ndim", 1) != 0
 
@@ -255,20 +196,7 @@ def numbers_of(
     above: bool = False,
     unit: str = "",
 ) -> tuple[float, ...]:
-    """Returns value as a tuple of floats, each checked by `number`.
-
-    Args:
-        field: name for the error.
-        value: the numbers to check [unit], any iterable.
-        names: name of each number, for the error.
-        low: smallest value.
-        high: largest value.
-        above: whether low itself is refused.
-        unit: unit of the numbers.
-
-    Raises:
-        ParameterError: the count of numbers is wrong, or a number was refused.
-    """
+    """Returns value as a tuple of floats, each checked by `number`."""
     if type(value) is tuple and len(value) == len(names):
         for x in value:
             if type(x) is not float or not _is_within(x, low, high, above):
@@ -297,19 +225,7 @@ def table_of(
     above: bool = False,
     unit: str = "",
 ) -> tuple[tuple[float, ...], ...]:
-    """Returns value as rows of floats of equal length, each checked by `number`.
-
-    Args:
-        field: name for the error.
-        value: the numbers to check [unit], rows of them or an array, shape (n, m); may be empty.
-        low: smallest value.
-        high: largest value.
-        above: whether low itself is refused.
-        unit: unit of the numbers.
-
-    Raises:
-        ParameterError: value is not such a table, or a number was refused.
-    """
+    """Returns value as rows of floats of equal length, each checked by `number`."""
     import numpy as np
 
     bound = "must be rows of numbers, all of one length"
@@ -337,16 +253,7 @@ def table_of(
 
 
 def array_of(field: str, value: object, bound: str = "must be numbers") -> np.ndarray:
-    """Returns a copy of value as an array of floats.
-
-    Args:
-        field: name for the error.
-        value: numbers, of any shape.
-        bound: what is accepted, for the error.
-
-    Raises:
-        ParameterError: value is not such an array.
-    """
+    """Returns a copy of value as an array of floats."""
     import numpy as np
 
     try:
@@ -364,34 +271,13 @@ def pair(
     above: bool = False,
     unit: str = "",
 ) -> tuple[float, float]:
-    """Returns value as an (x, y) pair of floats, each checked by `number`.
-
-    Args:
-        field: name for the error.
-        value: the numbers to check [unit], any iterable.
-        low: smallest value.
-        high: largest value.
-        above: whether low itself is refused.
-        unit: unit of the numbers.
-
-    Raises:
-        ParameterError: as `numbers_of`.
-    """
+    """Returns value as an (x, y) pair of floats, each checked by `number`."""
     x, y = numbers_of(field, value, ("x", "y"), low, high, above=above, unit=unit)
     return x, y
 
 
 def choice(field: str, value: object, valid: Sequence[str]) -> str:
-    """Returns value if it is one of the valid names.
-
-    Args:
-        field: name for the error.
-        value: the name to check.
-        valid: the names to choose from.
-
-    Raises:
-        ParameterError: it is not a valid name; the error suggests the nearest one.
-    """
+    """Returns value if it is one of the valid names."""
     if isinstance(value, str) and value in valid:
         return value
     near = nearest(value, valid) if isinstance(value, str) else []
@@ -427,13 +313,6 @@ def check_fields(part: Any, prefix: str = "") -> None:
     Numbers become floats, sequences become tuples. Fields may be float, int, bool, str, Literal,
     tuples of floats, other dataclasses, pairs (x, y) of them, or a union of these with None; float
     and int take a `Bound`.
-
-    Args:
-        part: the dataclass; call this first in its __post_init__.
-        prefix: put before the field's name in errors, as in "operator.".
-
-    Raises:
-        ParameterError: a field was refused.
     """
     for name, told, check, good in _checks_to_make(type(part), prefix):
         value = getattr(part, name)
@@ -446,11 +325,7 @@ def check_fields(part: Any, prefix: str = "") -> None:
 
 @functools.cache
 def field_types(kind: type) -> dict[str, tuple[Any, Bound | None]]:
-    """Type without annotations, and bound, of each field of a dataclass.
-
-    Args:
-        kind: the dataclass.
-    """
+    """Type without annotations, and bound, of each field of a dataclass."""
     hints = get_type_hints(kind, include_extras=True)
     out: dict[str, tuple[Any, Bound | None]] = {}
     for field in dataclasses.fields(kind):
@@ -638,16 +513,7 @@ def _check_text(field: str, value: Any, part: Any) -> Any:
 
 @contextlib.contextmanager
 def needing(what: str, package: str, extra: str = "data") -> Iterator[None]:
-    """Explains how to install a package if its import fails.
-
-    Args:
-        what: what needs it, for the error.
-        package: its name.
-        extra: extra of hapticclay that installs it.
-
-    Raises:
-        ParameterError: the package is not installed.
-    """
+    """Explains how to install a package if its import fails."""
     try:
         yield
     except ImportError:

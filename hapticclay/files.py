@@ -62,14 +62,7 @@ def versions() -> dict[str, str]:
 
 
 def writable(folder: Path) -> None:
-    """Checks that a folder can be made and written, before any work is done.
-
-    Args:
-        folder: the folder; it is not made.
-
-    Raises:
-        ParameterError: the folder cannot be made or written.
-    """
+    """Checks that a folder can be made and written, before any work is done."""
     made = [p for p in (folder, *folder.parents) if not p.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -92,11 +85,7 @@ _read_from: contextvars.ContextVar[frozenset[str]] = contextvars.ContextVar(
 
 @contextlib.contextmanager
 def sources_kept(paths: Iterable[Path]) -> Iterator[None]:
-    """Protects the files that a command reads from being replaced.
-
-    Args:
-        paths: the files; of a folder, those in it.
-    """
+    """Protects the files that a command reads from being replaced."""
     files = [f for p in paths for f in (p.iterdir() if os.path.isdir(p) else [p])]
     token = _read_from.set(frozenset(os.path.realpath(f) for f in files))
     try:
@@ -130,14 +119,7 @@ class Unfit(OSError):
 
 
 def check_regular(path: str | os.PathLike[str]) -> None:
-    """Refuses a path at which something other than a regular file lies.
-
-    Args:
-        path: the path.
-
-    Raises:
-        Unfit: there is a folder, a pipe, a device or a socket, or no file can have the name.
-    """
+    """Refuses a path at which something other than a regular file lies."""
     if "\0" in os.fsdecode(path):
         raise Unfit("no name of a file holds a null byte")
     if kind := _kind_of_file(os.fspath(path)):
@@ -145,16 +127,7 @@ def check_regular(path: str | os.PathLike[str]) -> None:
 
 
 def read_bytes(path: str | os.PathLike[str], most: int = MOST_READ) -> bytes:
-    """Content of a regular file; a pipe or a device, which may never end, is not opened.
-
-    Args:
-        path: the file, or a link to it.
-        most: size that is read [bytes].
-
-    Raises:
-        Unfit: it is no regular file, or larger.
-        OSError: it cannot be read.
-    """
+    """Content of a regular file; a pipe or a device, which may never end, is not opened."""
     check_regular(path)
     too_large = Unfit(f"it is larger than {most / 2**20:.3g} MiB")
     # not to wait, should a pipe have taken its place
@@ -172,32 +145,14 @@ def read_bytes(path: str | os.PathLike[str], most: int = MOST_READ) -> bytes:
 
 
 def read_text(path: str | os.PathLike[str], most: int = MOST_READ) -> str:
-    """As `read_bytes`, decoded from UTF-8; a byte order mark is left out.
-
-    Args:
-        path: as there.
-        most: as there.
-
-    Raises:
-        OSError: as by `read_bytes`.
-        UnicodeDecodeError: it is not UTF-8.
-    """
+    """As `read_bytes`, decoded from UTF-8; a byte order mark is left out."""
     return read_bytes(path, most).decode("utf-8-sig")
 
 
 def parse_json(
     text: str | bytes, pairs: Callable[[list[tuple[str, Any]]], Any] | None = None
 ) -> Any:
-    """Plain data of a JSON text.
-
-    Args:
-        text: the text.
-        pairs: makes a table of its names and values; None for a dictionary.
-
-    Raises:
-        ValueError: it is no JSON, is nested deeper than DEEPEST, or has a whole number beyond
-            MOST_WHOLE.
-    """
+    """Plain data of a JSON text."""
     try:
         return _bounded(json.loads(text, object_pairs_hook=pairs))
     except RecursionError:
@@ -205,14 +160,7 @@ def parse_json(
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Plain data of a TOML text.
-
-    Args:
-        text: the text.
-
-    Raises:
-        ValueError: as by `parse_json`.
-    """
+    """Plain data of a TOML text."""
     import tomllib
 
     if _DEEP_KEY.search(text):  # tomllib would take the square of the time

@@ -151,15 +151,7 @@ def _row(values: Sequence[Any]) -> str:
 
 
 def plain(value: Any) -> Any:
-    """Converts a part or a result to plain data, exact to the last bit.
-
-    Args:
-        value: a number, a text, an array, a dataclass of this package, or tuples, lists and
-            dictionaries of them.
-
-    Raises:
-        ParameterError: it is none of these.
-    """
+    """Converts a part or a result to plain data, exact to the last bit."""
     if value is None or isinstance(value, bool | int | str):
         return value
     if isinstance(value, float):
@@ -191,14 +183,7 @@ def _array(value: np.ndarray) -> dict[str, Any]:
 
 
 def of_plain(data: Any) -> Any:
-    """Restores the object from plain data of `plain`.
-
-    Args:
-        data: the data.
-
-    Raises:
-        ValueError, KeyError, TypeError: the data do not come from `plain`.
-    """
+    """Restores the object from plain data of `plain`."""
     if isinstance(data, list):
         return [of_plain(x) for x in data]
     if not isinstance(data, dict):

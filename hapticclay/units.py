@@ -30,12 +30,7 @@ SIZES: dict[str, tuple[Decimal, tuple[int, ...]]] = {  # in SI; powers of m, kg,
 
 @cache
 def parse_unit(text: str) -> tuple[Decimal, tuple[int, ...]] | None:
-    """Size of a unit in SI units and its powers of m, kg, s and rad; None if it is unknown.
-
-    Args:
-        text: the unit, as in "N.s/m" or "kg.m^2"; a slash divides by the next factor only. A space
-            multiplies as a dot does, and Ns and Nm are N.s and N.m.
-    """
+    """Size of a unit in SI units and its powers of m, kg, s and rad; None if it is unknown."""
     for sign, plain in (("µ", "u"), ("μ", "u"), ("²", "^2"), ("³", "^3"), ("·", "."), ("*", ".")):
         text = text.replace(sign, plain)
     text = re.sub(r"\s*([./])\s*", r"\1", text.replace(" per ", "/").strip())
@@ -64,24 +59,12 @@ def _known_unit(name: str) -> tuple[Decimal, tuple[int, ...]] | None:
 
 
 def is_quantity(value: object) -> bool:
-    """Whether a value is a text with a number and a unit.
-
-    Args:
-        value: the value.
-    """
+    """Whether a value is a text with a number and a unit."""
     return isinstance(value, str) and QUANTITY.fullmatch(value) is not None
 
 
 def from_unit(text: str, unit: str) -> float | None:
-    """The number of a text like "5 cm", in the unit of a field; None for other texts.
-
-    Args:
-        text: number and unit; "2/kg" is "2 1/kg".
-        unit: unit of the field, "" for none.
-
-    Raises:
-        ValueError: the unit is unknown, or has another dimension than the field's.
-    """
+    """The number of a text like "5 cm", in the unit of a field; None for other texts."""
     found = QUANTITY.fullmatch(text)
     if not found and unit.startswith("1/"):
         found = RECIPROCAL.fullmatch(text)

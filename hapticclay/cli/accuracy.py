@@ -75,12 +75,7 @@ class AccuracyCommand:
 
 
 def cheapest_tables(found: Ladder, markdown: bool = False) -> str:
-    """The fastest setting for each requested error, one table per unit.
-
-    Args:
-        found: the ladder.
-        markdown: whether for a page instead of a terminal.
-    """
+    """The fastest setting for each requested error, one table per unit."""
     parts = []
     for unit in found.units():
         rows = [
@@ -103,11 +98,7 @@ def cheapest_tables(found: Ladder, markdown: bool = False) -> str:
 
 
 def accuracy_page(found: Ladder) -> str:
-    """The ladder as a page in Markdown: the figure, the cheapest settings, all settings.
-
-    Args:
-        found: the ladder.
-    """
+    """The ladder as a page in Markdown: the figure, the cheapest settings, all settings."""
     rows = [
         [
             x.series,

@@ -40,15 +40,7 @@ def _show_line(usual: Callable[..., None], message: Any, category: type, *where:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs the command line.
-
-    Args:
-        argv: its words; None for those of this process.
-
-    Returns:
-        The exit status: 0; 1 if the command failed, 2 for bad input, 130 for Ctrl-C, 141 if the
-        reader of the output has gone, 128 + number for SIGTERM (143) and SIGHUP (129).
-    """
+    """Runs the command line."""
     # matplotlib warns of a home that cannot be written
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     with contextlib.suppress(AttributeError, ValueError):
@@ -104,14 +96,7 @@ def _tell(text: str) -> None:
 
 
 def parse_words(words: Sequence[str]) -> Callable[[], int] | None:
-    """The command of a command line; None if it asked for help, which is then printed.
-
-    Args:
-        words: the command line.
-
-    Raises:
-        ParameterError: there is no such command, or one of its options is wrong.
-    """
+    """The command of a command line; None if it asked for help, which is then printed."""
     words = with_units(ordered(words))
     check_words(words)
     named = words[:1] and words[0] in COMMANDS

@@ -17,10 +17,6 @@ dataclass of the options; calling it returns the exit status."""
 
 
 def load_command(name: str) -> type:
-    """The class of a command, whose module is imported only now.
-
-    Args:
-        name: a name in COMMANDS.
-    """
+    """The class of a command, whose module is imported only now."""
     module = importlib.import_module(COMMANDS[name])
     return next(x for n, x in vars(module).items() if n.lower() == f"{name}command")

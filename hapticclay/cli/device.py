@@ -171,11 +171,7 @@ class DeviceCommand:
 
 
 def served_scenario(source: Path | None) -> Scenario:
-    """What is served: a scenario file, or the paper's arm and hand.
-
-    Args:
-        source: the file; None for the paper's.
-    """
+    """What is served: a scenario file, or the paper's arm and hand."""
     from ..model.operator import Operator
     from ..scene.scenario import Scenario
 
@@ -185,14 +181,7 @@ def served_scenario(source: Path | None) -> Scenario:
 
 
 def trajectory_of(words: tuple[str, ...]) -> Trajectory | None:
-    """Where the hand wants to be, from the words of an option.
-
-    Args:
-        words: x and y; or x0, y0, x1, y1 and a speed; or the name of a CSV file.
-
-    Raises:
-        ParameterError: they are none of these.
-    """
+    """Where the hand wants to be, from the words of an option."""
     from ..ports.device import FASTEST, Trajectory
 
     if not words:

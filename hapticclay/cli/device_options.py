@@ -60,17 +60,7 @@ class DeviceOptions:
     def session(
         self, scenario: Scenario, stiffness: float, tool: Tool, every: int
     ) -> Iterator[Session]:
-        """The session, beside its device if there is one.
-
-        Args:
-            scenario: clay, gain and arm.
-            stiffness: of the hand at the mouse.
-            tool: at the handle.
-            every: keep each every-th sample.
-
-        Raises:
-            ParameterError: a value is out of its bounds, or there is no device.
-        """
+        """The session, beside its device if there is one."""
         if self.device:
             with self._hand(scenario) as hand:
                 from ..views.device_sessions import DeviceSession
@@ -123,13 +113,7 @@ class DeviceOptions:
             yield
 
     def deliver(self, session: Session, out: Path, figures: console.FigureOptions | None) -> None:
-        """Writes what the device exchanged, beside the record.
-
-        Args:
-            session: that has ended.
-            out: the folder.
-            figures: formats and style of the figures; None for no figures.
-        """
+        """Writes what the device exchanged, beside the record."""
         if self.device:
             from ..ports.client_log import FILE
 
@@ -143,11 +127,7 @@ class DeviceOptions:
 
 
 def timing_line(timing: dict[str, Any]) -> str:
-    """How regular the exchanges with a device were, in a line.
-
-    Args:
-        timing: from `Timing.summary`.
-    """
+    """How regular the exchanges with a device were, in a line."""
     late, later = (1e3 * x for x in timing["latency_p50_p99_s"])
     line = (
         f"{timing['exchanges']} exchanges at {timing['rate_hz']:.4g} Hz, {timing['missed']} lost; "
@@ -161,14 +141,7 @@ def timing_line(timing: dict[str, Any]) -> str:
 def deliver_loops(
     talks: list[Exchanges], scenario: Scenario, out: Path, figures: console.FigureOptions | None
 ) -> None:
-    """Writes the exchanges of the client with the most messages, and the report of its loop.
-
-    Args:
-        talks: of each client.
-        scenario: of the device.
-        out: the folder.
-        figures: formats and style of the figure; None for no figure.
-    """
+    """Writes the exchanges of the client with the most messages, and the report of its loop."""
     from ..ports.exchanges import FILE
 
     talks = sorted(talks, key=len, reverse=True)
@@ -182,14 +155,7 @@ def deliver_loops(
 def write_report(
     exchanges: Exchanges, scenario: Scenario, folder: Path, figures: console.FigureOptions | None
 ) -> None:
-    """Writes and prints the report of a loop.
-
-    Args:
-        exchanges: of a client.
-        scenario: of the device.
-        folder: where to.
-        figures: formats and style of the figure; None for no figure.
-    """
+    """Writes and prints the report of a loop."""
     from ..ports.report import loop_report
 
     found = loop_report(exchanges, scenario)
@@ -210,11 +176,7 @@ def _draw(found: LoopReport, folder: Path, figures: console.FigureOptions) -> No
 
 
 def report_table(found: LoopReport) -> str:
-    """The report for a terminal.
-
-    Args:
-        found: from `loop_report`.
-    """
+    """The report for a terminal."""
     rows = [
         (name, value if isinstance(value, str) else console.significant(value))
         for name, (value,) in found.tables()["report"].items()

@@ -52,11 +52,7 @@ class FieldsCommand:
 
 
 def field_list(fields: Iterable[Field]) -> str:
-    """Fields with their defaults, units, bounds and descriptions, for a terminal.
-
-    Args:
-        fields: from `fields_of`.
-    """
+    """Fields with their defaults, units, bounds and descriptions, for a terminal."""
     lines = []
     for f in fields:
         unit = f"  [{f.bound.unit}]" if f.bound.unit else ""

@@ -103,11 +103,7 @@ class FitCommand:
 
 
 def law_table(fitted: Fitted) -> str:
-    """The candidates, the chosen one's parameters with intervals, and warnings, for a terminal.
-
-    Args:
-        fitted: from `fit_flow`.
-    """
+    """The candidates, the chosen one's parameters with intervals, and warnings, for a terminal."""
     rows = []
     for c in sorted(fitted.candidates, key=lambda c: (c.law != fitted.law, c.aicc)):
         of = fitted.parameters if c.law == fitted.law else c.parameters

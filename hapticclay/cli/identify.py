@@ -172,16 +172,7 @@ def column_names(
     columns: Collection[str],
     example: str = "t=time input=cmd output=pos",
 ) -> dict[str, str]:
-    """Names of columns from words such as "input=cmd".
-
-    Args:
-        words: of the command line.
-        columns: what there may be.
-        example: of such words.
-
-    Raises:
-        ParameterError: a word has another form, or a column stands twice.
-    """
+    """Names of columns from words such as "input=cmd"."""
     out: dict[str, str] = {}
     for word in words:
         key, _, name = word.partition("=")
@@ -194,12 +185,7 @@ def column_names(
 
 
 def coefficient_table(results: Sequence[Identified], paper: bool = True) -> str:
-    """Fitted coefficients, and the printed ones beside them, for a terminal.
-
-    Args:
-        results: from `identify`.
-        paper: whether the printed ones are beside them.
-    """
+    """Fitted coefficients, and the printed ones beside them, for a terminal."""
     rows = [
         [
             r.what,
@@ -234,11 +220,7 @@ def coefficient_table(results: Sequence[Identified], paper: bool = True) -> str:
 
 
 def drift_table(found: Drift) -> str:
-    """Range of each coefficient over the workspace, with and without shaping, for a terminal.
-
-    Args:
-        found: from `drift_map`.
-    """
+    """Range of each coefficient over the workspace, with and without shaping, for a terminal."""
     ranges = found.ranges()
     rows = [
         [

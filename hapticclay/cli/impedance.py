@@ -119,11 +119,7 @@ class ImpedanceCommand:
 
 
 def impedance_table(found: MeasuredImpedance) -> str:
-    """Effective stiffness, damping and mass at each line, for a terminal.
-
-    Args:
-        found: from `measure_impedance`.
-    """
+    """Effective stiffness, damping and mass at each line, for a terminal."""
     m, c = found.measured, found.computed
     off = abs(m.Z / c.Z - 1.0)
     columns = zip(

@@ -35,12 +35,7 @@ class InfoCommand:
 
 
 def record_text(record: Record, size: int) -> str:
-    """What a record holds, for a terminal.
-
-    Args:
-        record: the record.
-        size: of its file [bytes].
-    """
+    """What a record holds, for a terminal."""
     import numpy as np
 
     from ..scene.text import scenario_rows
@@ -71,11 +66,7 @@ def record_text(record: Record, size: int) -> str:
 
 
 def array_table(record: Record) -> str:
-    """Shape, unit and range of each array, for a terminal.
-
-    Args:
-        record: the record.
-    """
+    """Shape, unit and range of each array, for a terminal."""
     import numpy as np
 
     from ..simulation.tables import ARRAY_UNITS, LONG_NAMES, recorded_arrays

@@ -75,11 +75,7 @@ class LabCommand:
 
 
 def lab_text(found: Lab) -> str:
-    """Task, table and questions of a lab, for a terminal.
-
-    Args:
-        found: the lab.
-    """
+    """Task, table and questions of a lab, for a terminal."""
     columns = list(found.columns.values())
     cells = [[x if isinstance(x, str) else f"{x:.5g}" for x in column] for column in columns]
     align = "".join("l" if isinstance(column[0], str) else "r" for column in columns)

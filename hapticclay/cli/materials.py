@@ -50,11 +50,7 @@ class MaterialsCommand:
 
 
 def material_table(tool: Tool) -> str:
-    """The materials with the flow of a tool in each and its source, for a terminal.
-
-    Args:
-        tool: the tool.
-    """
+    """The materials with the flow of a tool in each and its source, for a terminal."""
     from ..model.materials import MATERIALS
 
     rows, sources = [], []

@@ -118,11 +118,7 @@ def _bar(items: Any) -> Any:
 
 
 def device_table(found: DeviceMBK) -> str:
-    """Borders by runs beside the exact ones, and the dynamic range, for a terminal.
-
-    Args:
-        found: from `device_mbk`.
-    """
+    """Borders by runs beside the exact ones, and the dynamic range, for a terminal."""
     number = console.significant
     rows = []
     for plane, some in found.found.items():
@@ -146,11 +142,7 @@ def device_table(found: DeviceMBK) -> str:
 
 
 def arm_table(found: ArmMBK) -> str:
-    """The least masses of the arm, for a terminal.
-
-    Args:
-        found: from `arm_mbk`.
-    """
+    """The least masses of the arm, for a terminal."""
     number = console.significant
     runs = {x.exact: x.y for x in found.found}
     rows = []

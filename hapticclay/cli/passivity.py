@@ -126,14 +126,7 @@ def passivity_table(
     energy: EnergyOverTime,
     region: PassiveRegion,
 ) -> str:
-    """What the four figures say, for a terminal.
-
-    Args:
-        found: of the wall.
-        arms: of the axes of the arm.
-        energy: of the rendered clay.
-        region: of the wall.
-    """
+    """What the four figures say, for a terminal."""
     rows = [[x.name, f"{x.margin:.4g}", "yes" if x.margin >= 0.0 else "no"]
             for x in (found, *arms.values())]  # fmt: skip
     lines = [console.text_table(rows, ["", "to spare [N.s/m]", "passive"], "lrl"), ""]
@@ -151,13 +144,7 @@ def passivity_table(
 
 
 def limit_at(region: PassiveRegion, Ts: float, delay: float) -> float:
-    """The largest passive K by theory at one Ts and delay [N/m].
-
-    Args:
-        region: whose wall it is.
-        Ts: control sample [s].
-        delay: over Ts.
-    """
+    """The largest passive K by theory at one Ts and delay [N/m]."""
     from ..theory.wall_limits import colgate_schenkel_limit
 
     return colgate_schenkel_limit(replace(region.wall, Ts=Ts, delay=delay * Ts))

@@ -92,11 +92,7 @@ class ReproduceCommand:
 
 
 def claims_table(rows: Sequence[Row]) -> str:
-    """The claims of a classic, for a terminal.
-
-    Args:
-        rows: of its table.
-    """
+    """The claims of a classic, for a terminal."""
     from ..paper.report import format_error, format_number, format_verdict
 
     cells = [

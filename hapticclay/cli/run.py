@@ -73,9 +73,6 @@ def unstable_axes(scenario: Scenario) -> list[str]:
 
     The limit is the least over clay and poses of the path. Clay that is not viscous is left out:
     the linear limit does not apply to it.
-
-    Args:
-        scenario: the run.
     """
     from ..theory.pose_limits import PoseLimits
 
@@ -95,14 +92,7 @@ def simulate_with_progress(
     stop: Callable[[], bool] | None = None,
     error: str | None = None,
 ) -> Record:
-    """Runs simulate() under a progress bar.
-
-    Args:
-        scenario: the run.
-        every: keep every n-th sample.
-        stop: ends the run when it returns True.
-        error: largest error to allow, as in simulate(); the bar then shows one run after another.
-    """
+    """Runs simulate() under a progress bar."""
     from ..simulation.simulate import simulate
 
     start, length = scenario.start[0], scenario.length
@@ -119,17 +109,7 @@ def simulate_with_progress(
 def deliver(
     record: Record, folder: Path, figures: console.FigureOptions | None, paced: bool = False
 ) -> None:
-    """Writes a record and its plots, prints its table, and removes plots of an earlier record.
-
-    Args:
-        record: the run.
-        folder: where to write.
-        figures: how to write the plots; None for no plots.
-        paced: whether a clock or another program set the pace of the run.
-
-    Raises:
-        ParameterError: a file cannot be written.
-    """
+    """Writes a record and its plots, prints its table, and removes plots of an earlier record."""
     try:
         earlier = (folder / "record.npz").exists()
         record.save(folder)
@@ -147,12 +127,7 @@ def deliver(
 
 
 def run_table(record: Record, paced: bool = False) -> str:
-    """What happened in a run, for a terminal.
-
-    Args:
-        record: the run.
-        paced: whether a clock or another program set the pace of the run.
-    """
+    """What happened in a run, for a terminal."""
     from ..model.signals import Multisine
 
     s = record.scenario

@@ -170,16 +170,7 @@ class StabilityCommand:
 
 
 def clay_of(words: Sequence[str], b: float | None = None) -> Flow:
-    """The law of clay that is given by its numbers, or by the name of a material.
-
-    Args:
-        words: NAME=NUMBER each, one text or several, of Fy, K, n, and b; or a name of `material`.
-        b: damping where words name none [N.s/m]; None for 0, or for that of a material.
-
-    Raises:
-        ParameterError: no words, an unknown name, one given twice, n without K, b beside a
-            material, no number, or one out of its bounds.
-    """
+    """The law of clay that is given by its numbers, or by the name of a material."""
     from ..model.flow import Flow
     from ..model.materials import material
     from ..scene.fields import field_unit
@@ -211,17 +202,7 @@ def clay_of(words: Sequence[str], b: float | None = None) -> Flow:
 
 
 def clay_predictions(loop: PushedLoop, flow: Flow) -> dict[str, Any]:
-    """What theory says of a loop in clay that yields, in continuous time.
-
-    Args:
-        loop: the loop.
-        flow: the law of the clay.
-
-    Returns:
-        The law; bands of b in which the loop is unstable; what becomes of a small and of a large
-        push; the cycles by the describing function and, in Coulomb and Bingham clay, the exact ones
-        (None in another).
-    """
+    """What theory says of a loop in clay that yields, in continuous time."""
     from ..theory import describing, relay_cycle
     from ..theory.loops import TIMING
 
@@ -245,22 +226,14 @@ def clay_predictions(loop: PushedLoop, flow: Flow) -> dict[str, Any]:
 
 
 def linear_heading(flow: Flow) -> str:
-    """Says of which clay the verdicts of the linear loop are.
-
-    Args:
-        flow: the law of the clay.
-    """
+    """Says of which clay the verdicts of the linear loop are."""
     parts = [name for name, x in (("yield force", flow.Fy), ("consistency", flow.K)) if x]
     left_out = f" ({' and '.join(parts)} left out)" if parts else ""
     return f"Linear loop in clay of b = {flow.b:g} N.s/m alone{left_out}"
 
 
 def clay_table(clay: dict[str, Any]) -> str:
-    """The predictions, for a terminal.
-
-    Args:
-        clay: from `clay_predictions`.
-    """
+    """The predictions, for a terminal."""
     number = console.significant
     bands = ", ".join(
         f"{low:.4g} to {'any' if high == math.inf else f'{high:.4g}'}"
@@ -296,11 +269,7 @@ def clay_table(clay: dict[str, Any]) -> str:
 
 
 def yield_differences(chart: YieldMap) -> str:
-    """How the runs of a map of yield force and gain compare with theory.
-
-    Args:
-        chart: the map.
-    """
+    """How the runs of a map of yield force and gain compare with theory."""
     wrong = [c for c in chart.cells if c.simulated != c.expected]
     gaps = [abs(c.speed / c.exact - 1.0) for c in chart.cells if c.exact > 0.0 and c.speed > 0.0]
     lines = [f"{len(wrong)} of {len(chart.cells)} runs end otherwise than theory says"]
@@ -316,10 +285,6 @@ def verdicts(loop: PushedLoop, delay: float = 0.0) -> list[dict[str, Any]]:
     """Verdicts of the analysis on a loop: question, answer, value, meaning, omega [rad/s].
 
     Margins and transparency are those of continuous time; NaN where the loop is unstable there.
-
-    Args:
-        loop: the loop.
-        delay: of the motors [s].
     """
     import numpy as np
 
@@ -371,11 +336,7 @@ def verdicts(loop: PushedLoop, delay: float = 0.0) -> list[dict[str, Any]]:
 
 
 def verdict_table(rows: list[dict[str, Any]]) -> str:
-    """The verdicts, for a terminal.
-
-    Args:
-        rows: from `verdicts`.
-    """
+    """The verdicts, for a terminal."""
     said, number = {True: "yes", False: "no", None: ""}, console.significant
     cells = [
         [r["question"], said[r["answer"]], number(r["value"]), r["what"], number(r["omega"])]
@@ -385,11 +346,7 @@ def verdict_table(rows: list[dict[str, Any]]) -> str:
 
 
 def disagreements(chart: StabilityMap) -> str:
-    """The cells in which a run differs from the analysis in continuous time, and the causes.
-
-    Args:
-        chart: the map.
-    """
+    """The cells in which a run differs from the analysis in continuous time, and the causes."""
     wrong = [c for c in chart.cells if c.cause]
     lines = [
         "boundary found by runs against the exact one of the same loop: "

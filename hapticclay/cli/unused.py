@@ -28,14 +28,7 @@ class Unused(NamedTuple):
     without: tuple[str, ...] = ()
 
     def refuse(self, given: Given) -> None:
-        """Refuses the options where they do nothing.
-
-        Args:
-            given: the words of a command line.
-
-        Raises:
-            ParameterError: one of them is given.
-        """
+        """Refuses the options where they do nothing."""
         beside = all(_is_given(word, given) for word in self.beside)
         if not beside or any(_is_given(word, given) for word in self.without):
             return
@@ -48,25 +41,13 @@ FIGURE_WORDS = "format", "dpi", "style", "data"
 
 
 def undrawn(*switches: str) -> tuple[Unused, ...]:
-    """Options of figures beside an option that leaves the figures out.
-
-    Args:
-        *switches: the options, as "no-plots".
-    """
+    """Options of figures beside an option that leaves the figures out."""
     why = "is for figures, which --{} leaves out: give one of the two"
     return tuple(Unused(FIGURE_WORDS, why.format(x), (x,)) for x in switches)
 
 
 def refuse_unused(rules: Iterable[Unused], given: Given) -> None:
-    """Refuses options that would do nothing.
-
-    Args:
-        rules: of the command.
-        given: the words of a command line.
-
-    Raises:
-        ParameterError: one of them is given.
-    """
+    """Refuses options that would do nothing."""
     for rule in rules:
         rule.refuse(given)
 

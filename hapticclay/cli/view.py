@@ -26,11 +26,7 @@ if TYPE_CHECKING:
 
 
 def tool_size(name: str) -> Callable[[], float]:
-    """A function that returns the default of a field of Tool, which is imported only then.
-
-    Args:
-        name: the field.
-    """
+    """A function that returns the default of a field of Tool, which is imported only then."""
 
     def size() -> float:
         from ..studies.removal import TOOL
@@ -142,15 +138,7 @@ class ViewCommand:
 
 @contextlib.contextmanager
 def streaming(play: Session | Replay, address: str | None) -> Iterator[None]:
-    """Sends what is played over UDP meanwhile.
-
-    Args:
-        play: the session, or the replay.
-        address: HOST:PORT; None for nowhere.
-
-    Raises:
-        ParameterError: it is no such address, or there is no such host.
-    """
+    """Sends what is played over UDP meanwhile."""
     if address is None:
         yield
         return
@@ -164,16 +152,7 @@ def streaming(play: Session | Replay, address: str | None) -> Iterator[None]:
 
 
 def replay(record: Record, tool: Tool, stream: str | None = None) -> None:
-    """Shows a record in a window, in real time, until it is closed.
-
-    Args:
-        record: the run.
-        tool: the cutter.
-        stream: where to send it meanwhile, HOST:PORT; None for nowhere.
-
-    Raises:
-        ParameterError: there is no display, no OpenGL, nothing in the record, or no such host.
-    """
+    """Shows a record in a window, in real time, until it is closed."""
     if not len(record.t):
         raise ParameterError("record", record.scenario.name, "holds no samples")
     from ..views.replay import Replay

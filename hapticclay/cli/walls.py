@@ -60,12 +60,7 @@ class DeviceOptions:
         return tuple(f.name for f in fields(self) if getattr(self, f.name) != f.default)
 
     def wall(self, source: Path | str | None = None, **base: Any) -> VirtualWall:
-        """The wall of a file, or one of defaults, with what was given.
-
-        Args:
-            source: the file; None for none.
-            **base: fields that differ from the defaults where there is no file.
-        """
+        """The wall of a file, or one of defaults, with what was given."""
         from ..scene.changes import with_fields
         from ..scene.virtual_wall import VirtualWall
 
@@ -78,15 +73,7 @@ class DeviceOptions:
         return replace(wall, unilateral=True) if self.unilateral else wall
 
     def refuse(self, bound: str, but: tuple[str, ...] = ()) -> None:
-        """Refuses what was given.
-
-        Args:
-            bound: what to do, for the error.
-            but: options that may be given.
-
-        Raises:
-            ParameterError: an option was given.
-        """
+        """Refuses what was given."""
         for name in self.given:
             if name not in but:
                 raise ParameterError(name, str(getattr(self, name)), bound)
@@ -108,14 +95,7 @@ class WallOptions(DeviceOptions):
 
 
 def quantities(given: dict[str, str | None]) -> dict[str, Any]:
-    """Numbers with their units read, of the options that were given.
-
-    Args:
-        given: texts by name, None for those that were not.
-
-    Raises:
-        ParameterError: a text is none.
-    """
+    """Numbers with their units read, of the options that were given."""
     from ..scene.changes import named_values
 
     out: dict[str, Any] = {}
@@ -126,22 +106,14 @@ def quantities(given: dict[str, str | None]) -> dict[str, Any]:
 
 
 def operator_of(hand: Hand | None) -> Any:
-    """The hand of --hand, None for none.
-
-    Args:
-        hand: mass, damper and spring [kg, N.s/m, N/m].
-    """
+    """The hand of --hand, None for none."""
     from ..model.operator import Operator
 
     return Operator(*hand) if hand else None
 
 
 def box_of(hands: HandEnds | None) -> Box | None:
-    """The hands of --box, None for none.
-
-    Args:
-        hands: least and largest mass, damper and spring [kg, N.s/m, N/m].
-    """
+    """The hands of --box, None for none."""
     from ..theory.hand_boxes import Box
 
     if hands is None:

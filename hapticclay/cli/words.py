@@ -40,12 +40,6 @@ def ordered(words: Sequence[str]) -> list[str]:
 
     A path needs neither "file" nor "record". Commands that take a record take the constant cut by
     default.
-
-    Args:
-        words: the command line.
-
-    Raises:
-        ParameterError: a word is neither a command, nor an experiment, nor a file.
     """
     if words[:1] == ["--version"]:
         return ["version"]
@@ -120,12 +114,6 @@ def with_units(words: Sequence[str]) -> list[str]:
 
     A number with a unit becomes a number in the unit of its option, "none" the None of an option
     that may have no value, and one number for a pair of an experiment, as for --set, two.
-
-    Args:
-        words: the command line, ordered.
-
-    Raises:
-        ParameterError: a unit is unknown, or of another kind than the option's.
     """
     helping = not {*HELP}.isdisjoint(words)  # needs no values, nor what reads them
     if helping or len(words) < 2 or words[0] not in COMMANDS:
@@ -211,11 +199,7 @@ def _members(kind: Any) -> set[Any]:
 
 
 def sources(words: Sequence[str]) -> list[Path]:
-    """Files, and folders of records, that a command line names to be read.
-
-    Args:
-        words: the command line.
-    """
+    """Files, and folders of records, that a command line names to be read."""
     pairs = itertools.pairwise(["", *words])
     named = [Path(word) for before, word in pairs if before not in ("--out", "--page")]
     return [p for p in named if any(map(os.path.isfile, (p, p / "record.npz")))]
@@ -236,11 +220,7 @@ class Slot(NamedTuple):
 
 
 def options(words: Sequence[str]) -> dict[str, Any]:
-    """Types of the options of a command and of its experiment, by name.
-
-    Args:
-        words: the command line, ordered.
-    """
+    """Types of the options of a command and of its experiment, by name."""
     return {name: slot.kind for name, slot in _slots(words).items() if slot.named}
 
 
@@ -280,14 +260,7 @@ def _own_slots(kind: Any) -> dict[str, Slot]:
 
 
 def check_words(words: Sequence[str]) -> None:
-    """Refuses words that a command does not take.
-
-    Args:
-        words: the command line, ordered, without units.
-
-    Raises:
-        ParameterError: it names the option, what was given, what it takes and the nearest name.
-    """
+    """Refuses words that a command does not take."""
     if not words:
         raise _refused(f"give a command: {', '.join(COMMANDS)}")
     if not {*HELP}.isdisjoint(words) or any(w.startswith("--tyro-") for w in words):

@@ -137,11 +137,7 @@ class ZWidthCommand:
 
 
 def zwidth_table(found: ZWidth) -> str:
-    """The regions and what was found beside theory, for a terminal.
-
-    Args:
-        found: from `zwidth`.
-    """
+    """The regions and what was found beside theory, for a terminal."""
     number = console.significant
     rows = []
     for r in found.regions:

@@ -45,13 +45,7 @@ class Scores(NamedTuple):
 
 
 def at_random(task: Task, truths: list[Truth], seed: int) -> Policy:
-    """Uniformly distributed random actions.
-
-    Args:
-        task: the task.
-        truths: numbers drawn for each copy.
-        seed: seed of the actions.
-    """
+    """Uniformly distributed random actions."""
     rng, shape = np.random.default_rng(seed), (len(truths), len(task.actions))
     return lambda observations: rng.uniform(-1.0, 1.0, shape)
 
@@ -60,11 +54,6 @@ def pd_along_line(task: Any, truths: list[Truth], seed: int) -> Policy:
     """PD control across the line, and integral control of the speed along it.
 
     The integral is the last action, which is part of the observation.
-
-    Args:
-        task: a task with a line.
-        truths: numbers drawn; not used.
-        seed: not used.
     """
     names = [q.name for q in task.observations]
     first, last = names.index(MOTION[0].name), names.index(MOTION[4].name)
@@ -94,34 +83,19 @@ def _towards(gains: np.ndarray) -> Policy:
 
 
 def oracle_gain(b: float, hand: Operator, share: float = MARGIN) -> float:
-    """A share of the gain limit along x with this hand, at most the task's largest gain [1/kg].
-
-    Args:
-        b: damping of the clay [N.s/m].
-        hand: the hand.
-        share: the share.
-    """
+    """A share of the gain limit along x with this hand, at most the task's largest gain [1/kg]."""
     return min(share * gain_limit("x", b, hand), adaptive_gain.MOST)
 
 
 @functools.cache
 def least_limit(b: float) -> float:
-    """The least gain limit along x over the corners of the published hands [1/kg].
-
-    Args:
-        b: damping of the clay [N.s/m].
-    """
+    """The least gain limit along x over the corners of the published hands [1/kg]."""
     ends = ((HAND[name].low, HAND[name].high) for name in ("mass", "damper", "spring"))
     return min(gain_limit("x", b, Operator(*hand)) for hand in itertools.product(*ends))
 
 
 def robust_gain(b: float, share: float = MARGIN) -> float:
-    """A share of `least_limit`, at most the task's largest gain [1/kg].
-
-    Args:
-        b: damping of the clay [N.s/m].
-        share: the share; up to 1 no published hand is unstable.
-    """
+    """A share of `least_limit`, at most the task's largest gain [1/kg]."""
     return min(share * least_limit(b), adaptive_gain.MOST)
 
 
@@ -135,13 +109,7 @@ class Oracle(NamedTuple):
     share: float = MARGIN
 
     def __call__(self, task: Task, truths: list[Truth], seed: int) -> Policy:
-        """The policy of these episodes.
-
-        Args:
-            task: the task.
-            truths: numbers drawn for each copy.
-            seed: not used.
-        """
+        """The policy of these episodes."""
         hands = (Operator(t["mass"], t["damper"], t["spring"]) for t in truths)
         drawn = zip(truths, hands, strict=True)
         return _towards(np.array([oracle_gain(t["b"], hand, self.share) for t, hand in drawn]))
@@ -157,13 +125,7 @@ class Fixed(NamedTuple):
     share: float = MARGIN
 
     def __call__(self, task: Task, truths: list[Truth], seed: int) -> Policy:
-        """The policy of these episodes.
-
-        Args:
-            task: the task.
-            truths: numbers drawn; only the clay is used.
-            seed: not used.
-        """
+        """The policy of these episodes."""
         return _towards(np.array([robust_gain(t["b"], self.share) for t in truths]))
 
 
@@ -171,11 +133,6 @@ def passivity_observer(task: Task, truths: list[Truth], seed: int) -> Policy:
     """Raises the gain slowly, and lowers it when the device returns more energy than it received.
 
     The energy is that at the port over the samples, less the energy of the virtual mass 1/K.
-
-    Args:
-        task: the task.
-        truths: numbers drawn; not used.
-        seed: not used.
     """
     n, dt = adaptive_gain.SAMPLES, task.period
 
@@ -193,11 +150,6 @@ def identify_then_set(task: Task, truths: list[Truth], seed: int) -> Policy:
 
     The force of the hand is uh - Th p. Its muscle force uh has three tones of known frequency. The
     equation is integrated once, so that no velocity is differentiated.
-
-    Args:
-        task: the task.
-        truths: numbers drawn; only the clay is used.
-        seed: not used.
     """
     gains = np.array([robust_gain(t["b"]) for t in truths])
     seen: list[np.ndarray] = []
@@ -216,13 +168,7 @@ def identify_then_set(task: Task, truths: list[Truth], seed: int) -> Policy:
 
 
 def hand_from(v: np.ndarray, fh: np.ndarray, dt: float) -> Operator:
-    """Identifies the hand from its forces by least squares, within the published hands.
-
-    Args:
-        v: velocity [m/s], shape (n,), from rest.
-        fh: force on the handle [N], shape (n,).
-        dt: time between samples [s].
-    """
+    """Identifies the hand from its forces by least squares, within the published hands."""
 
     def integral(y: np.ndarray) -> np.ndarray:
         return np.concatenate(([0.0], np.cumsum(0.5 * dt * (y[1:] + y[:-1]))))
@@ -250,11 +196,6 @@ def least_squares(task: Task, truths: list[Truth], seed: int) -> Policy:
     """Moves back and forth at two speeds, then fits Fy + b |v| to the force of the clay.
 
     That force is the hand's force less the inertial and damping force of the device, (a + 10 v)/K.
-
-    Args:
-        task: the task.
-        truths: numbers drawn; not used.
-        seed: not used.
     """
     seen: list[np.ndarray] = []
 
@@ -299,14 +240,7 @@ BASELINES: dict[str, dict[str, Maker]] = {
 
 
 def returns(id: str, make: Maker, seeds: Sequence[int], **options: Any) -> Scores:
-    """Runs a policy for one episode per seed.
-
-    Args:
-        id: id of the environment, as "CutLine-v0".
-        make: makes the policy.
-        seeds: seeds of the episodes.
-        **options: options of the environment.
-    """
+    """Runs a policy for one episode per seed."""
     name = f"{NAMESPACE}/{choice('id', id, tuple(ENTRIES))}"
     env: Any = gymnasium.make_vec(name, num_envs=len(seeds), **options).unwrapped
     observations, info = env.reset(seed=list(seeds))
@@ -328,9 +262,5 @@ def returns(id: str, make: Maker, seeds: Sequence[int], **options: Any) -> Score
 
 
 def mean_of(x: np.ndarray) -> tuple[float, float]:
-    """Mean, and half of its 95 % confidence interval by the normal distribution.
-
-    Args:
-        x: one value per episode.
-    """
+    """Mean, and half of its 95 % confidence interval by the normal distribution."""
     return float(x.mean()), 1.96 * float(x.std(ddof=1)) / math.sqrt(len(x))

@@ -18,86 +18,46 @@ Pair = tuple[Value, Value]  # (x, y)
 
 
 def where(condition: Value, a: Value, b: Value) -> Value:
-    """a where the condition holds, else b.
-
-    Args:
-        condition: bool, or one per copy.
-        a: value.
-        b: value.
-    """
+    """a where the condition holds, else b."""
     if isinstance(condition, np.ndarray):
         return np.where(condition, a, b)
     return a if condition else b
 
 
 def negated(condition: Value) -> Value:
-    """Whether a condition does not hold.
-
-    Args:
-        condition: bool, or one per copy.
-    """
+    """Whether a condition does not hold."""
     return ~condition if isinstance(condition, np.ndarray) else not condition
 
 
 def bounded(x: Value, low: Value, high: Value) -> Value:
-    """x, at least low and at most high; NaN stays NaN.
-
-    Args:
-        x: value.
-        low: smallest value.
-        high: largest value.
-    """
+    """x, at least low and at most high; NaN stays NaN."""
     if isinstance(x, np.ndarray):
         return np.where(x < low, low, np.where(x > high, high, x))
     return low if x < low else high if x > high else x
 
 
 def shown(x: Value, low: Value, high: Value) -> Value:
-    """x, at least low and at most high; 0 in place of NaN.
-
-    Args:
-        x: value.
-        low: smallest value.
-        high: largest value.
-    """
+    """x, at least low and at most high; 0 in place of NaN."""
     return where(x == x, bounded(x, low, high), 0.0)
 
 
 def root(x: Value) -> Value:
-    """Square root.
-
-    Args:
-        x: value, >= 0.
-    """
+    """Square root."""
     return np.sqrt(x) if isinstance(x, np.ndarray) else math.sqrt(x)
 
 
 def mapped(f: Callable[[float], float], x: Value) -> Value:
-    """f(x), value by value.
-
-    Args:
-        f: a function of `math`.
-        x: value.
-    """
+    """f(x), value by value."""
     return np.array([f(value) for value in x.tolist()]) if isinstance(x, np.ndarray) else f(x)
 
 
 def picked(table: Any, i: Value) -> Value:
-    """Entry i of each copy's table.
-
-    Args:
-        table: of one copy, shape (m,), or of all, shape (n, m).
-        i: index, or one per copy.
-    """
+    """Entry i of each copy's table."""
     return table[np.arange(len(i)), i] if isinstance(i, np.ndarray) else table[i]
 
 
 def columns_of(rows: Sequence[Any]) -> Any:
-    """The values of several copies as columns; tuples stay tuples, and None stays None.
-
-    Args:
-        rows: values of each copy: numbers, tables, or tuples of these.
-    """
+    """The values of several copies as columns; tuples stay tuples, and None stays None."""
     first = rows[0]
     if isinstance(first, tuple):
         return tuple(columns_of(x) for x in zip(*rows, strict=True))
@@ -105,13 +65,7 @@ def columns_of(rows: Sequence[Any]) -> Any:
 
 
 def replaced(columns: Any, which: Sequence[int], rows: Sequence[Any]) -> Any:
-    """Columns with the values of some copies replaced.
-
-    Args:
-        columns: as by `columns_of`.
-        which: numbers of the copies.
-        rows: values of each of these.
-    """
+    """Columns with the values of some copies replaced."""
     first = rows[0]
     if isinstance(first, tuple):
         parts = zip(columns, zip(*rows, strict=True), strict=True)
@@ -124,12 +78,7 @@ def replaced(columns: Any, which: Sequence[int], rows: Sequence[Any]) -> Any:
 
 
 def value_of(columns: Any, i: int) -> Any:
-    """The values of one copy.
-
-    Args:
-        columns: as by `columns_of`.
-        i: number of the copy.
-    """
+    """The values of one copy."""
     if isinstance(columns, tuple):
         return tuple(value_of(x, i) for x in columns)
     return None if columns is None else columns[i]

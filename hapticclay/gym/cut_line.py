@@ -56,11 +56,7 @@ class CutLineTask(Follow):
         )
 
     def line(self, truth: Truth) -> np.ndarray:
-        """Nodes of the line [m].
-
-        Args:
-            truth: numbers drawn.
-        """
+        """Nodes of the line [m]."""
         return lines.turned(lines.SHAPES[self.shape](LENGTH), truth["angle"])
 
     @override

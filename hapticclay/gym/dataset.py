@@ -53,24 +53,6 @@ def record(
     Each episode is kept as soon as it ends, in a hidden folder beside the data sets. After an
     interruption the same call continues there, and the data set has the same bits as one that was
     never interrupted. The data set appears when it is complete.
-
-    Args:
-        id: id of the environment, as "CutLine-v0".
-        name: name of the data set, as "hapticclay/cut-line/pd-v0".
-        episodes: number of episodes, 1 to 100000; episode i has the seed `seed` + i.
-        noise: standard deviation added to each action, 0 to 1.
-        seed: seed of the first episode, at least 0.
-        engine: as in `Simulation`.
-        progress: called with the number of episodes that are kept: first with those of an earlier
-            call, then after each episode.
-
-    Returns:
-        The data set, a minari.MinariDataset.
-
-    Raises:
-        ParameterError: before any episode: an argument is refused, there is a data set of this
-            name, an interrupted recording of this name had other arguments, or Minari or h5py is
-            not installed.
     """
     choice("id", id, tuple(BASELINE))
     choice("engine", engine, ENGINES)

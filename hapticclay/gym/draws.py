@@ -44,15 +44,7 @@ HAND = {
 
 
 def with_ranges(ranges: Mapping[str, Range], given: Mapping[str, Any] | None) -> dict[str, Range]:
-    """Copies ranges with other ends.
-
-    Args:
-        ranges: by name.
-        given: pairs (low, high) by name; equal ends fix a number; None for none.
-
-    Raises:
-        ParameterError: there is no such range, or its ends are refused.
-    """
+    """Copies ranges with other ends."""
     if given is not None and not isinstance(given, Mapping):
         bound = (
             "must be a dictionary of pairs [low, high] by name, as {'mass': [0.3, 0.4]}, or None"
@@ -70,15 +62,7 @@ def with_ranges(ranges: Mapping[str, Range], given: Mapping[str, Any] | None) ->
 
 
 def fixed_by(ranges: Mapping[str, Range], given: Mapping[str, Any]) -> Truth:
-    """The numbers of an episode that are given, not drawn.
-
-    Args:
-        ranges: by name.
-        given: values by name; also texts with a unit, as "300 g".
-
-    Raises:
-        ParameterError: a name is unknown, or a value out of its bounds.
-    """
+    """The numbers of an episode that are given, not drawn."""
     found = {}
     for name, value in given.items():
         r = ranges[choice("options", name, tuple(ranges))]
@@ -90,11 +74,6 @@ def draw(ranges: Mapping[str, Range], rng: np.random.Generator, fixed: Truth) ->
     """Draws the numbers of an episode.
 
     All numbers are drawn, so that a fixed value does not change the others.
-
-    Args:
-        ranges: by name.
-        rng: generator.
-        fixed: values to use instead of drawn ones, as by `fixed_by`.
     """
     return {name: _spread(r, float(rng.random())) for name, r in ranges.items()} | fixed
 
@@ -106,11 +85,7 @@ def _spread(r: Range, u: float) -> float:
 
 
 def table_of(ranges: Mapping[str, Range]) -> str:
-    """Markdown table of the drawn numbers.
-
-    Args:
-        ranges: by name.
-    """
+    """Markdown table of the drawn numbers."""
     rows = ["| option | what | drawn from | law | allowed | unit |", "|---|---|---|---|---|---|"]
     for name, r in ranges.items():
         law = "log-uniform" if r.log else "uniform"

@@ -149,9 +149,5 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
 
 def fps_of(task: type[Task]) -> int:
-    """Control periods per second of a task.
-
-    Args:
-        task: its class.
-    """
+    """Control periods per second of a task."""
     return round(1.0 / (task.steps * DT))

@@ -56,12 +56,7 @@ class Episode:
         self._gain: Any = None
 
     def reset(self, rng: np.random.Generator, fixed: Truth) -> None:
-        """Starts an episode.
-
-        Args:
-            rng: generator.
-            fixed: values to use instead of drawn ones, as by `draws.fixed_by`.
-        """
+        """Starts an episode."""
         self.truth = draw(self.task.ranges, rng, fixed)
         scenario = self.task.scenario(self.truth)
         if self._run is None:
@@ -82,11 +77,7 @@ class Episode:
         return np.array([shown(x, low, high) for x, (low, high) in found], np.float32)
 
     def step(self, action: Sequence[float]) -> Period:
-        """Advances by one control period.
-
-        Args:
-            action: finite numbers of the action, clipped to -1 to 1.
-        """
+        """Advances by one control period."""
         run, task = self._run, self.task
         assert run is not None
         clipped = tuple([bounded(x, -1.0, 1.0) for x in action])
@@ -140,13 +131,7 @@ class Episodes:
         generators: Sequence[np.random.Generator],
         fixed: Sequence[Truth],
     ) -> None:
-        """Starts episodes; the first call must start all of them.
-
-        Args:
-            which: numbers of the copies.
-            generators: random generator of each of these copies.
-            fixed: values to use instead of drawn ones, for each of these copies.
-        """
+        """Starts episodes; the first call must start all of them."""
         ranges = self.task.ranges
         drawn = [draw(ranges, rng, x) for rng, x in zip(generators, fixed, strict=True)]
         scenarios = [self.task.scenario(truth) for truth in drawn]
@@ -172,12 +157,7 @@ class Episodes:
         return shown(np.stack(found, axis=1), self._low, self._high).astype(np.float32)
 
     def step(self, actions: np.ndarray, live: np.ndarray) -> Period:
-        """Advances by one control period.
-
-        Args:
-            actions: finite numbers of the actions, shape (n, k), clipped to -1 to 1.
-            live: which copies advance, shape (n,); results of the others are meaningless.
-        """
+        """Advances by one control period."""
         runs, task = self._runs, self.task
         assert runs is not None
         action = tuple(bounded(actions, -1.0, 1.0).T)
@@ -191,20 +171,12 @@ class Episodes:
         return Period(self.observe(), reward, ended, info)
 
     def copy(self, i: int) -> tuple[Truth, Memory, Handle]:
-        """Numbers drawn, memory and handle of one copy.
-
-        Args:
-            i: number of the copy.
-        """
+        """Numbers drawn, memory and handle of one copy."""
         memory = {name: value_of(x, i) for name, x in self.memory.items() if name != "at"}
         return self.truth_of(i), memory, Handle(*value_of(tuple(self.handle), i))
 
     def truth_of(self, i: int) -> Truth:
-        """The numbers drawn for a copy, by name.
-
-        Args:
-            i: number of the copy.
-        """
+        """The numbers drawn for a copy, by name."""
         return {name: float(x[i]) for name, x in self.truth.items()}
 
     def close(self) -> None:

@@ -51,20 +51,11 @@ class Follow(Task):
     most: ClassVar[float] = FORCE
 
     def line(self, truth: Truth) -> np.ndarray:
-        """Nodes of the line of an episode [m], shape (pieces + 1, 2).
-
-        Args:
-            truth: numbers drawn.
-        """
+        """Nodes of the line of an episode [m], shape (pieces + 1, 2)."""
         raise NotImplementedError
 
     def error(self, m: Memory, at: lines.Place) -> Value:
-        """Deviation from the line, in tolerances.
-
-        Args:
-            m: memory of the task.
-            at: position of the handle along its line.
-        """
+        """Deviation from the line, in tolerances."""
         raise NotImplementedError
 
     @override
@@ -85,24 +76,13 @@ class Follow(Task):
         return Command((x * a - y * b, y * a + x * b))
 
     def beside(self, m: Memory, h: Handle) -> lines.Place:
-        """Position of the handle along its line, as found by `judge`; computed after a reset.
-
-        Args:
-            m: memory of the task.
-            h: handle.
-        """
+        """Position of the handle along its line, as found by `judge`; computed after a reset."""
         if m["at"] is None:
             m["at"] = lines.place(m["pieces"], h.p, AHEAD)
         return m["at"]
 
     def motion(self, m: Memory, h: Handle, at: lines.Place) -> tuple[Value, ...]:
-        """The observations listed in MOTION.
-
-        Args:
-            m: memory of the task.
-            h: handle.
-            at: position of the handle along its line.
-        """
+        """The observations listed in MOTION."""
         v, w = lines.along_across(at.tangent, h.v)
         f, g = lines.along_across(at.tangent, h.fh)
         left = m["length"] - at.s

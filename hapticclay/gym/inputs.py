@@ -18,16 +18,7 @@ T = TypeVar("T", bound=Task)
 
 
 def action_of(field: str, given: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """An action as numbers, float64; they may lie outside of the action space.
-
-    Args:
-        field: name for the error.
-        given: the action, or one per copy.
-        shape: its shape.
-
-    Raises:
-        ParameterError: it has another shape, or is not of finite real numbers.
-    """
+    """An action as numbers, float64; they may lie outside of the action space."""
     try:
         action = np.asarray(given)
     except (TypeError, ValueError):  # rows of unequal length
@@ -47,15 +38,7 @@ def action_of(field: str, given: Any, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def seed_of(field: str, given: Any) -> int | None:
-    """A seed, a whole number of at most 128 bits; None for none.
-
-    Args:
-        field: name for the error.
-        given: the seed.
-
-    Raises:
-        ParameterError: it is not such a number.
-    """
+    """A seed, a whole number of at most 128 bits; None for none."""
     if given is None:
         return None
     try:
@@ -66,15 +49,7 @@ def seed_of(field: str, given: Any) -> int | None:
 
 
 def seeds_of(given: Any, n: int) -> list[int | None]:
-    """The seed of each copy.
-
-    Args:
-        given: seed of the first copy, counted up for the others; or one seed per copy; or None.
-        n: number of copies.
-
-    Raises:
-        ParameterError: these are not n seeds.
-    """
+    """The seed of each copy."""
     if given is None:
         return [None] * n
     if isinstance(given, np.ndarray):
@@ -91,14 +66,7 @@ def seeds_of(given: Any, n: int) -> list[int | None]:
 
 
 def options_of(given: Any) -> dict[str, Any]:
-    """Options of a reset, by name.
-
-    Args:
-        given: a dictionary, or None for none.
-
-    Raises:
-        ParameterError: it is neither.
-    """
+    """Options of a reset, by name."""
     if given is None:
         return {}
     if not isinstance(given, Mapping):
@@ -108,17 +76,7 @@ def options_of(given: Any) -> dict[str, Any]:
 
 
 def task_of(kind: type[T], ranges: Any, options: Mapping[str, Any], owner: Any) -> T:
-    """The task of an environment.
-
-    Args:
-        kind: class of the task.
-        ranges: ends of ranges, by name; None for the task's.
-        options: options of the task, by name.
-        owner: the environment, whose constructor has these arguments.
-
-    Raises:
-        ParameterError: an option is unknown or refused.
-    """
+    """The task of an environment."""
     own = [f.name for f in dataclasses.fields(kind) if f.init and f.name != "given"]
     parameters = inspect.signature(owner.__init__).parameters.values()
     others = [p.name for p in parameters if p.kind is not p.VAR_KEYWORD]

@@ -34,29 +34,17 @@ class Place(NamedTuple):
 
 
 def straight(length: float) -> list[tuple[float, float]]:
-    """A straight line along x.
-
-    Args:
-        length: [m].
-    """
+    """A straight line along x."""
     return [(0.0, 0.0), (length, 0.0)]
 
 
 def corner(length: float) -> list[tuple[float, float]]:
-    """A line along x that turns left by 90 degrees half-way.
-
-    Args:
-        length: [m].
-    """
+    """A line along x that turns left by 90 degrees half-way."""
     return [(0.0, 0.0), (0.5 * length, 0.0), (0.5 * length, 0.5 * length)]
 
 
 def arc(length: float) -> list[tuple[float, float]]:
-    """A quarter circle that starts along x and turns left, as a polygon of that length.
-
-    Args:
-        length: [m].
-    """
+    """A quarter circle that starts along x and turns left, as a polygon of that length."""
     part = length / PIECES
     nodes, turn = [(0.0, 0.0)], 0.5 * math.pi / PIECES
     for i in range(PIECES):
@@ -70,22 +58,13 @@ SHAPES = {"straight": straight, "arc": arc, "corner": corner}
 
 
 def turned(nodes: list[tuple[float, float]], angle: float) -> np.ndarray:
-    """A line rotated about its start, shape (number of nodes, 2) [m].
-
-    Args:
-        nodes: nodes of the line [m].
-        angle: angle, counterclockwise [rad].
-    """
+    """A line rotated about its start, shape (number of nodes, 2) [m]."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([(c * x - s * y, s * x + c * y) for x, y in nodes])
 
 
 def pieces_of(nodes: np.ndarray) -> tuple[tuple[float, ...], ...]:
-    """The pieces of a line: x and y of its begin [m], of its direction, length and start [m].
-
-    Args:
-        nodes: nodes of the line [m], shape (pieces + 1, 2).
-    """
+    """The pieces of a line: x and y of its begin [m], of its direction, length and start [m]."""
     d = np.diff(nodes, axis=0)
     lengths = np.sqrt(d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1])
     starts = np.cumsum(lengths) - lengths
@@ -94,23 +73,13 @@ def pieces_of(nodes: np.ndarray) -> tuple[tuple[float, ...], ...]:
 
 
 def length_of(nodes: np.ndarray) -> float:
-    """Length of a line [m].
-
-    Args:
-        nodes: nodes of the line [m], shape (pieces + 1, 2).
-    """
+    """Length of a line [m]."""
     d = np.diff(nodes, axis=0)
     return float(np.cumsum(np.sqrt(d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1]))[-1])
 
 
 def place(pieces: tuple[tuple[Value, ...], ...], p: Pair, ahead: float) -> Place:
-    """Position of a handle relative to its line.
-
-    Args:
-        pieces: from `pieces_of`.
-        p: position of the handle [m].
-        ahead: look-ahead distance along the line [m].
-    """
+    """Position of a handle relative to its line."""
     square, s, across, tx, ty = beside(pieces[0], p)
     for piece in pieces[1:]:
         found = beside(piece, p)
@@ -127,12 +96,7 @@ def place(pieces: tuple[tuple[Value, ...], ...], p: Pair, ahead: float) -> Place
 
 
 def beside(piece: tuple[Value, ...], p: Pair) -> tuple[Value, ...]:
-    """Squared distance from a piece, arc length, distance to its left, and its direction.
-
-    Args:
-        piece: from `pieces_of`.
-        p: position of the handle [m].
-    """
+    """Squared distance from a piece, arc length, distance to its left, and its direction."""
     x, y, tx, ty, length, start = piece
     dx, dy = p[0] - x, p[1] - y
     along = bounded(dx * tx + dy * ty, 0.0, length)
@@ -141,11 +105,6 @@ def beside(piece: tuple[Value, ...], p: Pair) -> tuple[Value, ...]:
 
 
 def along_across(tangent: Pair, x: Pair) -> Pair:
-    """Components of a vector along and across a line.
-
-    Args:
-        tangent: direction of the line.
-        x: the vector.
-    """
+    """Components of a vector along and across a line."""
     (a, b), (u, v) = tangent, x
     return a * u + b * v, a * v - b * u

@@ -59,11 +59,7 @@ class PareEdgeTask(Follow):
         )
 
     def line(self, truth: Truth) -> np.ndarray:
-        """Nodes of the path of the tool centre [m].
-
-        Args:
-            truth: numbers drawn.
-        """
+        """Nodes of the path of the tool centre [m]."""
         end = truth["depth"] - truth["depth_at_end"]
         return np.array([(0.0, 0.0), (APPROACH, 0.0), (APPROACH + LENGTH, end)])
 
@@ -79,12 +75,7 @@ class PareEdgeTask(Follow):
         return scene_of(truth, name="pare edge", clay=Clay.of_groove(groove), start=start)
 
     def depths(self, m: Memory, at: lines.Place) -> tuple[Value, Value, Value]:
-        """Depth of the tool edge, its target, and the target ahead [m].
-
-        Args:
-            m: memory of the task.
-            at: position of the handle along its line.
-        """
+        """Depth of the tool edge, its target, and the target ahead [m]."""
         along = m["pieces"][1][4]
         step = m["depth_at_end"] - m["depth"]
 

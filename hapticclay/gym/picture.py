@@ -37,24 +37,14 @@ class Picture:
         self._path = []
 
     def note(self, p: tuple[float, float]) -> None:
-        """Adds a point to the path.
-
-        Args:
-            p: position of the handle [m].
-        """
+        """Adds a point to the path."""
         point = float(p[0]), float(p[1])
         if not self._path or self._path[-1] != point:
             self._path.append(point)
         del self._path[:-PATH]
 
     def drawn(self, truth: Truth, m: Memory, h: Handle) -> np.ndarray | None:
-        """The present picture, shape (height, width, 3), uint8; None if a window shows it.
-
-        Args:
-            truth: numbers drawn for the episode.
-            m: memory of the task.
-            h: handle.
-        """
+        """The present picture, shape (height, width, 3), uint8; None if a window shows it."""
         x, y = map(float, h.p)
         scenario, nodes = self._task.scenario(truth), m.get("nodes")
         plan = Plan(
@@ -73,13 +63,7 @@ class Picture:
 
 
 def joints_at(s: Scenario, x: float, y: float) -> np.ndarray:
-    """Shoulder, elbow and handle [m], shape (3, 2), in the coordinates of p.
-
-    Args:
-        s: the scene.
-        x: x of the handle [m].
-        y: y of the handle [m].
-    """
+    """Shoulder, elbow and handle [m], shape (3, 2), in the coordinates of p."""
     ox, oy = s.origin
     q, _ = inverse_kinematics(ox + x, oy + y, s.arm.links)
     elbow = s.arm.l1 * math.cos(q) - ox, s.arm.l1 * math.sin(q) - oy
@@ -87,22 +71,13 @@ def joints_at(s: Scenario, x: float, y: float) -> np.ndarray:
 
 
 def blocks_of(s: Scenario) -> list[tuple[float, float, float, float]]:
-    """Blocks of clay, (x, y, width, height) [m]; empty if clay is everywhere.
-
-    Args:
-        s: the scene.
-    """
+    """Blocks of clay, (x, y, width, height) [m]; empty if clay is everywhere."""
     blocks = [] if s.clay is None else s.clay.blocks
     return [(b.x[0], b.y[0], b.x[1] - b.x[0], b.y[1] - b.y[0]) for b in blocks]
 
 
 def view_of(nodes: np.ndarray | None, p: np.ndarray) -> tuple[float, float, float]:
-    """Centre of the close-up view and half its side [m].
-
-    Args:
-        nodes: nodes of the line [m]; None for none.
-        p: position of the handle [m], shape (2,).
-    """
+    """Centre of the close-up view and half its side [m]."""
     if nodes is None:
         return 0.0, 0.0, max(0.08, 1.1 * float(np.abs(p).max()))
     low, high = nodes.min(axis=0), nodes.max(axis=0)

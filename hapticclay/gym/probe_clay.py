@@ -88,12 +88,7 @@ class ProbeClayTask(Task):
 
 
 def answer_of(b: float, Fy: float) -> tuple[float, float]:
-    """The answer part of an action for a given clay.
-
-    Args:
-        b: damping [N.s/m].
-        Fy: yield force [N].
-    """
+    """The answer part of an action for a given clay."""
     x, y = (
         min(max(math.log10(max(value, 1e-9) / middle) / DECADES, -1.0), 1.0)
         for value, middle in zip((b, Fy), MIDDLE, strict=True)

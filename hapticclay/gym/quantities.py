@@ -26,33 +26,19 @@ class Quantity(NamedTuple):
 
 
 def either_way(name: str, most: float, unit: str = "") -> Quantity:
-    """A quantity with symmetric bounds.
-
-    Args:
-        name: what it is.
-        most: largest value.
-        unit: its unit.
-    """
+    """A quantity with symmetric bounds."""
     return Quantity(name, -most, most, unit)
 
 
 def box_of(quantities: Sequence[Quantity]) -> Box:
-    """The space of quantities, shape (n,), float32.
-
-    Args:
-        quantities: ordered.
-    """
+    """The space of quantities, shape (n,), float32."""
     low = np.array([q.low for q in quantities], np.float32)
     high = np.array([q.high for q in quantities], np.float32)
     return Box(low, high, dtype=np.float32)
 
 
 def table_of(quantities: Sequence[Quantity]) -> str:
-    """Markdown table of quantities: number, name, bounds, unit.
-
-    Args:
-        quantities: ordered.
-    """
+    """Markdown table of quantities: number, name, bounds, unit."""
     rows = ["| num | name | min | max | unit |", "|---|---|---|---|---|"]
     for i, q in enumerate(quantities):
         rows.append(f"| {i} | {q.name} | {q.low:g} | {q.high:g} | {q.unit or '-'} |")

@@ -33,18 +33,7 @@ ANCHORS = {ID: Anchors("best fixed gain", "best oracle")}
 
 
 def scores_of(id: str, means: Mapping[str, float]) -> dict[str, float]:
-    """Scores of policies, from their mean returns over the same episodes.
-
-    Args:
-        id: id of the environment, as "AdaptiveGain-v0".
-        means: mean return by policy, those of `ANCHORS` among them.
-
-    Returns:
-        Score by policy; empty where the environment has none.
-
-    Raises:
-        ParameterError: a policy of `ANCHORS` is missing.
-    """
+    """Scores of policies, from their mean returns over the same episodes."""
     if id not in ANCHORS:
         return {}
     for name in ANCHORS[id]:
@@ -84,20 +73,6 @@ def search(
     """Runs AdaptiveGain with shares of the gain limit, over the same episodes.
 
     The shares given come first, then those in steps of 0.01 around the best of them.
-
-    Args:
-        family: "best fixed gain" (a share of the least limit over the published hands, for the
-            clay of the episode) or "best oracle" (a share of the limit of the hand of the episode).
-        shares: shares to begin with.
-        seeds: seeds of the episodes.
-        around: number of finer steps to either side.
-        **options: options of the environment.
-
-    Returns:
-        What each share earned, ordered by share.
-
-    Raises:
-        ParameterError: there is no such family.
     """
     make = FAMILIES[choice("family", family, tuple(FAMILIES))]
     found: dict[float, Scores] = {}

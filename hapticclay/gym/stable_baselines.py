@@ -65,11 +65,7 @@ class StableBaselinesVecEnv(VecEnv):
         return observations
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Keeps the actions for `step_wait`.
-
-        Args:
-            actions: shape (n, k).
-        """
+        """Keeps the actions for `step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
@@ -100,22 +96,11 @@ class StableBaselinesVecEnv(VecEnv):
         return list(self._get_indices(indices))
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute, common to all copies.
-
-        Args:
-            attr_name: its name.
-            indices: of the copies; None for all.
-        """
+        """An attribute, common to all copies."""
         return [getattr(self.env, attr_name) for _ in self._indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Sets an attribute, common to all copies.
-
-        Args:
-            attr_name: its name.
-            value: its value.
-            indices: must be None.
-        """
+        """Sets an attribute, common to all copies."""
         if indices is not None:
             raise ParameterError("indices", indices, "must be None: the copies share attributes")
         setattr(self.env, attr_name, value)
@@ -123,26 +108,11 @@ class StableBaselinesVecEnv(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Refused: the copies are not separate environments.
-
-        Args:
-            method_name: name of the method.
-            *method_args: its arguments.
-            indices: of the copies.
-            **method_kwargs: its keyword arguments.
-
-        Raises:
-            ParameterError: always.
-        """
+        """Refused: the copies are not separate environments."""
         raise ParameterError("method_name", method_name, "must be none: copies have no methods")
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Whether the copies are wrapped: always False.
-
-        Args:
-            wrapper_class: class of the wrapper.
-            indices: of the copies; None for all.
-        """
+        """Whether the copies are wrapped: always False."""
         return [False for _ in self._indices(indices)]
 
 

@@ -118,48 +118,23 @@ class Task:
         raise NotImplementedError
 
     def scenario(self, truth: Truth) -> Scenario:
-        """The scene of an episode.
-
-        Args:
-            truth: numbers drawn, by name.
-        """
+        """The scene of an episode."""
         raise NotImplementedError
 
     def begin(self, truth: Truth, rng: np.random.Generator) -> Memory:
-        """Memory of the task at the start of an episode.
-
-        Args:
-            truth: numbers drawn, by name.
-            rng: generator for further random numbers.
-        """
+        """Memory of the task at the start of an episode."""
         raise NotImplementedError
 
     def command(self, m: Memory, action: tuple[Value, ...]) -> Command:
-        """Command of an action for a control period.
-
-        Args:
-            m: memory of the task.
-            action: numbers of the action, within -1 to 1.
-        """
+        """Command of an action for a control period."""
         raise NotImplementedError
 
     def observe(self, m: Memory, h: Handle) -> tuple[Value, ...]:
-        """The quantities of an observation.
-
-        Args:
-            m: memory of the task.
-            h: handle.
-        """
+        """The quantities of an observation."""
         raise NotImplementedError
 
     def judge(self, m: Memory, h: Handle, action: tuple[Value, ...]) -> Judged:
-        """Reward of a control period.
-
-        Args:
-            m: memory of the task; it is updated.
-            h: handle at the end of the period.
-            action: numbers of the action of the period.
-        """
+        """Reward of a control period."""
         raise NotImplementedError
 
     def handle(self, sample: Sequence[Pair], held: Sequence[Value], over: Value) -> Handle:
@@ -167,11 +142,6 @@ class Task:
 
         A run counts as diverged if it is over (for example out of reach), if it is faster than
         SPEED_LIMIT, or if a motor needed a torque that no stable run of the task needs.
-
-        Args:
-            sample: p, v, fh and fe.
-            held: torques that each motor reaches in `held` samples of the period [N.m].
-            over: whether the run is over.
         """
         p, v, fh, fe = sample
         shoulder, elbow = TORQUE_LIMIT
@@ -181,21 +151,12 @@ class Task:
 
 
 def hand_of(truth: Truth) -> Operator:
-    """The hand of an episode.
-
-    Args:
-        truth: numbers drawn.
-    """
+    """The hand of an episode."""
     return Operator(truth["mass"], truth["damper"], truth["spring"])
 
 
 def scene_of(truth: Truth, **parts: Any) -> Scenario:
-    """The scene common to all tasks: a hand at the arm, without an end condition.
-
-    Args:
-        truth: numbers drawn.
-        **parts: fields of the scenario.
-    """
+    """The scene common to all tasks: a hand at the arm, without an end condition."""
     share = truth.get("gain", 1.0)
     shared = dict(
         operator=hand_of(truth), gain=(share * GAIN[0], share * GAIN[1]), force=(0.0, 0.0),
@@ -205,9 +166,5 @@ def scene_of(truth: Truth, **parts: Any) -> Scenario:
 
 
 def saturated(x: Value) -> Value:
-    """x/(1 + x): a cost that grows like x for small x and stays below 1.
-
-    Args:
-        x: cost, >= 0.
-    """
+    """x/(1 + x): a cost that grows like x for small x and stays below 1."""
     return x / (1.0 + x)

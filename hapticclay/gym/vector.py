@@ -267,14 +267,7 @@ class TaskVectorEnv(VectorEnv):
 
 
 def mode_of(given: str | AutoresetMode) -> AutoresetMode:
-    """An autoreset mode, given as a member or by name.
-
-    Args:
-        given: the mode.
-
-    Raises:
-        ParameterError: there is no such mode.
-    """
+    """An autoreset mode, given as a member or by name."""
     if isinstance(given, AutoresetMode):
         return given
     return AutoresetMode[choice("autoreset_mode", given, [x.name for x in AutoresetMode])]

@@ -23,11 +23,7 @@ def leaves_mode(m, s, vx, vy):
 
 
 def meet(m, s, after):
-    """Shortens the step tried to where a mode first ends, as detected at its end.
-
-    Returns:
-        Length of the step [s]; whether it has to be tried again.
-    """
+    """Shortens the step tried to where a mode first ends, as detected at its end."""
     x, y, shortest = s.mode[0], s.mode[1], modes.shortest_step(m, s)
     if x.ends != 0.0 or y.ends != 0.0:
         return after, False

@@ -78,12 +78,7 @@ def build(scenario: Scenario) -> mujoco.MjModel:
 
 
 def rotate_dampers(model: mujoco.MjModel, scenario: Scenario) -> None:
-    """Rotates the engine's dampers, which act along the axes of a site, with the clay.
-
-    Args:
-        model: as from `build`.
-        scenario: the scenario with the clay.
-    """
+    """Rotates the engine's dampers, which act along the axes of a site, with the clay."""
     if scenario.clay is not None:
         half, site = 0.5 * scenario.clay.angle, model.site("clay").id
         model.site_quat[site] = math.cos(half), 0.0, 0.0, math.sin(half)
@@ -99,12 +94,7 @@ def _compiled_model(dampers: bool, folder: Path, arm: Arm) -> mujoco.MjModel:
 
 
 def compose_spec(parts: list[str], arm: Arm) -> mujoco.MjSpec:
-    """The specification of a model from files of mjcf/, with the lengths and inertias of an arm.
-
-    Args:
-        parts: names of the files.
-        arm: the arm, whatever numbers the files have.
-    """
+    """The specification of a model from files of mjcf/, with the lengths and inertias of an arm."""
     text = "".join(f'<include file="{part}"/>' for part in parts)
     files = {part: (mjcf_folder() / part).read_bytes() for part in parts}
     spec = mujoco.MjSpec.from_string(f'<mujoco model="hapticclay">{text}</mujoco>', include=files)
@@ -120,31 +110,14 @@ def compose_spec(parts: list[str], arm: Arm) -> mujoco.MjSpec:
 
 
 def checked_model(model: mujoco.MjModel, caught: list[str]) -> mujoco.MjModel:
-    """The model; raises if the engine warned while compiling it.
-
-    Args:
-        model: the model.
-        caught: warnings of the engine.
-
-    Raises:
-        RuntimeError: there are warnings.
-    """
+    """The model; raises if the engine warned while compiling it."""
     if caught:
         raise RuntimeError(f"mjcf: {'; '.join(caught)}")
     return model
 
 
 def arm_at(q: tuple[float, float], arm: Arm = PAPER) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Kinematics and inertia of the arm by the engine, independent of the formulas of `model.arm`.
-
-    Args:
-        q: joint angles, shoulder and elbow [rad].
-        arm: the arm.
-
-    Returns:
-        Handle position [m], shape (2,); Jacobian J(q) [m], shape (2, 2); M(q) [kg.m^2], shape
-        (2, 2).
-    """
+    """Kinematics and inertia of the arm by the engine, independent of the formulas of `model.arm`."""
     with warnings_caught() as caught:
         model = checked_model(compose_spec(["arm.xml"], arm).compile(), caught)
     data = mujoco.MjData(model)
@@ -162,9 +135,6 @@ def timestep_view(model: mujoco.MjModel) -> np.ndarray:
 
     The engine shows its gravity as an array, which stands in the same record of options, behind the
     timestep; where, is found by two values that are written there.
-
-    Args:
-        model: the model.
     """
     start = model.opt.gravity.ctypes.data - 8 * OPTIONS
     memory: Any = (ctypes.c_double * OPTIONS).from_address(start)

@@ -195,12 +195,7 @@ def declared(made: Any) -> Iterator[tuple[str, str, int, bool]]:
 
 
 def header(records: Any, functions: str) -> str:
-    """The C header of records, in an order in which each is known when it is used.
-
-    Args:
-        records: the classes.
-        functions: typedefs of functions that records name.
-    """
+    """The C header of records, in an order in which each is known when it is used."""
     names = "".join(f"typedef struct {x.__name__}_s {x.__name__}_s;\n" for x in records)
     text = HEAD + names + functions
     for made in records:

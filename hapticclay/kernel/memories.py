@@ -16,17 +16,7 @@ from .sampled import SLACK
 
 @functools.lru_cache(maxsize=256)
 def formed_memory(servo: Servo, shape: Compensator, K: float, T: float) -> np.ndarray:
-    """Rows of `next_form` of one axis: exact, by a matrix exponential, under a held force.
-
-    Args:
-        servo: of the axis.
-        shape: of C.
-        K: gain of the compensator.
-        T: length of the sample [s].
-
-    Returns:
-        Shape (6, 8): z filled up to the highest order, y and y', over (z, y, y', start, f).
-    """
+    """Rows of `next_form` of one axis: exact, by a matrix exponential, under a held force."""
     n, most = shape.order, compensator.ORDER
     A, B = controller.controller_matrices(servo, shape, K)
     m = np.zeros((n + 4, n + 4))
@@ -42,29 +32,14 @@ def formed_memory(servo: Servo, shape: Compensator, K: float, T: float) -> np.nd
 
 @functools.lru_cache(maxsize=256)
 def held_memory(servo: Servo, shape: Compensator, K: float, T: float) -> np.ndarray:
-    """State `memory` of one axis.
-
-    Args:
-        servo: of the axis.
-        shape: of C.
-        K: gain of the compensator.
-        T: length of the sample [s].
-
-    Returns:
-        Rows (A, B) of controller.held_compensator, shape (20,).
-    """
+    """State `memory` of one axis."""
     out = np.column_stack(controller.held_compensator(servo, shape, K, T)).ravel()
     out.flags.writeable = False
     return out
 
 
 def delay_in_samples(delay: float, Ts: float) -> tuple[int, float]:
-    """A delay in whole samples, and the remaining share of a sample.
-
-    Args:
-        delay: the delay [s].
-        Ts: control sample [s].
-    """
+    """A delay in whole samples, and the remaining share of a sample."""
     delay /= Ts
     whole = math.floor(delay + SLACK)
     return whole, max(delay - whole, 0.0)

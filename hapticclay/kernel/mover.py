@@ -125,11 +125,7 @@ class Mover:
 
 
 def refuse_callbacks() -> None:
-    """Refuses a control callback of the engine, which would interfere.
-
-    Raises:
-        ParameterError: there is one.
-    """
+    """Refuses a control callback of the engine, which would interfere."""
     if mujoco.get_mjcb_control() is not None:
         bound = "the engine must be free of control callbacks"
         raise ParameterError("mjcb_control", mujoco.get_mjcb_control(), bound)

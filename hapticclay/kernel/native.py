@@ -54,12 +54,7 @@ def checksum(file: str | Path) -> int:
 
 @functools.cache
 def machine() -> Any:
-    """The compiled kernel.
-
-    Raises:
-        ImportError: it is lacking or damaged, was built from other sources or for another Python,
-            or computes other numbers than CPython.
-    """
+    """The compiled kernel."""
     try:
         built = importlib.import_module("hapticclay.native.built")
     except ModuleNotFoundError:
@@ -77,11 +72,7 @@ def machine() -> Any:
 
 
 def check_sources(known: dict[str, int]) -> None:
-    """Checks that the sources are those of the build.
-
-    Raises:
-        ImportError: one differs, and which.
-    """
+    """Checks that the sources are those of the build."""
     there, root = set(sources()), str(PACKAGE)
     for name in sorted(there | set(known)):
         if name not in there or known.get(name) != checksum(f"{root}/{name}"):
@@ -89,11 +80,7 @@ def check_sources(known: dict[str, int]) -> None:
 
 
 def check_modules(known: dict[str, int]) -> None:
-    """Checks that the compiled modules are whole, and the ones that Python will find.
-
-    Raises:
-        ImportError: one is lacking, damaged or for another Python, and which.
-    """
+    """Checks that the compiled modules are whole, and the ones that Python will find."""
     folder = PACKAGE / "native"
     for name, value in known.items():
         file = folder / name
@@ -112,11 +99,7 @@ def check_modules(known: dict[str, int]) -> None:
 
 
 def check_numbers(made: Any) -> None:
-    """Checks the layout of records and some formulas of compiled code against CPython.
-
-    Raises:
-        ImportError: they differ.
-    """
+    """Checks the layout of records and some formulas of compiled code against CPython."""
     from . import probe
 
     for name, size in made.SIZES.items():

@@ -26,12 +26,6 @@ def spring_step(scenario: Scenario) -> float:
     A kick uses the force of a spring at the place before it, so a step must resolve the fastest
     motion that the spring can drive. In continuous control this is a motion of the whole loop: the
     compensator may have direct feedthrough, and the servo may impose a lighter handle.
-
-    Args:
-        scenario: the run.
-
-    Raises:
-        ParameterError: dt would be divided into more than SPRING_STEPS.
     """
     laws = scenario.clay.laws if scenario.clay and scenario.clay.springs else ()
     most = [float((law.elastic[..., 0] + law.elastic[..., 2]).max()) for law in laws]
@@ -56,10 +50,6 @@ def fastest_rate(scenario: Scenario, grown: float = 0.0) -> float:
 
     It is that of clay and hand against the handle; or of a servo or a pole of a compensator that
     the longest step does not hold.
-
-    Args:
-        scenario: the scene.
-        grown: time for which clay that grows has grown [s].
     """
     hands = [th or NO_HAND for th in scenario.operators]
     damper, spring = max(th.damper for th in hands), max(th.spring for th in hands)
@@ -68,12 +58,7 @@ def fastest_rate(scenario: Scenario, grown: float = 0.0) -> float:
 
 
 def steepest_clay(scenario: Scenario, grown: float) -> float:
-    """Largest damping of the clay, with that of its consistency at REFERENCE_SPEED [N.s/m].
-
-    Args:
-        scenario: the scene.
-        grown: as in `fastest_rate` [s].
-    """
+    """Largest damping of the clay, with that of its consistency at REFERENCE_SPEED [N.s/m]."""
     most, clay = 0.0, scenario.clay
     for law in clay.laws if clay else ():
         b = np.minimum(law.damping + grown * law.rates, B_MAX)
@@ -85,11 +70,7 @@ def steepest_clay(scenario: Scenario, grown: float) -> float:
 
 
 def largest_lightness(scenario: Scenario) -> float:
-    """Largest acceleration of the handle per unit of force [1/kg].
-
-    Args:
-        scenario: the scene.
-    """
+    """Largest acceleration of the handle per unit of force [1/kg]."""
     W, through = scenario.arm.links[4], 0.0
     for servo, shape, K in zip(scenario.servo, scenario.compensators, scenario.gain, strict=True):
         if scenario.inertia_shaping:
@@ -100,11 +81,7 @@ def largest_lightness(scenario: Scenario) -> float:
 
 
 def creep_limit(scenario: Scenario) -> float:
-    """Speed below which clay of n < 1 counts as at rest: it would need too many steps [m/s].
-
-    Args:
-        scenario: the scene.
-    """
+    """Speed below which clay of n < 1 counts as at rest: it would need too many steps [m/s]."""
     W, most = largest_lightness(scenario), 0.0
     for law in scenario.clay.laws if scenario.clay else ():
         _, K, n = (x.ravel().tolist() for x in law.flows)
@@ -113,23 +90,14 @@ def creep_limit(scenario: Scenario) -> float:
 
 
 def own_rate(scenario: Scenario) -> float:
-    """Fastest rate of compensator and servo [1/s].
-
-    Args:
-        scenario: the scene.
-    """
+    """Fastest rate of compensator and servo [1/s]."""
     blocks = [(1.0, x.damping, x.stiffness) for servo in scenario.servo for x in (servo.G, servo.S)]
     poles = [np.roots(x) for x in (*blocks, *(c.den for c in scenario.compensators))]
     return float(np.abs(np.concatenate(poles)).max())
 
 
 def parts_of_sample(scenario: Scenario, i: int) -> int:
-    """Engine steps per sample, the same for all samples of a block.
-
-    Args:
-        scenario: the scene.
-        i: one of the samples.
-    """
+    """Engine steps per sample, the same for all samples of a block."""
     grown = 0.0
     if scenario.clay and scenario.clay.grows:  # at the end of the block: no clay has grown longer
         grown = min((i // GROWTH_BLOCK + 1) * GROWTH_BLOCK * scenario.dt, scenario.t_max)
@@ -137,14 +105,7 @@ def parts_of_sample(scenario: Scenario, i: int) -> int:
 
 
 def check_explicit(scenario: Scenario) -> None:
-    """Refuses a scene that is too stiff for explicit steps at its start.
-
-    Args:
-        scenario: the scene.
-
-    Raises:
-        ParameterError: it is.
-    """
+    """Refuses a scene that is too stiff for explicit steps at its start."""
     parts, bound = parts_of_sample(scenario, 0), ""
     if parts > SUBSTEPS:
         bound = f"would take {parts:.4g} steps a sample in so stiff a scene"

@@ -104,21 +104,7 @@ def bound(m, s, after):
 
 
 def towards(m, s, after, overx, overy, first):
-    """Tries the next step, shortened to the first border ahead.
-
-    Args:
-        m: the model.
-        s: the state; it is put into the region of the step.
-        after: longest length of the step [s].
-        overx: side of the border of x crossed without a step. It cannot be crossed back, so that
-            the run cannot stall there.
-        overy: the same of y.
-        first: whether different clay has been entered since the last check.
-
-    Returns:
-        Length of the step [s]; coordinate of the border that it ends on or that is crossed without
-        a step, -1 for none; side of this border; whether it is crossed without a step.
-    """
+    """Tries the next step, shortened to the first border ahead."""
     axis, up = -1, 0
     herex, herey = arm.place(m, s.q1, s.q2)
     while True:
@@ -150,12 +136,7 @@ def towards(m, s, after, overx, overy, first):
 
 
 def border_ahead(m, s, after, herex, herey, overx, overy):
-    """The border that the step tried crosses first.
-
-    Returns:
-        Length of the step to it [s]; its coordinate, -1 for none; its side; whether the handle
-        stands on it.
-    """
+    """The border that the step tried crosses first."""
     px, py = methods.place_behind(m, s, after)
     if borders.side(s.x, px) == 0 and borders.side(s.y, py) == 0:
         return after, -1, 0, False

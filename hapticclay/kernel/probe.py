@@ -6,12 +6,7 @@ SIZE = 27
 
 
 def fill(links, out):
-    """Computes SIZE numbers, in which a rounding of its own or another order shows.
-
-    Args:
-        links: numbers of an arm, as `Arm.links`.
-        out: where to write them.
-    """
+    """Computes SIZE numbers, in which a rounding of its own or another order shows."""
     out[0], out[1], out[2], out[3] = arm.jacobian(0.3, 1.1, links)
     out[4], out[5], out[6] = arm.mobility(out, links)
     out[7], out[8] = arm.inverse_kinematics(0.31, 0.17, links)

@@ -73,12 +73,7 @@ class Row:
     # ---- the scene
 
     def take(self, scenario: Scenario, controller: Controller | None = None) -> None:
-        """Takes a scene; the state stays.
-
-        Args:
-            scenario: the scene.
-            controller: the user's own, in place of the scene's.
-        """
+        """Takes a scene; the state stays."""
         made = scene.compile_scene(scenario, controller)
         self.arrays, self.caller, self.laws = made.arrays, made.caller, made.laws
         self.buffers.make_room(made.m)
@@ -278,14 +273,7 @@ class NativeRow(Row):
     def __init__(
         self, scenario: Scenario, mover: Mover, buffers: Buffers, at: Any = None
     ):  # fmt: skip
-        """Makes a row.
-
-        Args:
-            scenario: what is run.
-            mover: the engine.
-            buffers: what it fills.
-            at: arrays of one model and one state to lie in; its own if None.
-        """
+        """Makes a row."""
         self.machine = native.machine()
         self.models, self.states = at or (one(records.Model), one(records.State))
         self.s = layout.view_of(records.State, self.states)
@@ -371,12 +359,7 @@ FORCE = ctypes.CFUNCTYPE(None, PLACE, *[FLOAT] * 4, ctypes.POINTER(FLOAT))
 
 
 def called_by_address(functions: Any, at: dict[int, Any]) -> Any:
-    """The functions of a law of a user, as compiled code calls them: name, type, function.
-
-    Args:
-        functions: as from `kept`.
-        at: numbers of the law by their address.
-    """
+    """The functions of a law of a user, as compiled code calls them: name, type, function."""
     load, moved, force = functions
     kick = layout.struct_of(records.Kick)
     yield "load", LOAD, lambda z, k: load(at[z], kick.from_address(k))
@@ -388,10 +371,6 @@ def kept(law: Any, failed: list[BaseException]) -> Any:
     """load, moved and force of a law of a user, whose exceptions are kept: the run ends by NaN.
 
     Compiled code would drop them; in CPython one of arithmetic would be that of a straight arm.
-
-    Args:
-        law: the module.
-        failed: gets the exceptions.
     """
 
     def tried(function: Any, *arguments: Any) -> bool:

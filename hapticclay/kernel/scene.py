@@ -42,12 +42,7 @@ class Compiled(NamedTuple):
 
 
 def compile_scene(s: Scenario, controller: Controller | None = None) -> Compiled:
-    """The model of a scene.
-
-    Args:
-        s: the scene.
-        controller: the user's own, in place of the scene's.
-    """
+    """The model of a scene."""
     m, arrays = records.Model(), {"table": regions.region_table(s.clay, s.length)}
     put_arm(m, s)
     put_axes(m, s)
@@ -117,12 +112,7 @@ def largest_damping(s: Scenario) -> float:
 
 
 def hardness(s: Scenario, b: Any) -> tuple[Any, Any]:
-    """Whether a step may overshoot, and whether a hit may saturate the motors within one.
-
-    Args:
-        s: the scene.
-        b: its largest damping, a number or an array over runs [N.s/m].
-    """
+    """Whether a step may overshoot, and whether a hit may saturate the motors within one."""
     if is_held(s) or (s.integrator != "fast" and s.control != "sampled"):
         return False, False
     # share of its velocity that a step of explicit damping would take from a handle without a hand

@@ -28,12 +28,7 @@ class Drives:
         }
 
     def prepare(self, row: Any, n: int) -> int:
-        """Prepares the signals over the next whole steps; returns how many.
-
-        Args:
-            row: of the run.
-            n: how many steps are wanted.
-        """
+        """Prepares the signals over the next whole steps; returns how many."""
         m, i, dt, further, tables = row.m, row.s.i, row.m.dt, 2, self.signals.values()
         if m.method == methods.ACCURATE:
             counts = row.substeps(i)
@@ -88,14 +83,7 @@ class Drives:
 
 
 def stage_times(row: Any, dt: float, i: int, n: int) -> np.ndarray:
-    """Starts and middles of the steps of the accurate method, and the end of the last [s].
-
-    Args:
-        row: of the run.
-        dt: length of a sample [s].
-        i: index of the first sample.
-        n: how many samples.
-    """
+    """Starts and middles of the steps of the accurate method, and the end of the last [s]."""
     k, blocks = i + np.arange(n), []
     counts = np.array([row.substeps(j) for j in k.tolist()])
     for each in np.split(k, np.flatnonzero(np.diff(counts)) + 1):
@@ -138,12 +126,7 @@ class Drive:
                 self._first = pieces.pieces_value(self._pieces, now, now + self._slack)[0]
 
     def prepare(self, begin: float, end: float) -> None:
-        """Makes the pieces of the next part of a run, and from them the table.
-
-        Args:
-            begin: of the part, a whole multiple of dt [s].
-            end: of the part, a whole multiple of dt or the end of the run [s].
-        """
+        """Makes the pieces of the next part of a run, and from them the table."""
         made = self.signal.pieces(begin, end, self.dt)
         if len(made):
             made = made.copy()
@@ -152,15 +135,7 @@ class Drive:
         self._pieces = made
 
     def breaks(self, begin: float, end: float) -> np.ndarray:
-        """Times in the part made ready at which a step must end: jumps, and kinks off the samples.
-
-        Args:
-            begin: of the part [s].
-            end: of the part [s].
-
-        Returns:
-            Ascending [s], shape (n,).
-        """
+        """Times in the part made ready at which a step must end: jumps, and kinks off the samples."""
         t = self.signal.breaks(begin, end)
         t = t[(t > begin) & (t < end)]
         if not len(t):
@@ -173,15 +148,7 @@ class Drive:
         return t[jumps | off]
 
     def mean(self, t: np.ndarray, h: float) -> np.ndarray:
-        """Mean over [t - h, t + h]; for h = 0 the value from t on.
-
-        Args:
-            t: centres of the intervals [s], shape (n,), in the part made ready.
-            h: half their length [s].
-
-        Returns:
-            Shape (n, 2).
-        """
+        """Mean over [t - h, t + h]; for h = 0 the value from t on."""
         out = self.signal.mean_of_multisines(t, h)
         if len(self._pieces):
             if h == 0.0:
@@ -190,40 +157,18 @@ class Drive:
         return out
 
     def __call__(self, t: np.ndarray) -> np.ndarray:
-        """Value from each time on.
-
-        Args:
-            t: times [s], shape (n,), in the part made ready.
-
-        Returns:
-            Shape (n, 2).
-        """
+        """Value from each time on."""
         return self.mean(t, 0.0)
 
     def around(self, t: np.ndarray, h: float) -> np.ndarray:
-        """Value at times, of pieces the mean over h before and after, or over less next to t = 0.
-
-        Args:
-            t: times [s], shape (n,), in the part made ready.
-            h: half the length of that interval [s].
-
-        Returns:
-            Shape (n, 2).
-        """
+        """Value at times, of pieces the mean over h before and after, or over less next to t = 0."""
         out = self.signal.mean_of_multisines(t, 0.0)
         if len(self._pieces):
             out = out + pieces.pieces_mean(self._pieces, t, np.minimum(h, t))
         return out
 
     def since_start(self, t: np.ndarray) -> Any:
-        """Change since t = 0, of a drive that counts its pieces from there.
-
-        Args:
-            t: times [s], shape (n,), in the part made ready.
-
-        Returns:
-            Shape (n, 2).
-        """
+        """Change since t = 0, of a drive that counts its pieces from there."""
         out = self.signal.mean_of_multisines(t, 0.0)
         out = out - self.signal.mean_of_multisines(np.zeros(1), 0.0)
         if len(self._pieces):

@@ -65,15 +65,6 @@ PAPER = Arm()
 
 
 def jacobians(q1: Any, q2: Any, links: Links) -> tuple[Any, ...]:
-    """As `jacobian`, for arrays.
-
-    Args:
-        q1: angles of link 1 [rad], of any shape.
-        q2: angles of link 2 against link 1 [rad], of the same shape.
-        links: of the arm, as `Arm.links`.
-
-    Returns:
-        (u1x, u1y, u2x, u2y) [m], of the same shape.
-    """
+    """As `jacobian`, for arrays."""
     l1, l2, a = links[0], links[1], q1 + q2
     return -l1 * np.sin(q1), l1 * np.cos(q1), -l2 * np.sin(a), l2 * np.cos(a)

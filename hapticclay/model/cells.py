@@ -351,16 +351,7 @@ def _leave_out(law: Profile | Grid) -> None:
 def outline(
     x: tuple[float, float], y: tuple[float, float], prefix: str = ""
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Checks and returns the outline along x and along y [m].
-
-    Args:
-        x: begin and end along x.
-        y: the same along y.
-        prefix: prefix of their names in errors.
-
-    Raises:
-        ParameterError: they are not two ascending numbers.
-    """
+    """Checks and returns the outline along x and along y [m]."""
     spans = pair(f"{prefix}x", x, unit="m"), pair(f"{prefix}y", y, unit="m")
     for field, span in zip(AXES, spans, strict=True):
         check_ascending(prefix + field, span)
@@ -368,15 +359,7 @@ def outline(
 
 
 def pixels(image: Any, b: tuple[float, float]) -> np.ndarray:
-    """Damping of the pixels of an image [N.s/m], starting at the lowest x and y, x first.
-
-    Args:
-        image: brightness from 0 (black) to 1 (white), shape (rows, columns).
-        b: damping at black and at white [N.s/m].
-
-    Raises:
-        ParameterError: the image is not a table of numbers from 0 to 1, or b is out of bounds.
-    """
+    """Damping of the pixels of an image [N.s/m], starting at the lowest x and y, x first."""
     gray = np.array(table_of("image", image, 0.0, 1.0))
     black, white = pair("b", b, 0.0, B_MAX, unit="N.s/m")
     if not gray.size:
@@ -391,14 +374,6 @@ def _framed(inner: Any, outside: float) -> Any:
 
 
 def check_ascending(field: str, edges: tuple[float, ...]) -> None:
-    """Raises an error if borders do not ascend.
-
-    Args:
-        field: name for the error.
-        edges: the borders [m].
-
-    Raises:
-        ParameterError: the borders do not ascend.
-    """
+    """Raises an error if borders do not ascend."""
     if any(b <= a for a, b in zip(edges, edges[1:], strict=False)):
         raise ParameterError(field, edges, "must be strictly ascending")

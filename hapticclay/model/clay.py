@@ -75,15 +75,7 @@ def slab(resists: float | Flow, start: float | None = None, end: float | None = 
 
 
 def extent(clay: Clay | None, i: int) -> list[tuple[float, float]]:
-    """Intervals of coordinate i that contain clay, judged by that coordinate alone.
-
-    Args:
-        clay: the clay; None for none.
-        i: coordinate, 0 for x, 1 for y.
-
-    Returns:
-        Disjoint intervals (low, high) [m], ascending, possibly infinite.
-    """
+    """Intervals of coordinate i that contain clay, judged by that coordinate alone."""
     out: list[tuple[float, float]] = []
     for law in clay.laws if clay else ():
         if AXES[i] in law.along:

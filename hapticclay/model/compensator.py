@@ -199,14 +199,7 @@ PRINTED = Compensator()
 
 
 def form_numbers(compensator: Compensator) -> list[float]:
-    """A realisation of C/K as plain numbers, padded with zeros to the highest order.
-
-    Args:
-        compensator: the shape.
-
-    Returns:
-        FORM numbers: A row by row, B, C, D.
-    """
+    """A realisation of C/K as plain numbers, padded with zeros to the highest order."""
     n = compensator.order
     A, B, C, D = compensator.state_space()
     a, b, c = np.zeros((ORDER, ORDER)), np.zeros(ORDER), np.zeros(ORDER)
@@ -215,18 +208,7 @@ def form_numbers(compensator: Compensator) -> list[float]:
 
 
 def moving_states(compensator: Compensator, v: float) -> list[float]:
-    """States of a compensator whose output moves at constant rate and is 0 now.
-
-    Args:
-        compensator: the shape.
-        v: rate of its output [m/s].
-
-    Returns:
-        ORDER numbers.
-
-    Raises:
-        ParameterError: v is not 0 and C has no integrator, so that it cannot hold that rate.
-    """
+    """States of a compensator whose output moves at constant rate and is 0 now."""
     n = compensator.order
     out = [0.0] * ORDER
     if v == 0.0:

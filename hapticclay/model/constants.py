@@ -71,9 +71,5 @@ TORQUE_LIMIT = (40.0, 40.0)  # [N.m], ours: direct-drive motors for such inertia
 
 
 def each_axis(part):
-    """A part that both axes share, or a pair of parts, as a pair (x, y).
-
-    Args:
-        part: the part, or a tuple of two.
-    """
+    """A part that both axes share, or a pair of parts, as a pair (x, y)."""
     return part if isinstance(part, tuple) else (part, part)

@@ -50,14 +50,7 @@ SERVO = (Servo(G[0], S[0]), Servo(G[1], S[1]))  # as printed, of x and y
 
 
 def feedback_vector(servo: Servo) -> np.ndarray:
-    """Servo acceleration of the law above, without forces, as a row over the state of one axis.
-
-    Args:
-        servo: servo of the axis.
-
-    Returns:
-        Shape (6,): p'' = feedback @ (p, p', delta, delta', y, y').
-    """
+    """Servo acceleration of the law above, without forces, as a row over the state of one axis."""
     g, s = servo.G, servo.S
     reference = [g.gain, 0.0, s.stiffness - g.stiffness, s.damping - g.damping]
     return np.array([-s.stiffness, -s.damping, *reference])
@@ -66,18 +59,7 @@ def feedback_vector(servo: Servo) -> np.ndarray:
 def controller_matrices(
     servo: Servo, compensator: Compensator, K: Any
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compensator and reference model in continuous time: z' = A z + B f, f the net force [N].
-
-    Args:
-        servo: of the axis.
-        compensator: shape of C, of order n.
-        K: gain of the compensator, or gains, shape (m,).
-
-    Returns:
-        A, shape (n + 2, n + 2), and B, shape (n + 2,) or (m, n + 2); z holds the states of
-        `Compensator.state_space`, with K in its input, then y = G delta and y'. As printed, the
-        states of the compensator are delta and delta'.
-    """
+    """Compensator and reference model in continuous time: z' = A z + B f, f the net force [N]."""
     g, n = servo.G, compensator.order
     own, drive, out, through = compensator.state_space()
     A, unit = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
@@ -93,16 +75,6 @@ def held_compensator(
     """Compensator and reference model over a sample under held net force: z+ = A z + B f.
 
     Exact, by a matrix exponential (Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed.).
-
-    Args:
-        servo: of the axis.
-        compensator: shape of C, of order n.
-        K: gain of the compensator, or gains, shape (m,).
-        T: length of the sample [s].
-
-    Returns:
-        A, shape (n + 2, n + 2), and B, shape (n + 2,), or one of each a gain, shapes (m, n + 2,
-        n + 2) and (m, n + 2); z as in `controller_matrices`.
     """
     A, B = controller_matrices(servo, compensator, K)
     n = B.shape[-1]
@@ -113,14 +85,7 @@ def held_compensator(
 
 
 def matrix_exponential(a: np.ndarray) -> np.ndarray:
-    """Matrix exponential.
-
-    Args:
-        a: shape (n, n), or a stack of such, shape (m, n, n).
-
-    Returns:
-        As a.
-    """
+    """Matrix exponential."""
     from scipy.linalg import expm
 
     return expm(a)

@@ -104,14 +104,6 @@ def butterworth(cutoff: float, order: int, Ts: float) -> tuple[float, ...]:
     """Butterworth low-pass filter of unit gain under a held input: x+ = A x + B u, y = x[0], exact.
 
     The poles lie on a circle of radius 2 pi cutoff (matrix exponential).
-
-    Args:
-        cutoff: corner frequency [Hz].
-        order: 1 or 2.
-        Ts: hold of the input [s].
-
-    Returns:
-        (A00, A01, A10, A11, B0, B1); for order 1, only A00 and B0 are not zero.
     """
     from scipy.linalg import expm
 
@@ -145,24 +137,11 @@ class SampleNoise:
         return self._first
 
     def forget(self, first: int) -> None:
-        """Drops the samples before a given one.
-
-        Args:
-            first: index of the first sample to keep.
-        """
+        """Drops the samples before a given one."""
         self._rows, self._first = self._rows[first - self._first :], first
 
     def table(self, first: int, n: int) -> np.ndarray:
-        """Random effects on n samples; the first sample of a run is on time and never lost.
-
-        Args:
-            first: index of the first of these samples; it must still be kept.
-            n: number of samples.
-
-        Returns:
-            One row per sample: offset of the sampling instant [s], whether the sample is lost (1 or
-            0), noise on the force (x, y) [N].
-        """
+        """Random effects on n samples; the first sample of a run is on time and never lost."""
         blocks, at = [self._rows], first - self._first
         missing = at + n - len(self._rows)
         while missing > 0:
@@ -240,11 +219,7 @@ def _trait(name: str, of: Any, theory: str, refuses: dict[str, Refusal], words: 
 
 
 def hardware_words(scenario: Any) -> str:
-    """The parts of the hardware of a scenario, with units; "ideal" if there are none.
-
-    Args:
-        scenario: scenario with hardware.
-    """
+    """The parts of the hardware of a scenario, with units; "ideal" if there are none."""
     found = [told.text() for x in present(scenario, TRAITS[1:]) for told in x.words(scenario)]
     return ", ".join(found) or "ideal"
 

@@ -40,15 +40,6 @@ def bearing_factor(tool: Tool) -> float:
     The face, width by depth, is modelled as a rectangular foundation turned on its side. B is the
     shorter side, L the longer side, and D the depth of the lower edge below the surface:
     Nc = 5 (1 + 0.2 B/L) (1 + 0.2 D/B), D/B at most 2.5.
-
-    Args:
-        tool: the tool.
-
-    Returns:
-        Nc, 6 to 8.1.
-
-    Raises:
-        ParameterError: the tool is not a Tool.
     """
     _check_tool(tool)
     short, long = sorted((tool.width, tool.depth))
@@ -66,13 +57,6 @@ def power_law(rpm: Sequence[float], viscosity: Sequence[float]) -> tuple[float, 
     The spindle is modelled as a long cylinder in a wide vessel. The shear stress at its wall is
     viscosity x 2 w, and the shear rate 2 w/n (Krieger & Maron 1952); w is its speed in rad/s. n
     is the slope of a least-squares line through log stress over log w.
-
-    Args:
-        rpm: speeds [rev/min], at least two different ones.
-        viscosity: apparent viscosity at each [Pa.s], as the instrument shows it.
-
-    Returns:
-        K [Pa.s^n], n.
     """
     x = [math.log(2.0 * _speed(r)) for r in rpm]
     y = [math.log(v) + a for v, a in zip(viscosity, x, strict=True)]

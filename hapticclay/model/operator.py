@@ -12,15 +12,7 @@ from .traits import Trait
 
 
 def mobility_with(trace, mass):
-    """Largest acceleration of handle and hand per unit of force, for numbers or arrays.
-
-    Args:
-        trace: trace of the mobility of the arm [1/kg], see `arm.Arm.links`.
-        mass: mass of the hand, the lesser of both axes [kg].
-
-    Returns:
-        [1/kg].
-    """
+    """Largest acceleration of handle and hand per unit of force, for numbers or arrays."""
     return trace / (1.0 + mass * trace)
 
 

@@ -29,13 +29,7 @@ PANELS = 2**17  # panels of a quadrature evaluated at once
 
 
 def loop_table(lines: np.ndarray, pieces: np.ndarray, slack: float) -> np.ndarray:
-    """The table of a signal.
-
-    Args:
-        lines: of its multisines, shape (m, 5).
-        pieces: shape (n, PIECE).
-        slack: a jump within this time after an instant counts as being at that instant [s].
-    """
+    """The table of a signal."""
     table = np.zeros((1 + len(lines) + len(pieces), PIECE))
     table[0, :3] = len(lines), slack, len(table)
     table[1 : 1 + len(lines), :5] = lines
@@ -44,16 +38,7 @@ def loop_table(lines: np.ndarray, pieces: np.ndarray, slack: float) -> np.ndarra
 
 
 def value_rows(rows: np.ndarray, t: np.ndarray, h: Any = 0.0) -> np.ndarray:
-    """As `mean_of_piece`, row by row.
-
-    Args:
-        rows: a piece for each time, shape (n, PIECE).
-        t: centres of the intervals [s], shape (n,).
-        h: half their lengths [s], a number or shape (n,).
-
-    Returns:
-        Shape (n, 2).
-    """
+    """As `mean_of_piece`, row by row."""
     u, k = t - rows[:, 0], np.square(h)
     c = rows[:, 1:].reshape(-1, 2, 4).T
     mean = c[0] + u * (c[1] + u * (c[2] + u * c[3])) + k * (c[2] / 3.0 + c[3] * u)
@@ -61,31 +46,13 @@ def value_rows(rows: np.ndarray, t: np.ndarray, h: Any = 0.0) -> np.ndarray:
 
 
 def pieces_value(pieces: np.ndarray, t: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """As `value_of_pieces`, at many times.
-
-    Args:
-        pieces: shape (m, PIECE), m > 0.
-        t: times [s], shape (n,).
-        near: times on the wanted sides [s], shape (n,).
-
-    Returns:
-        Shape (n, 2).
-    """
+    """As `value_of_pieces`, at many times."""
     at = np.searchsorted(pieces[:, 0], near, "right") - 1
     return value_rows(pieces[np.maximum(at, 0)], t)
 
 
 def pieces_mean(pieces: np.ndarray, t: np.ndarray, h: np.ndarray) -> np.ndarray:
-    """As `mean_of_pieces`, over many intervals; for h = 0 the value from t on, without slack.
-
-    Args:
-        pieces: shape (m, PIECE), m > 0.
-        t: centres of the intervals [s], shape (n,).
-        h: half their lengths [s], shape (n,).
-
-    Returns:
-        Shape (n, 2).
-    """
+    """As `mean_of_pieces`, over many intervals; for h = 0 the value from t on, without slack."""
     start, begin, end = pieces[:, 0], t - h, t + h
     first = np.maximum(np.searchsorted(start, begin, "right") - 1, 0)
     last = np.maximum(np.searchsorted(start, end, "left") - 1, first)
@@ -106,15 +73,7 @@ def pieces_mean(pieces: np.ndarray, t: np.ndarray, h: np.ndarray) -> np.ndarray:
 
 
 def added_pieces(parts: Sequence[np.ndarray], factors: Sequence[float]) -> np.ndarray:
-    """Pieces of a sum.
-
-    Args:
-        parts: pieces of each of its parts, shape (m, PIECE) each.
-        factors: factor on each part.
-
-    Returns:
-        Shape (n, PIECE).
-    """
+    """Pieces of a sum."""
     terms = [(x, k) for x, k in zip(parts, factors, strict=True) if len(x)]
     if not terms:
         return NO_PIECES
@@ -134,16 +93,7 @@ def added_pieces(parts: Sequence[np.ndarray], factors: Sequence[float]) -> np.nd
 
 
 def straight_pieces(start: Any, values: Any, slopes: Any = None) -> np.ndarray:
-    """Constant or straight pieces.
-
-    Args:
-        start: start of each piece [s], shape (n,).
-        values: value at its start, shape (n, 2).
-        slopes: per second, shape (n, 2); None for constant pieces.
-
-    Returns:
-        Shape (n, PIECE).
-    """
+    """Constant or straight pieces."""
     out = np.zeros((len(start), PIECE))
     out[:, 0] = start
     out[:, [1, 5]] = values
@@ -153,16 +103,7 @@ def straight_pieces(start: Any, values: Any, slopes: Any = None) -> np.ndarray:
 
 
 def cell_edges(begin: float, end: float, cell: float) -> np.ndarray:
-    """Edges of cells that cover an interval: multiples of their length, cut at the end.
-
-    Args:
-        begin: start of the interval [s].
-        end: end of the interval [s].
-        cell: length of a cell [s].
-
-    Returns:
-        Shape (n,), n > 1.
-    """
+    """Edges of cells that cover an interval: multiples of their length, cut at the end."""
     first = math.floor(begin / cell + 1e-6)
     last = max(math.ceil(end / cell - 1e-6), first + 1)
     edges = np.arange(first, last + 1) * cell
@@ -172,15 +113,7 @@ def cell_edges(begin: float, end: float, cell: float) -> np.ndarray:
 
 
 def interpolate(f: Callable[[np.ndarray], np.ndarray], edges: np.ndarray) -> np.ndarray:
-    """Cubic pieces through values at the Lobatto nodes of each cell.
-
-    Args:
-        f: value at times [s] of shape (n,), as shape (n, 2).
-        edges: of the cells [s], shape (m + 1,).
-
-    Returns:
-        Shape (m, PIECE).
-    """
+    """Cubic pieces through values at the Lobatto nodes of each cell."""
     m, span = len(edges) - 1, np.diff(edges)
     inner = edges[:-1, None] + span[:, None] * NODES[:3]
     values = f(np.append(inner.ravel(), edges[-1]))
@@ -193,17 +126,7 @@ def interpolate(f: Callable[[np.ndarray], np.ndarray], edges: np.ndarray) -> np.
 def integrals(
     f: Callable[[np.ndarray], np.ndarray], begin: np.ndarray, end: np.ndarray, panels: np.ndarray
 ) -> np.ndarray:
-    """Integrals by Gauss quadrature with ten nodes per panel.
-
-    Args:
-        f: value at times [s] of shape (m,), as shape (m, 2).
-        begin: start of each interval [s], shape (n,).
-        end: end of each interval [s], shape (n,).
-        panels: number of equal parts of each interval, shape (n,).
-
-    Returns:
-        Shape (n, 2).
-    """
+    """Integrals by Gauss quadrature with ten nodes per panel."""
     out = np.zeros((len(begin), 2))
     for which in np.array_split(np.arange(len(begin)), panels.sum() // PANELS + 1):
         of = np.repeat(which, panels[which])

@@ -16,15 +16,7 @@ from .smooth import Smooth
 
 
 def region_table(clay: Clay | None, length: float | None) -> np.ndarray:
-    """Tabulates clay and the end of the path for `enter_region`.
-
-    Args:
-        clay: the clay; None for none.
-        length: the run ends when p_x reaches this [m]; None for no end.
-
-    Returns:
-        The table, shape (n,); its parts are named above.
-    """
+    """Tabulates clay and the end of the path for `enter_region`."""
     given = clay.laws if clay else (NOTHING, NOTHING)
     laws = [NOTHING if isinstance(law, Smooth) else law for law in given]
     end = math.inf if length is None else length
@@ -111,12 +103,7 @@ def _of_cells(what: str, law: Any) -> np.ndarray:
 
 
 def keep_entries(table: np.ndarray, before: np.ndarray) -> None:
-    """Copies the times of first entry into each cell from clay with the same borders.
-
-    Args:
-        table: from `region_table`; receives the times.
-        before: the previous table.
-    """
+    """Copies the times of first entry into each cell from clay with the same borders."""
     begin = int(table[ENTERED])
     end = int(table[FLOWS]) or int(table[SPRINGS]) or len(table)
     table[begin:end] = before[begin:end]

@@ -23,17 +23,7 @@ MOST_LINES = 100_000
 
 
 def multisine_line(omega: Any, phase: Any, t: Any, h: Any) -> Any:
-    """Mean of cos(omega t + phase) over [t - h, t + h]. Numbers, or arrays of one shape.
-
-    Args:
-        omega: angular frequency [rad/s].
-        phase: at t = 0 [rad].
-        t: centre of the interval [s].
-        h: half its length [s].
-
-    Returns:
-        The mean; the value at t for h = 0.
-    """
+    """Mean of cos(omega t + phase) over [t - h, t + h]. Numbers, or arrays of one shape."""
     return np.sinc(omega * h / np.pi) * np.cos(omega * t + phase)
 
 

@@ -34,24 +34,12 @@ TRAITS = {x.name: x for x in (*METHODS, *LAWS, *PARTS)}
 
 
 def refusal(a: str, b: str) -> Refusal | None:
-    """Why two parts cannot be combined; None if they can.
-
-    Args:
-        a: name of one part.
-        b: name of the other part.
-    """
+    """Why two parts cannot be combined; None if they can."""
     return TRAITS[a].refuses.get(b) or TRAITS[b].refuses.get(a)
 
 
 def check_scene(s: Any) -> None:
-    """Refuses parts and methods that cannot be combined.
-
-    Args:
-        s: the scenario.
-
-    Raises:
-        ParameterError: two of its parts cannot be combined.
-    """
+    """Refuses parts and methods that cannot be combined."""
     own = [] if s.clay is None else present(s.clay, LAWS)
     check_traits([*present(s, METHODS), *own, *present(s, PARTS)], s)
 

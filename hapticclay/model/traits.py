@@ -67,11 +67,7 @@ class Told(NamedTuple):
     unit: str = ""
 
     def text(self, most: int = 1) -> str:
-        """Words, values and unit, without repeated values.
-
-        Args:
-            most: number of values to list; if there are more, the least and the largest are shown.
-        """
+        """Words, values and unit, without repeated values."""
         some = sorted(set(self.values))
         shown = ", ".join(f"{v:.4g}" for v in some)
         if len(some) > most:
@@ -123,21 +119,11 @@ class Block(NamedTuple):
     tool: Any = None
 
     def at_speed(self, speed: float) -> float:
-        """Force on a tool that cuts it [N].
-
-        Args:
-            speed: of the tool [m/s].
-        """
+        """Force on a tool that cuts it [N]."""
         return self.force + speed * self.damping
 
     def holds(self, x: Any, y: Any, margin: float = 0.0) -> Any:
-        """Whether places lie in the block.
-
-        Args:
-            x: coordinates [m].
-            y: the same along y.
-            margin: margin around the block that counts as inside [m].
-        """
+        """Whether places lie in the block."""
         (x0, x1), (y0, y1), m = self.x, self.y, margin
         return (x >= x0 - m) & (x <= x1 + m) & (y >= y0 - m) & (y <= y1 + m)
 
@@ -201,39 +187,20 @@ class Law(Trait):
 
 
 def multiplied(values: Any, factor: float, most: float, least: float = 0.0) -> Any:
-    """Numbers, or rows of them, multiplied and clipped to bounds; zeros stay zero.
-
-    Args:
-        values: the numbers, or tuples of them.
-        factor: factor on each number.
-        most: upper bound.
-        least: lower bound of numbers other than 0.
-    """
+    """Numbers, or rows of them, multiplied and clipped to bounds; zeros stay zero."""
     if isinstance(values, tuple):
         return tuple(multiplied(x, factor, most, least) for x in values)
     return min(max(values * factor, least), most) if values else values
 
 
 def told_values(form: str, values: Iterable[float], unit: str = "") -> tuple[Told, ...]:
-    """A quantity over a scene, or nothing if all its values are 0.
-
-    Args:
-        form: as `Told.form`.
-        values: values of the quantity.
-        unit: unit of the values.
-    """
+    """A quantity over a scene, or nothing if all its values are 0."""
     some = tuple(v for v in dict.fromkeys(values) if v)
     return (Told(form, some, unit),) * bool(some)
 
 
 def told_pair(form: str, values: Sequence[float], unit: str = "") -> tuple[Told, ...]:
-    """A quantity of both axes at a place: one number if they agree, nothing if both are 0.
-
-    Args:
-        form: as `Told.form`.
-        values: values along x and along y.
-        unit: unit of the values.
-    """
+    """A quantity of both axes at a place: one number if they agree, nothing if both are 0."""
     x, y = map(float, values)
     if not (x or y):
         return ()
@@ -243,26 +210,12 @@ def told_pair(form: str, values: Sequence[float], unit: str = "") -> tuple[Told,
 
 
 def present(scene: Any, traits: Iterable[T]) -> list[T]:
-    """The traits that a scene has.
-
-    Args:
-        scene: a scenario; clay for traits of clay.
-        traits: traits to look for.
-    """
+    """The traits that a scene has."""
     return [x for x in traits if x.has(scene)]
 
 
 def check_traits(found: Sequence[Trait], scene: Any, prefix: str = "") -> None:
-    """Refuses traits that cannot be combined.
-
-    Args:
-        found: traits of the scene.
-        scene: a scenario, or clay.
-        prefix: prefix of the dotted names of the fields of `scene`.
-
-    Raises:
-        ParameterError: two traits cannot be combined.
-    """
+    """Refuses traits that cannot be combined."""
     names = {x.name for x in found}
     for trait in found:
         for other, why in trait.refuses.items():

@@ -44,22 +44,14 @@ CUT_EVENTS = ("enters the clay", "leaves the clay", "ends")
 
 
 def ledger_rows(runs: Runs | None = None) -> list[Row]:
-    """All rows, in the paper's order.
-
-    Args:
-        runs: the runs behind them; None for new ones.
-    """
+    """All rows, in the paper's order."""
     runs = runs or Runs()
     parts = (machine, blocks, constant, variable, largest_gains, maneuver)
     return [each for part in parts for each in part(runs)]
 
 
 def machine(runs: Runs) -> Iterator[Row]:
-    """The arm and its sampling (Secs. 2, 4, Eq. 14).
-
-    Args:
-        runs: the runs behind the rows.
-    """
+    """The arm and its sampling (Secs. 2, 4, Eq. 14)."""
     straight, folded = (arm_at((0.0, q2))[0][0] for q2 in (0.0, math.pi))
     yield row(
         f"l1 | Sec. 4 | {L1:g} m | m",
@@ -133,11 +125,7 @@ def _lambda_x(x: float, y: float) -> float:
 
 
 def blocks(runs: Runs) -> Iterator[Row]:
-    """G, Sh and Th as identified on the simulated arm (Eqs. 15 to 19).
-
-    Args:
-        runs: the runs behind the rows.
-    """
+    """G, Sh and Th as identified on the simulated arm (Eqs. 15 to 19)."""
     symbols = {"gain": "numerator", "damping": "s", "stiffness": "constant term"}
     for what, places, tolerance, unit in (
         ("G", (15, 16), 5e-3, "m/m"),
@@ -195,11 +183,7 @@ def _corner(th: Operator) -> float:
 
 
 def largest_gains(runs: Runs) -> Iterator[Row]:
-    """The gain limit and the conditions for stability (Secs. 3, 4.3).
-
-    Args:
-        runs: the runs behind the rows.
-    """
+    """The gain limit and the conditions for stability (Secs. 3, 4.3)."""
     text = "; ".join(
         f"{axis}, b = {b:g}: {gain_limits.gain_limit(axis, b, TH):.4g} with Th, "
         f"{gain_limits.gain_limit(axis, b):.4g} without"
@@ -254,11 +238,7 @@ def largest_gains(runs: Runs) -> Iterator[Row]:
 
 
 def constant(runs: Runs) -> Iterator[Row]:
-    """The constant cut (Sec. 4.1, Figs. 7, 8).
-
-    Args:
-        runs: the runs behind the rows.
-    """
+    """The constant cut (Sec. 4.1, Figs. 7, 8)."""
     r = runs.constant()
     edges = [c.border for c in r.crossings]
     yield row(
@@ -357,11 +337,7 @@ def constant(runs: Runs) -> Iterator[Row]:
 
 
 def variable(runs: Runs) -> Iterator[Row]:
-    """The variable cut (Sec. 4.2, Figs. 9, 10).
-
-    Args:
-        runs: the runs behind the rows.
-    """
+    """The variable cut (Sec. 4.2, Figs. 9, 10)."""
     r, shaped = runs.variable("none"), runs.variable("none", inertia_shaping=True)
     yield row(
         "input force | Sec. 4.2 | 1 N at 45 degrees | N",
@@ -461,11 +437,7 @@ def variable(runs: Runs) -> Iterator[Row]:
 
 
 def maneuver(runs: Runs) -> Iterator[Row]:
-    """The maneuver of the stability test (Sec. 4.3, Fig. 11).
-
-    Args:
-        runs: the runs behind the rows.
-    """
+    """The maneuver of the stability test (Sec. 4.3, Fig. 11)."""
     where = {
         GAINS_FIG11[0]: "2 in the caption, 3 in the text",
         GAINS_FIG11[1]: "3 in the text, 2 in the caption",

@@ -40,11 +40,7 @@ NOTES = {
 
 
 def comparison_page(found: Comparison) -> str:
-    """Renders a comparison as a self-contained HTML page.
-
-    Args:
-        found: from `compare_files`.
-    """
+    """Renders a comparison as a self-contained HTML page."""
     walls = isinstance(found[0].subject, VirtualWall)
     (m0, m1), (d0, d1), (k0, k1) = COMPARED_HANDS.mass, COMPARED_HANDS.damper, COMPARED_HANDS.spring
     hands = f"Worst hand of {m0:g} to {m1:g} kg, {d0:g} to {d1:g} N.s/m, {k0:g} to {k1:g} N/m."
@@ -66,23 +62,14 @@ def comparison_page(found: Comparison) -> str:
 
 
 def number_rows(found: Comparison) -> dict[str, list[str]]:
-    """Key numbers as text, one row per number, one cell per file; omits numbers that no file has.
-
-    Args:
-        found: from `compare_files`.
-    """
+    """Key numbers as text, one row per number, one cell per file; omits numbers that no file has."""
     names = [n for n in found[0].numbers if not all(math.isnan(x.numbers[n]) for x in found)]
     rows = {name: [_number_text(x.numbers[name]) for x in found] for name in names}
     return rows | {"outcome of its run": [x.record.status for x in found]}
 
 
 def inline_svg(text: str, name: str) -> str:
-    """Prepares an SVG file for embedding in a page: no header, unique ids, colours of the page.
-
-    Args:
-        text: text of the file.
-        name: prefix of its ids.
-    """
+    """Prepares an SVG file for embedding in a page: no header, unique ids, colours of the page."""
     text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.S)
     text = re.sub(r'\b(id="|href="#|url\(#)', rf"\g<1>{name}-", text)
     for color, variable in SVG_COLORS.items():

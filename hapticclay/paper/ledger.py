@@ -77,11 +77,7 @@ class Runs:
     """
 
     def __init__(self, progress: Callable[[str], None] | None = None):
-        """Starts without runs.
-
-        Args:
-            progress: called with the name of each run before it is made.
-        """
+        """Starts without runs."""
         self.progress = progress or (lambda name: None)
         self._kept: dict[str, Any] = {}
 
@@ -92,52 +88,29 @@ class Runs:
         return self._kept[name]
 
     def constant(self, **kw) -> Record:
-        """A constant cut.
-
-        Args:
-            **kw: as `constant_cut`.
-        """
+        """A constant cut."""
         return self._get(f"constant cut {_keywords(kw)}", lambda: simulate(constant_cut(**kw)))
 
     def variable(self, growth: Any = "30/s", **kw) -> Record:
-        """A variable cut.
-
-        Args:
-            growth: as `variable_cut`.
-            **kw: as `variable_cut`.
-        """
+        """A variable cut."""
         return self._get(
             f"variable cut, growth {growth} {_keywords(kw)}",
             lambda: simulate(variable_cut(growth, **kw)),
         )
 
     def stability(self, gain: float, **kw) -> Record:
-        """A stability test.
-
-        Args:
-            gain: as `stability_test`.
-            **kw: as `stability_test`.
-        """
+        """A stability test."""
         return self._get(
             f"stability test, K = {gain:g} {_keywords(kw)}",
             lambda: simulate(stability_test(gain, **kw)),
         )
 
     def free(self, **kw) -> Record:
-        """A motion in free space.
-
-        Args:
-            **kw: as `free`.
-        """
+        """A motion in free space."""
         return self._get(f"free {_keywords(kw)}", lambda: simulate(free(**kw)))
 
     def identified(self, what: str, axis: str) -> Identified:
-        """An identification from a single run.
-
-        Args:
-            what: "G", "S" (Sh) or "Th".
-            axis: "x" or "y".
-        """
+        """An identification from a single run."""
         return self._get(
             f"identification of {what}{axis}", lambda: identify(axis, what, realisations=1)
         )
@@ -148,31 +121,14 @@ def _keywords(kw: dict) -> str:
 
 
 def steady(r: Record, axis: str, k: int, name: str) -> float:
-    """A steady-state quantity of one region of the path.
-
-    Args:
-        r: the record.
-        axis: "x" or "y".
-        k: index of the region along the path.
-        name: name of the quantity, as in `Record.regions`.
-
-    Returns:
-        The quantity, or its mean for a statistic; NaN if the speed did not settle.
-    """
+    """A steady-state quantity of one region of the path."""
     value = r.regions(axis)[k][axis][name]
     value = value["mean"] if isinstance(value, dict) else value
     return math.nan if value is None else value
 
 
 def rightmost(axis: str, K: float, b: float, th: Operator | None) -> complex:
-    """Rightmost pole of the loop at the nominal pose [1/s]; of a pair, the one above the real axis.
-
-    Args:
-        axis: "x" or "y".
-        K: compensator gain.
-        b: damping of the clay [N.s/m].
-        th: Th; None for Th = 0.
-    """
+    """Rightmost pole of the loop at the nominal pose [1/s]; of a pair, the one above the real axis."""
     poles = loops.closed_loop_poles(axis, K, b, th)
     return complex(max((p for p in poles if p.imag >= 0.0), key=lambda p: p.real))
 
@@ -186,13 +142,6 @@ def row(
     status: str,
     reason: str = "",
 ) -> Row:
-    """Makes one row of the ledger.
-
-    Args:
-        cells: "quantity | place in the paper | as printed | unit".
-        figures: (expected, ours, tolerance), as in `Row`.
-        status: as in `Row`.
-        reason: as in `Row`.
-    """
+    """Makes one row of the ledger."""
     what, where, printed, unit = cells.split(" | ")
     return Row(what, where, printed, unit, *figures, status, reason)

@@ -205,12 +205,7 @@ PICTURES = (
 
 
 def format_number(x: float | None, unit: str = "") -> str:
-    """Formats a value for a table with six digits; None gives an empty cell.
-
-    Args:
-        x: the value.
-        unit: its unit; "1" is not shown.
-    """
+    """Formats a value for a table with six digits; None gives an empty cell."""
     if x is None:
         return ""
     if math.isnan(x):
@@ -220,20 +215,12 @@ def format_number(x: float | None, unit: str = "") -> str:
 
 
 def typeset(unit: str) -> str:
-    """Typesets a unit: N·s/m, 1/s²; nothing for "1".
-
-    Args:
-        unit: unit as in a Row, N.s/m, 1/s^2.
-    """
+    """Typesets a unit: N·s/m, 1/s²; nothing for "1"."""
     return "" if unit == "1" else unit.replace("N.", "N·").replace("^2", "²")
 
 
 def aligned(x: float | None) -> Any:
-    """Formats a value so that the decimal points of an HTML column align.
-
-    Args:
-        x: the value.
-    """
+    """Formats a value so that the decimal points of an HTML column align."""
     import markupsafe  # a dependency of jinja2
 
     whole, point, rest = format_number(x).partition(".")
@@ -242,11 +229,7 @@ def aligned(x: float | None) -> Any:
 
 
 def format_error(row: Row) -> str:
-    """Formats the error of a row in percent, or in the row's unit if 0 is expected.
-
-    Args:
-        row: of the ledger.
-    """
+    """Formats the error of a row in percent, or in the row's unit if 0 is expected."""
     if row.error is None or math.isnan(row.error):
         return ""
     if row.expected == 0.0:
@@ -256,11 +239,7 @@ def format_error(row: Row) -> str:
 
 
 def format_verdict(row: Row) -> str:
-    """Formats the agreement of a row.
-
-    Args:
-        row: of the ledger.
-    """
+    """Formats the agreement of a row."""
     return {True: "yes", False: "NO", None: ""}[row.agrees]
 
 
@@ -288,21 +267,12 @@ def template_environment() -> Any:
 
 
 def paper_page(rows: list[Row]) -> str:
-    """Renders the ledger as a Markdown page (docs/paper.md).
-
-    Args:
-        rows: of the ledger.
-    """
+    """Renders the ledger as a Markdown page (docs/paper.md)."""
     return template_environment().get_template("paper.md").render(rows=rows, statuses=STATUSES)
 
 
 def classic_page(found: Found, source: Classic) -> str:
-    """Renders the claims of a classic as a Markdown page (docs/classics/).
-
-    Args:
-        found: its rows and charts.
-        source: the classic.
-    """
+    """Renders the claims of a classic as a Markdown page (docs/classics/)."""
     words = {"source": source, "rows": found.rows, "charts": found.charts}
     template = template_environment().get_template("classic.md")
     return template.render(words, statuses=CLASSIC_STATUSES)
@@ -315,18 +285,7 @@ def reproduce(
     save: Callable[[dict[str, Figure], Path], object] | None = None,
     runs: Runs | None = None,
 ) -> list[Row]:
-    """Writes report.html (self-contained), report.md, ledger.json and figures/.
-
-    Args:
-        out: folder.
-        quick: whether to omit the map of the workspace.
-        progress: called with the title of each step before it starts.
-        save: writes figures by name to a folder; None for the SVG files of the report alone.
-        runs: runs to reuse; None for new runs.
-
-    Returns:
-        The rows of the ledger.
-    """
+    """Writes report.html (self-contained), report.md, ledger.json and figures/."""
     runs = runs or Runs(progress)
     rows = claims.ledger_rows(runs)
     drawn = []
@@ -347,15 +306,7 @@ def reproduce_classic(
     progress: Callable[[str], None] | None = None,
     save: Callable[[dict[str, Figure], Path], object] | None = None,
 ) -> Found:
-    """Writes report.html (self-contained), report.md, ledger.json and figures/ of a classic.
-
-    Args:
-        source: the classic.
-        out: folder.
-        quick: whether to make fewer runs.
-        progress: called with the title of each step before it begins.
-        save: as in `reproduce`.
-    """
+    """Writes report.html (self-contained), report.md, ledger.json and figures/ of a classic."""
     found = source.make(quick, progress or (lambda title: None))
     drawn = []
     for chart in found.charts:

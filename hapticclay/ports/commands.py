@@ -66,11 +66,7 @@ IDLE = Command()
 
 
 def finite(value: Any) -> float | None:
-    """A number as a float; None for anything else, including bool.
-
-    Args:
-        value: value from a message.
-    """
+    """A number as a float; None for anything else, including bool."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
     try:
@@ -83,17 +79,7 @@ def finite(value: Any) -> float | None:
 def read_numbers(
     given: Mapping[str, Any], names: Sequence[str], quantity: Quantity
 ) -> tuple[tuple[float, ...] | None, str]:
-    """Reads the numbers of a quantity from a message; a missing one is 0.
-
-    Args:
-        given: numbers by name.
-        names: names to read.
-        quantity: the quantity.
-
-    Returns:
-        The numbers and ""; or None and why they are dropped: one is no finite number, or is beyond
-        the bound of the quantity.
-    """
+    """Reads the numbers of a quantity from a message; a missing one is 0."""
     values = [finite(given.get(name, 0.0)) for name in names]
     found = tuple(x for x in values if x is not None)
     if len(found) < len(values):
@@ -104,31 +90,17 @@ def read_numbers(
 
 
 def is_bounded(values: Iterable[float], quantity: Quantity) -> bool:
-    """Whether numbers are finite and within the bound of a quantity.
-
-    Args:
-        values: the numbers.
-        quantity: the quantity.
-    """
+    """Whether numbers are finite and within the bound of a quantity."""
     return all(abs(x) <= quantity.most for x in values)
 
 
 def short_text(value: Any) -> str | None:
-    """A text of at most LONGEST_TEXT characters; None for anything else.
-
-    Args:
-        value: value from a message.
-    """
+    """A text of at most LONGEST_TEXT characters; None for anything else."""
     return value if isinstance(value, str) and len(value) <= LONGEST_TEXT else None
 
 
 def shortening(v: Sequence[float], most: float) -> float:
-    """The factor, 0 to 1, that shortens a vector to a length; 0 if the vector is not finite.
-
-    Args:
-        v: the vector.
-        most: the length.
-    """
+    """The factor, 0 to 1, that shortens a vector to a length; 0 if the vector is not finite."""
     top = max(map(abs, v), default=0.0)
     if not top or not all(map(math.isfinite, v)):
         return 0.0
@@ -139,9 +111,5 @@ def shortening(v: Sequence[float], most: float) -> float:
 
 
 def by_axis(v: Vector) -> dict[str, float]:
-    """A vector in the form used in messages.
-
-    Args:
-        v: components along x, y, z.
-    """
+    """A vector in the form used in messages."""
     return dict(zip(AXES, v, strict=True))

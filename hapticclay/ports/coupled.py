@@ -117,16 +117,7 @@ class DeviceHand:
     """
 
     def __init__(self, client: DeviceClient, coupling: Coupled, start: Pair):
-        """Measures the period of the device, without force.
-
-        Args:
-            client: reads the device.
-            coupling: to the arm.
-            start: place of the simulated handle [m].
-
-        Raises:
-            ParameterError: the coupling has B < K Ts/2 at the requested rate.
-        """
+        """Measures the period of the device, without force."""
         coupling.check(client.limits.Ts)
         self.client, self.plane = client, coupling.plane
         self.coupling = coupling.at(max(client.limits.Ts, self._settle()))
@@ -147,15 +138,7 @@ class DeviceHand:
         return statistics.median(b - a for a, b in zip(t[:-1], t[1:], strict=True))
 
     def exchange(self, p: Pair, v: Pair) -> bool:
-        """Sends the coupling force to the device and reads its position.
-
-        Args:
-            p: place of the simulated handle [m].
-            v: its velocity [m/s].
-
-        Returns:
-            Whether the sample came in time.
-        """
+        """Sends the coupling force to the device and reads its position."""
         push = NOTHING
         if self.held:
             x, y = self.coupling.force(self.place, self.rate, p, v)
@@ -167,11 +150,7 @@ class DeviceHand:
         return self.held
 
     def watch(self) -> bool:
-        """Reads the position of the device, without force; the next forces rise from zero.
-
-        Returns:
-            Whether the sample came in time.
-        """
+        """Reads the position of the device, without force; the next forces rise from zero."""
         sample = self.client.exchange()
         self.client.restart_ramp()
         self.held = sample is not None
@@ -272,12 +251,7 @@ def _muscle(hand: DeviceHand, p: Pair, v: Pair, passed: float) -> Pair:
 
 
 def held_by(scenario: Scenario, coupling: Coupled) -> Scenario:
-    """A scenario whose hand is a device.
-
-    Args:
-        scenario: arm, clay and control.
-        coupling: between device and simulated handle.
-    """
+    """A scenario whose hand is a device."""
     return replace(
         scenario,
         operator=coupling.operator,

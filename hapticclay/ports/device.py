@@ -98,17 +98,7 @@ class Trajectory:
 def read_columns(
     field: str, path: str | os.PathLike[str], units: dict[str, tuple[str, ...]]
 ) -> list[tuple[float, ...]]:
-    """Reads some columns of a CSV file.
-
-    Args:
-        field: name for the error.
-        path: the file; its first line names the columns.
-        units: columns to read, and their SI units; none for a column without a unit.
-
-    Raises:
-        ParameterError: the file cannot be read, lacks a column, or has a cell that is no number or
-            a unit that does not fit.
-    """
+    """Reads some columns of a CSV file."""
     try:
         sheet = Sheet.read(field, Path(path))
     except OSError as error:
@@ -142,19 +132,7 @@ class SimulatedDevice:
         largest_force: float = LARGEST_FORCE,
         clay: bool = False,
     ):
-        """Makes the device, at rest.
-
-        Args:
-            scenario: arm, hand, hardware, clay and step are used; compensator and servo are not.
-            period: time by which `advance` moves on [s]; None for the control sample.
-            hand: target of the hand; None for the muscle force of the scenario.
-            largest_force: largest magnitude of the force [N], > 0, at most 1e3.
-            clay: whether the clay of the scenario acts.
-
-        Raises:
-            ParameterError: the period is not a whole multiple of the control sample, or the hand
-                lacks the spring that it needs to follow a trajectory.
-        """
+        """Makes the device, at rest."""
         self.scenario, self._samples = device_scenario(scenario, period, clay)
         self._hand = None if hand is None else _follower(hand, self.scenario)
         self._arm = DrivenArm(self.scenario, largest_force)
@@ -188,69 +166,35 @@ class SimulatedDevice:
         return "" if outcome is None else str(outcome)
 
     def drive(self, drive: Drive) -> Pair:
-        """Changes what the motors do from the next control sample on.
-
-        Args:
-            drive: the drive, in the plane of the arm.
-
-        Returns:
-            The force that will act, limited in length [N].
-        """
+        """Changes what the motors do from the next control sample on."""
         return self._arm.drive(drive)
 
     def advance(self, samples: int | None = None) -> None:
-        """Advances the simulation.
-
-        Args:
-            samples: control samples; None for a period.
-        """
+        """Advances the simulation."""
         steps = round(float(self.scenario.Ts or self.scenario.dt) / self.scenario.dt)
         n = steps * (self._samples if samples is None else samples)
         force = None if self._hand is None else self._hand(self.t)
         self._simulation.advance(n, force=force)
 
     def record(self) -> Record:
-        """Stops the device and returns the record so far.
-
-        Raises:
-            RuntimeError: the device has not run.
-        """
+        """Stops the device and returns the record so far."""
         return replace_scenario(self._simulation.record(), self.scenario)
 
 
 def ended_as_planned(record: Record) -> Record:
-    """A record of a session that lasted as long as it was to last.
-
-    Args:
-        record: the record; one that ended in another way is returned as it is.
-    """
+    """A record of a session that lasted as long as it was to last."""
     if record.outcome.code != "interrupted":
         return record
     return replace(record, outcome=replace(record.outcome, code="time limit"))
 
 
 def replace_scenario(record: Record, scenario: Scenario) -> Record:
-    """A record whose scenario does not contain the law that the client replaces.
-
-    Args:
-        record: the record.
-        scenario: the scenario to store in the record.
-    """
+    """A record whose scenario does not contain the law that the client replaces."""
     return replace(record, scenario=scenario)
 
 
 def device_scenario(scenario: Scenario, period: float | None, clay: bool) -> tuple[Scenario, int]:
-    """The scenario of a device, and the number of control samples per period.
-
-    Args:
-        scenario: the given scenario; without Ts, the control sample is the period divided by a
-            whole number, at most 0.36 ms.
-        period: period of a client [s]; None for the control sample.
-        clay: whether the clay acts.
-
-    Raises:
-        ParameterError: the period is not a whole multiple of Ts.
-    """
+    """The scenario of a device, and the number of control samples per period."""
     if period is not None:
         period = number("period", period, 1e-5, 1.0, unit="s")
     Ts = scenario.Ts

@@ -63,15 +63,7 @@ class DrivenArm:
     """
 
     def __init__(self, scenario: Scenario, largest_force: float = LARGEST_FORCE):
-        """Starts without torque, at the initial state of a scenario.
-
-        Args:
-            scenario: arm, origin, start and velocity are used.
-            largest_force: limit, > 0, at most 1e3 [N].
-
-        Raises:
-            ParameterError: the force is out of its bounds.
-        """
+        """Starts without torque, at the initial state of a scenario."""
         self.largest_force = number("largest_force", largest_force, 0.0, 1e3, above=True)
         self._origin, self._links = scenario.origin, scenario.arm.links
         self._reach = scenario.arm.l1 + scenario.arm.l2, scenario.arm.l2  # of both joints [m]
@@ -81,14 +73,7 @@ class DrivenArm:
         self.controller = Controller(self._law)
 
     def drive(self, drive: Drive) -> Pair:
-        """Changes what the motors do from the next control sample on.
-
-        Args:
-            drive: the command.
-
-        Returns:
-            The force that will act on the handle if the handle does not move [N].
-        """
+        """Changes what the motors do from the next control sample on."""
         self.asked = drive._replace(torques=self._limited(drive.torques))
         self.force = self._at(self.sensed)
         return self.force

@@ -148,11 +148,7 @@ class ExchangeLog:
     """Keeps the newest exchanges."""
 
     def __init__(self, most: int = MOST_ROWS):
-        """Makes an empty log.
-
-        Args:
-            most: number of newest rows to keep.
-        """
+        """Makes an empty log."""
         self._rows = Rows(len(COLUMNS), most)
 
     @property
@@ -161,11 +157,7 @@ class ExchangeLog:
         return self._rows.count
 
     def add(self, row: Exchange) -> None:
-        """Adds an exchange.
-
-        Args:
-            row: the exchange.
-        """
+        """Adds an exchange."""
         times, (position, velocity, asked, applied) = row[:3], row[3:]
         self._rows.add((*times, *position, *velocity, *asked, *applied))
 

@@ -38,35 +38,19 @@ class Guard:
     origins: tuple[str, ...] = ()
 
     def refusal(self, connection: Any, request: Any) -> Any:
-        """Judges a request.
-
-        Args:
-            connection: of websockets.
-            request: of websockets.
-
-        Returns:
-            The response to a request that is not admitted, None otherwise.
-        """
+        """Judges a request."""
         if why := self.reason(request):
             return connection.respond(HTTPStatus.FORBIDDEN, f"hapticclay: {why}\n")
         return None
 
     def reason(self, request: Any) -> str:
-        """Why a request is refused; "" for one that is admitted, by the token in its address.
-
-        Args:
-            request: of websockets.
-        """
+        """Why a request is refused; "" for one that is admitted, by the token in its address."""
         if not self.is_own(request):
             return REFUSED
         return "" if self.has_token(request) else NO_TOKEN
 
     def is_own(self, request: Any) -> bool:
-        """Whether Host is a name of this machine, and Origin, if sent, the same or admitted.
-
-        Args:
-            request: of websockets.
-        """
+        """Whether Host is a name of this machine, and Origin, if sent, the same or admitted."""
         try:
             hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
             if len(hosts) != 1 or not all(self._admits(x, hosts[0]) for x in origins):
@@ -82,11 +66,7 @@ class Guard:
         return name in (self.host.lower(), socket.gethostname().lower())
 
     def has_token(self, request: Any) -> bool:
-        """Whether the address of a request holds the token, or none is required.
-
-        Args:
-            request: of websockets; `is_own`.
-        """
+        """Whether the address of a request holds the token, or none is required."""
         query = parse_qs(urlsplit(request.path).query)
         return not self.token or self.matches(query.get("token", [""])[0], self.token)
 
@@ -95,24 +75,12 @@ class Guard:
 
     @staticmethod
     def matches(given: str, expected: str) -> bool:
-        """Compares secrets in a time that does not depend on them.
-
-        Args:
-            given: from a request.
-            expected: the secret.
-        """
+        """Compares secrets in a time that does not depend on them."""
         return hmac.compare_digest(given.encode(errors="replace"), expected.encode())
 
 
 def origins_of(given: object) -> tuple[str, ...]:
-    """Checked origins of pages, in lower case.
-
-    Args:
-        given: scheme, host and port of pages.
-
-    Raises:
-        ParameterError: one is no origin, such as "null", which any page can have.
-    """
+    """Checked origins of pages, in lower case."""
     if not isinstance(given, tuple):
         raise ParameterError("origins", given, "must be a tuple of texts")
     for origin in given:
@@ -129,15 +97,7 @@ def origins_of(given: object) -> tuple[str, ...]:
 
 
 def listening(host: str, port: int) -> socket.socket:
-    """A socket that listens.
-
-    Args:
-        host: address or name of this machine; "" for all addresses.
-        port: 0 to 65535; 0 for a free one.
-
-    Raises:
-        ParameterError: the host is none of this machine, or the port is not available.
-    """
+    """A socket that listens."""
     port = integer("port", port, 0, 65_535)
     if not isinstance(host, str):
         raise ParameterError("host", host, "must be an address of this machine, as 127.0.0.1")
@@ -161,11 +121,7 @@ def _not_available(host: str, port: int, error: Exception) -> ParameterError:
 
 
 def url_host(host: str) -> str:
-    """The host of an address: for "all addresses" the address of this machine for others.
-
-    Args:
-        host: that the server listens on.
-    """
+    """The host of an address: for "all addresses" the address of this machine for others."""
     if host in ("", "0.0.0.0", "::"):
         try:
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:

@@ -33,12 +33,7 @@ class Inbox:
     """
 
     def __init__(self, socket: Any, broken: tuple[type[BaseException], ...]):
-        """Starts to read.
-
-        Args:
-            socket: connection of websockets, read by nothing else.
-            broken: exceptions by which a connection ends.
-        """
+        """Starts to read."""
         self.skipped, self.ended = 0, ""
         self._socket, self._broken = socket, broken
         self._changed = threading.Condition()
@@ -62,12 +57,6 @@ class Inbox:
         Answers hold nothing that relates them to messages. So answers that are owed to earlier
         messages are awaited as well, or each later one would be taken for the one before it. They
         are given up if they do not come within this wait.
-
-        Args:
-            patience: longest wait [s].
-
-        Returns:
-            The frame; None if none came that holds the device.
         """
         end = time.perf_counter() + patience
         with self._changed:
@@ -82,11 +71,7 @@ class Inbox:
             return found
 
     def join(self, timeout: float) -> None:
-        """Waits for the end of the thread, after the connection was closed.
-
-        Args:
-            timeout: longest wait [s].
-        """
+        """Waits for the end of the thread, after the connection was closed."""
         self._thread.join(timeout)
 
     def _take(self) -> Arrival | None:

@@ -113,11 +113,7 @@ class Message:
     torques: tuple[Torques, ...] = ()
 
     def command(self, device_id: str) -> Command:
-        """The command in the message for a device.
-
-        Args:
-            device_id: of the device.
-        """
+        """The command in the message for a device."""
         forces = [f.vector for f in self.forces if f.device_id == device_id]
         targets = [x.vector for x in self.targets if x.device_id == device_id]
         torques = [x.torques for x in self.torques if x.device_id == device_id]
@@ -174,14 +170,7 @@ class Frame:
 
 
 def read_message(data: str | bytes) -> Message:
-    """Reads what a client sent.
-
-    Args:
-        data: a frame, text or binary.
-
-    Returns:
-        The message. For unreadable data it has no forces and one notice.
-    """
+    """Reads what a client sent."""
     try:
         tree = json.loads(data)
     except (ValueError, RecursionError):
@@ -295,11 +284,7 @@ def _numbers(
 
 
 def message_text(message: Message) -> str:
-    """The text of a client's message, with the key of 3.1 to 3.4, which all versions accept.
-
-    Args:
-        message: message to send; its notices are not sent.
-    """
+    """The text of a client's message, with the key of 3.1 to 3.4, which all versions accept."""
     tree: dict[str, Any] = {}
     session: dict[str, Any] = {"force_render_full_state": {}} if message.full else {}
     if message.profile:
@@ -335,11 +320,7 @@ def _entry(device_id: str, command: str, body: dict[str, Any]) -> dict[str, Any]
 
 
 def frame_data(frame: Frame) -> dict[str, Any]:
-    """A frame of the service as plain data.
-
-    Args:
-        frame: frame to send.
-    """
+    """A frame of the service as plain data."""
     device: dict[str, Any] = {"device_id": frame.device_id}
     if frame.full:
         device["config"] = _device_config(frame.device_id)
@@ -366,11 +347,7 @@ GRIP_STATUS = {"connected": True, "awake": True, "ready": True}
 
 
 def frame_text(frame: Frame) -> str:
-    """The text of a frame of the service.
-
-    Args:
-        frame: frame to send.
-    """
+    """The text of a frame of the service."""
     return json.dumps(frame_data(frame), allow_nan=False)
 
 
@@ -442,15 +419,7 @@ def _device_config(device_id: str) -> dict[str, Any]:
 
 
 def read_frame(data: str | bytes) -> Frame | None:
-    """Reads the first Inverse3 and the first wireless grip from a service's frame.
-
-    Args:
-        data: a frame, text or binary.
-
-    Returns:
-        The frame; None if it has no Inverse3 with a finite position, velocity and force, within
-        the bounds of these quantities.
-    """
+    """Reads the first Inverse3 and the first wireless grip from a service's frame."""
     try:
         tree = json.loads(data)
         device = tree["inverse3"][0]

@@ -16,22 +16,11 @@ class InverseProtocol:
     name, pushes = "inverse", False
 
     def greet(self, service: Host, session: Session) -> list[str]:
-        """The inventory.
-
-        Args:
-            service: the service.
-            session: session of the client.
-        """
+        """The inventory."""
         return [inverse.frame_text(frame_of(service, session, full=True))]
 
     def answer(self, service: Host, session: Session, data: str | bytes) -> list[str]:
-        """Returns one frame for any message.
-
-        Args:
-            service: the service.
-            session: session of the client.
-            data: message of the client.
-        """
+        """Returns one frame for any message."""
         message, shown = inverse.read_message(data), service.inverse3
         others = {x for x in message.devices if x not in (shown.device_id, shown.grip_id)}
         for notice in message.notices:
@@ -43,32 +32,17 @@ class InverseProtocol:
         return [inverse.frame_text(frame_of(service, session, message.full))]
 
     def due(self, service: Host, session: Session) -> list[str]:
-        """Nothing: the service only answers messages.
-
-        Args:
-            service: the service.
-            session: session of the client.
-        """
+        """Nothing: the service only answers messages."""
         return []
 
     def inventory(self, service: Host) -> dict[str, Any]:
-        """The devices of each kind, as plain data.
-
-        Args:
-            service: the service.
-        """
+        """The devices of each kind, as plain data."""
         found = inverse.frame_data(frame_of(service, None, full=True))
         return {kind: found[kind] for kind in inverse.DEVICES}
 
 
 def frame_of(service: Host, session: Session | None, full: bool) -> inverse.Frame:
-    """The state of the device.
-
-    Args:
-        service: the service that owns the device.
-        session: session of the receiving client; None for no client.
-        full: whether the frame includes the configuration.
-    """
+    """The state of the device."""
     mode, number = (session.command.mode, session.number) if session else ("idle", 0)
     shown = service.inverse3
     return inverse.Frame(

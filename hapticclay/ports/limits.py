@@ -54,16 +54,7 @@ PLAIN = Limits()
 
 
 def allowed(force: Vector, largest: float, grown: float) -> Vector:
-    """A force within its largest length, times the share of the ramp.
-
-    Args:
-        force: requested force [N].
-        largest: longer forces are shortened to this length [N].
-        grown: share of the ramp that has passed, 0 to 1.
-
-    Returns:
-        The force [N]; zero if the request is not finite.
-    """
+    """A force within its largest length, times the share of the ramp."""
     scale = grown * shortening(force, largest)
     if not scale:
         return NOTHING
@@ -78,11 +69,7 @@ class ForceLimiter:
     """
 
     def __init__(self, limits: Limits):
-        """Starts with the ramp, before any force.
-
-        Args:
-            limits: the limits.
-        """
+        """Starts with the ramp, before any force."""
         self._limits, self.withheld = limits, 0
         self._ramp_from = 0.0  # [s]
         self._sent, self._sent_at = NOTHING, -limits.Ts  # the newest force, and when [s]
@@ -91,32 +78,17 @@ class ForceLimiter:
         self._is_frozen = False
 
     def restart(self, t: float) -> None:
-        """Restarts the ramp.
-
-        Args:
-            t: time of the device [s].
-        """
+        """Restarts the ramp."""
         self._ramp_from, self._pushed_at = t, None
 
     def see(self, position: Vector, t: float) -> None:
-        """Compares a position with the one before.
-
-        Args:
-            position: of the cursor [m].
-            t: when it came [s].
-        """
+        """Compares a position with the one before."""
         if position != self._position:
             self._position, self._pushed_at = position, None
             self._thaw(t)
 
     def apply(self, force: Vector, t: float, lost: bool = False) -> Vector:
-        """The force to send; it counts as sent.
-
-        Args:
-            force: the request [N].
-            t: time of the device [s].
-            lost: whether the newest sample was lost, so that zero is sent.
-        """
+        """The force to send; it counts as sent."""
         limits, passed = self._limits, max(0.0, t - self._sent_at)
         self._sent_at = t
         if passed > limits.Ts + limits.patience:  # the device may have let go meanwhile

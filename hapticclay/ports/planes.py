@@ -8,34 +8,18 @@ PLANES = {"xy": (0, 1), "xz": (0, 2)}  # axes of the cursor that become x and y 
 
 
 def to_plane(v: Vector, plane: str) -> Pair:
-    """Components of a cursor vector in the plane of the arm.
-
-    Args:
-        v: the vector.
-        plane: of PLANES.
-    """
+    """Components of a cursor vector in the plane of the arm."""
     i, j = PLANES[plane]
     return v[i], v[j]
 
 
 def normal_component(v: Vector, plane: str) -> float:
-    """Component of a cursor vector normal to the plane of the arm.
-
-    Args:
-        v: the vector.
-        plane: of PLANES.
-    """
+    """Component of a cursor vector normal to the plane of the arm."""
     return v[3 - sum(PLANES[plane])]
 
 
 def to_space(v: Pair, plane: str, rest: Vector = NOTHING) -> Vector:
-    """Converts a vector in the plane of the arm to a cursor vector.
-
-    Args:
-        v: the vector.
-        plane: of PLANES.
-        rest: vector to add to the result.
-    """
+    """Converts a vector in the plane of the arm to a cursor vector."""
     out = list(rest)
     for axis, value in zip(PLANES[plane], v, strict=True):
         out[axis] += value

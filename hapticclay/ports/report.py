@@ -269,21 +269,12 @@ def loop_report(exchanges: Exchanges, scenario: Scenario) -> LoopReport:
 
 
 def lag_behind(exchanges: Exchanges, back: int) -> float:
-    """Median time from a measurement to the force of a later message [s], 0 or more.
-
-    Args:
-        exchanges: of one client.
-        back: age of the answer with the measurement, 1 for the newest.
-    """
+    """Median time from a measurement to the force of a later message [s], 0 or more."""
     return max(0.0, float(np.median(exchanges.began[back:] - exchanges.sampled[:-back])))
 
 
 def why_no_period(exchanges: Exchanges) -> str:
-    """Why most messages found the arm where the one before had left it.
-
-    Args:
-        exchanges: of one client.
-    """
+    """Why most messages found the arm where the one before had left it."""
     real = float(exchanges.received[-1] - exchanges.received[0])
     moved = float(exchanges.began[-1] - exchanges.began[0])
     if moved < KEPT_UP * real:
@@ -300,17 +291,7 @@ def why_no_period(exchanges: Exchanges) -> str:
 def limit_line(
     handle: Handle, B: float, Ts: float, delay: float
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Largest stable stiffness over damping, from zero damping to where none is stable.
-
-    Args:
-        handle: arm and hand.
-        B: damping that the line must reach [N.s/m].
-        Ts: period of the client [s].
-        delay: delay of its force [s].
-
-    Returns:
-        B [N.s/m] and K [N/m], of equal length.
-    """
+    """Largest stable stiffness over damping, from zero damping to where none is stable."""
     mass = float(1.0 / (handle.normal @ np.linalg.inv(handle.inertia) @ handle.normal))
     top = max(2.5 * mass / (Ts + delay), 1.2 * B)
     rising = np.geomspace(1e-3 * top, 0.8 * top, LINE)
@@ -319,14 +300,7 @@ def limit_line(
 
 
 def fit_wall(exchanges: Exchanges) -> tuple[WallFit | None, str]:
-    """The wall that explains a client's forces, or why there is none.
-
-    Args:
-        exchanges: of one client.
-
-    Returns:
-        The wall, or None with the reason; the reason is "" if there is a wall.
-    """
+    """The wall that explains a client's forces, or why there is none."""
     force = exchanges.asked[:, :2]
     size = np.hypot(*force.T)
     tried = max(FIRST, min(LATEST, len(force) // LOOKBACK))

@@ -84,14 +84,7 @@ class Operation:
 
 
 def read_operation(data: str | bytes) -> Operation:
-    """Reads what a client sent.
-
-    Args:
-        data: a frame, text or binary.
-
-    Returns:
-        The operation; unreadable data give one with an error.
-    """
+    """Reads what a client sent."""
     try:
         tree = json.loads(data)
     except (ValueError, RecursionError):
@@ -139,35 +132,18 @@ def _is_id(value: Any) -> bool:
 
 
 def plain_type(given: Any) -> str:
-    """Name of a type as ROS 1 has it: geometry_msgs/PoseStamped.
-
-    Args:
-        given: name of a type of ROS 1 or ROS 2; anything else gives "".
-    """
+    """Name of a type as ROS 1 has it: geometry_msgs/PoseStamped."""
     return given.replace("/msg/", "/") if isinstance(given, str) else ""
 
 
 def kind_of(topic: str, kinds: Mapping[str, str]) -> str:
-    """The kind of topic with which a name ends, in any namespace; "" for none.
-
-    Args:
-        topic: the name, as in /arm/body/servo_cf.
-        kinds: last parts of names.
-    """
+    """The kind of topic with which a name ends, in any namespace; "" for none."""
     found = [kind for kind in kinds if f"/{topic.lstrip('/')}".endswith(f"/{kind}")]
     return max(found, key=len, default="")
 
 
 def command_of(kind: str, msg: Mapping[str, Any]) -> tuple[Command, str]:
-    """The command in a message on a command topic.
-
-    Args:
-        kind: topic, from TAKEN.
-        msg: the message.
-
-    Returns:
-        The command, and a notice of what was dropped, "" for nothing.
-    """
+    """The command in a message on a command topic."""
     part: Any = msg
     for name in PLACES[TAKEN[kind]]:
         part = part.get(name) if isinstance(part, Mapping) else None
@@ -189,60 +165,32 @@ def _command(kind: str, vector: Vector | None) -> Command:
 
 
 def publish_text(topic: str, msg: Mapping[str, Any]) -> str:
-    """A message on a topic.
-
-    Args:
-        topic: its name.
-        msg: the ROS message.
-    """
+    """A message on a topic."""
     return json.dumps({"op": "publish", "topic": topic, "msg": msg}, allow_nan=False)
 
 
 def status_text(level: str, text: str, to: Operation) -> str:
-    """A status message.
-
-    Args:
-        level: "error", "warning" or "info".
-        text: text of the message.
-        to: the operation that it refers to.
-    """
+    """A status message."""
     name = {} if to.id is None else {"id": to.id}
     return json.dumps({"op": "status", **name, "level": level, "msg": text})
 
 
 def response_text(to: Operation, values: Any, result: bool) -> str:
-    """The answer of a service.
-
-    Args:
-        to: the call.
-        values: values to return; after a failure, the reason.
-        result: whether the call succeeded.
-    """
+    """The answer of a service."""
     name = {} if to.id is None else {"id": to.id}
     body = {"service": to.topic, "values": values, "result": result}
     return json.dumps({"op": "service_response", **name, **body}, allow_nan=False)
 
 
 def ros_time(t: float) -> dict[str, int]:
-    """A time, with the fields of ROS 1 and ROS 2.
-
-    Args:
-        t: since the epoch of its clock [s].
-    """
+    """A time, with the fields of ROS 1 and ROS 2."""
     whole = math.floor(t)
     parts = int(1e9 * (t - whole))
     return {"secs": whole, "nsecs": parts, "sec": whole, "nanosec": parts}
 
 
 def ros_message(kind: str, cursor: Cursor, pressed: frozenset[str], t: float) -> dict[str, Any]:
-    """The message of a published topic.
-
-    Args:
-        kind: topic, from PUBLISHED.
-        cursor: newest measurement.
-        pressed: names of the pressed buttons.
-        t: time of the measurement [s].
-    """
+    """The message of a published topic."""
     stamped: dict[str, Any] = {"header": {"stamp": ros_time(t), "frame_id": FRAME}}
     if kind == "phantom/button":
         return {"grey_button": int("a" in pressed), "white_button": int("b" in pressed)}

@@ -36,21 +36,12 @@ class Subscriptions:
     buttons: frozenset[str] | None = None
 
     def add(self, operation: Operation, kind: str) -> None:
-        """Adds a subscription.
-
-        Args:
-            operation: operation that requests it.
-            kind: kind of the topic.
-        """
+        """Adds a subscription."""
         self.topics[operation.topic] = kind
         self.throttles.setdefault(operation.topic, {})[operation.id] = operation.throttle
 
     def refusal(self, operation: Operation) -> str:
-        """Why a subscription would be one too many; "" if it would not.
-
-        Args:
-            operation: operation that requests it.
-        """
+        """Why a subscription would be one too many; "" if it would not."""
         known = self.throttles.get(operation.topic)
         if known is None and len(self.topics) >= MOST_TOPICS:
             return f"more than {MOST_TOPICS} topics"
@@ -60,11 +51,7 @@ class Subscriptions:
         return ""
 
     def remove(self, operation: Operation) -> None:
-        """Ends one subscription; without an id, all subscriptions to a topic.
-
-        Args:
-            operation: operation that requests it.
-        """
+        """Ends one subscription; without an id, all subscriptions to a topic."""
         left = self.throttles.get(operation.topic, {})
         if operation.id is None:
             left.clear()
@@ -83,23 +70,12 @@ class RosbridgeProtocol:
         self._epoch = time.time()
 
     def greet(self, service: Host, session: Session) -> list[str]:
-        """Nothing: a client subscribes first.
-
-        Args:
-            service: the service.
-            session: session of the client.
-        """
+        """Nothing: a client subscribes first."""
         session.memory = Subscriptions()
         return []
 
     def answer(self, service: Host, session: Session, data: str | bytes) -> list[str]:
-        """Status messages, service responses, and the topics that are due after a command.
-
-        Args:
-            service: the service.
-            session: session of the client.
-            data: message of the client.
-        """
+        """Status messages, service responses, and the topics that are due after a command."""
         operation = rosbridge.read_operation(data)
         if operation.error:
             return self._status(service, session, "error", operation.error, operation)
@@ -110,12 +86,7 @@ class RosbridgeProtocol:
         return act(self, service, session, operation)
 
     def due(self, service: Host, session: Session) -> list[str]:
-        """Subscribed topics with a state newer than the last one sent.
-
-        Args:
-            service: the service.
-            session: session of the client.
-        """
+        """Subscribed topics with a state newer than the last one sent."""
         kept, t, out = session.memory, service.device.sensed.t, []
         cursor, pressed = service.cursor(), service.pressed
         epoch = self._epoch if service.clock == "wall" else 0.0
@@ -134,11 +105,7 @@ class RosbridgeProtocol:
         return out
 
     def inventory(self, service: Host) -> dict[str, Any]:
-        """Topics and their types, as plain data.
-
-        Args:
-            service: the service.
-        """
+        """Topics and their types, as plain data."""
         return {"published": dict(PUBLISHED), "taken": dict(TAKEN)}
 
     # ---- operations

@@ -19,12 +19,7 @@ class Rows:
     """
 
     def __init__(self, width: int, most: int = MOST_ROWS):
-        """Makes an empty table.
-
-        Args:
-            width: numbers per row.
-            most: number of rows to keep.
-        """
+        """Makes an empty table."""
         self.count, self._width, self._most = 0, width, most
         chunks = -(-most // CHUNK) + 1
         self._chunks: collections.deque[np.ndarray] = collections.deque(maxlen=chunks)
@@ -33,11 +28,7 @@ class Rows:
         return min(self.count, self._most)
 
     def add(self, row: Sequence[float]) -> None:
-        """Adds a row.
-
-        Args:
-            row: its numbers.
-        """
+        """Adds a row."""
         at = self.count % CHUNK
         if not at:
             self._chunks.append(np.empty((CHUNK, self._width)))

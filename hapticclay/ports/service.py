@@ -54,13 +54,7 @@ class Service:
         clock: str = "wall",
         inverse3: Inverse3 = PLAIN,
     ):
-        """Makes the service; `start` starts the wall clock.
-
-        Args:
-            device: the driven device.
-            clock: "tick" or "wall".
-            inverse3: identity and protocol of the simulated device.
-        """
+        """Makes the service; `start` starts the wall clock."""
         self.device, self.clock, self.notices = device, clock, Counter[str]()
         self.inverse3, self._plane = inverse3, inverse3.plane
         self.protocol = protocol_of(inverse3.protocol)
@@ -74,11 +68,7 @@ class Service:
     # ---- clients
 
     def connect(self) -> tuple[int, list[str]]:
-        """Adds a client.
-
-        Returns:
-            The number of its session, and the first message to send.
-        """
+        """Adds a client."""
         with self._lock:
             self._count += 1
             number = self._count
@@ -91,42 +81,24 @@ class Service:
             return number, self.protocol.greet(self, session)
 
     def leave(self, number: int) -> None:
-        """Removes a client and its command.
-
-        Args:
-            number: number of the session.
-        """
+        """Removes a client and its command."""
         with self._lock:
             self._sessions.pop(number, None)
             self.device.drive(LIMP if self.clock == "tick" else self._drive())
 
     def answer(self, number: int, data: str | bytes) -> list[str]:
-        """The answer to a message.
-
-        Args:
-            number: number of the client's session.
-            data: its message, text or binary, of any content.
-        """
+        """The answer to a message."""
         with self._lock:
             return self.protocol.answer(self, self._sessions[number], data)
 
     def due(self, number: int) -> list[str]:
-        """Messages to push to a client.
-
-        Args:
-            number: number of the session.
-        """
+        """Messages to push to a client."""
         with self._lock:
             session = self._sessions.get(number)
             return [] if session is None else self.protocol.due(self, session)
 
     def apply(self, session: Session, command: Command) -> None:
-        """Applies a client's command; with the clock "tick", that of the first advances the device.
-
-        Args:
-            session: session of the client.
-            command: the command; an empty one is idle.
-        """
+        """Applies a client's command; with the clock "tick", that of the first advances the device."""
         device = self.device
         session.command, session.heard = command, time.monotonic()
         force = command.force or NOTHING
@@ -162,11 +134,7 @@ class Service:
             return self.protocol.inventory(self)
 
     def count(self, notice: str) -> None:
-        """Counts what was dropped from a message, and reports it the first time.
-
-        Args:
-            notice: what was dropped, and why.
-        """
+        """Counts what was dropped from a message, and reports it the first time."""
         notice = one_line(notice, LONGEST_NOTICE)  # a client's text may hold control characters
         if notice not in self.notices and len(self.notices) >= MOST_NOTICES:
             notice = "further kinds"  # bounds memory under random input
@@ -198,11 +166,7 @@ class Service:
         )
 
     def cursor(self, mode: str = "idle") -> Cursor:
-        """The newest measurement, in the frame of the device.
-
-        Args:
-            mode: what the receiving client drives.
-        """
+        """The newest measurement, in the frame of the device."""
         seen, device, plane = self.device.sensed, self.device, self._plane
         return Cursor(
             to_space(seen.position, plane, REST),
@@ -258,11 +222,7 @@ class Service:
 
 
 def protocol_of(protocol: str) -> WireProtocol:
-    """The protocol with a given name.
-
-    Args:
-        protocol: "inverse" or "rosbridge".
-    """
+    """The protocol with a given name."""
     if protocol == "rosbridge":
         from .rosbridge_service import RosbridgeProtocol
 

@@ -97,19 +97,11 @@ class Device(Protocol):
         ...
 
     def drive(self, drive: Drive) -> Pair:
-        """Changes what the motors do from the next control sample on.
-
-        Args:
-            drive: the drive, in the plane of the arm.
-        """
+        """Changes what the motors do from the next control sample on."""
         ...
 
     def advance(self, samples: int | None = None) -> None:
-        """Advances the simulation.
-
-        Args:
-            samples: control samples; None for a period.
-        """
+        """Advances the simulation."""
 
 
 @dataclass
@@ -152,27 +144,14 @@ class Host(Protocol):
         ...
 
     def cursor(self, mode: str = "idle") -> Cursor:
-        """The newest measurement, in the frame of the device.
-
-        Args:
-            mode: what the receiving client drives.
-        """
+        """The newest measurement, in the frame of the device."""
         ...
 
     def apply(self, session: Session, command: Command) -> None:
-        """Applies a client's command.
-
-        Args:
-            session: session of the client.
-            command: the command.
-        """
+        """Applies a client's command."""
 
     def count(self, notice: str) -> None:
-        """Counts what was dropped from a message.
-
-        Args:
-            notice: what was dropped, and why.
-        """
+        """Counts what was dropped from a message."""
 
 
 class WireProtocol(Protocol):
@@ -187,37 +166,17 @@ class WireProtocol(Protocol):
     pushes: bool
 
     def greet(self, service: Host, session: Session) -> list[str]:
-        """The first message to a client.
-
-        Args:
-            service: the service.
-            session: session of the client.
-        """
+        """The first message to a client."""
         ...
 
     def answer(self, service: Host, session: Session, data: str | bytes) -> list[str]:
-        """The answer to a message of a client.
-
-        Args:
-            service: the service.
-            session: session of the client.
-            data: its message, text or binary, of any content.
-        """
+        """The answer to a message of a client."""
         ...
 
     def due(self, service: Host, session: Session) -> list[str]:
-        """Messages to push to a client.
-
-        Args:
-            service: the service.
-            session: session of the client.
-        """
+        """Messages to push to a client."""
         ...
 
     def inventory(self, service: Host) -> dict[str, Any]:
-        """The available devices or topics, as plain data.
-
-        Args:
-            service: the service.
-        """
+        """The available devices or topics, as plain data."""
         ...

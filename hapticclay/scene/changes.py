@@ -43,15 +43,7 @@ def with_fields(part: T, changes: Mapping[str, Any]) -> T:
 
 
 def check_added_hand(old: Any, *changes: Mapping[Any, Any]) -> None:
-    """Refuses a mass, damper or spring alone where there is no hand, which would add the others.
-
-    Args:
-        old: the operator before.
-        *changes: plain data from `nested`; later ones override earlier ones.
-
-    Raises:
-        ParameterError: a hand is added incompletely.
-    """
+    """Refuses a mass, damper or spring alone where there is no hand, which would add the others."""
     given = functools.reduce(laid_over, changes, {}).get("operator")
     _check_hand(given, old, "operator")
 
@@ -74,14 +66,7 @@ def _check_hand(given: Any, old: Any, path: str) -> None:
 
 
 def nested(changes: Mapping[str, Any]) -> dict[Any, Any]:
-    """Converts values by dotted name to plain data; the key None holds the value of a whole field.
-
-    Args:
-        changes: values by dotted name, or nested values by name.
-
-    Raises:
-        ParameterError: a value is given in both ways, or is nested too deeply.
-    """
+    """Converts values by dotted name to plain data; the key None holds the value of a whole field."""
     out: dict[Any, Any] = {}
     for name, value in changes.items():
         try:
@@ -114,18 +99,7 @@ def _plant(tree: dict[Any, Any], names: Sequence[Any], value: Any) -> None:
 
 
 def named_values(field: str, words: Iterable[str]) -> dict[str, Any]:
-    """Reads the words "arm.l1=0.3", "gain=1,0.5", "inertia_shaping=true", "dt=0.1ms".
-
-    Args:
-        field: name for the error.
-        words: the words.
-
-    Returns:
-        Values by dotted name.
-
-    Raises:
-        ParameterError: a word is not name=value, or a name appears twice.
-    """
+    """Reads the words "arm.l1=0.3", "gain=1,0.5", "inertia_shaping=true", "dt=0.1ms"."""
     out: dict[str, Any] = {}
     for word in words:
         name, equals, value = word.partition("=")

@@ -21,14 +21,7 @@ VALUES = {("render", "implicit"): "physical"}
 
 
 def with_present_names(data: Any) -> Any:
-    """Renames the keys of plain data to the present names, in nested tables and dotted names.
-
-    Args:
-        data: contents of a file.
-
-    Raises:
-        ParameterError: a table has both the old and the present name of a field.
-    """
+    """Renames the keys of plain data to the present names, in nested tables and dotted names."""
     if isinstance(data, list):
         return [with_present_names(x) for x in data]
     if not isinstance(data, Mapping):

@@ -368,11 +368,7 @@ class Parameter(NamedTuple):
 
 @functools.cache
 def parameters(kind: type[Experiment]) -> dict[str, Parameter]:
-    """Parameters of an experiment by name; `operator` is a bool, true for the arm of the paper.
-
-    Args:
-        kind: the experiment.
-    """
+    """Parameters of an experiment by name; `operator` is a bool, true for the arm of the paper."""
     types, told, out = field_types(kind), field_descriptions(kind), {}
     for name, given in inspect.signature(kind).parameters.items():
         hint, bound = types[name]
@@ -435,21 +431,13 @@ def _reaches(field: tuple[Any, Bound | None], value: Any, *names: str) -> bool:
 
 
 def parameter_names(kind: type[Experiment] | None) -> list[str]:
-    """Names of all that can be set of an experiment: its parameters, and fields of the scenario.
-
-    Args:
-        kind: the experiment; None for a scenario alone.
-    """
+    """Names of all that can be set of an experiment: its parameters, and fields of the scenario."""
     own = parameters(kind) if kind else {}
     return list(dict.fromkeys([*own, *dotted_names(Scenario)]))
 
 
 def parameter_fields(kind: type[Experiment]) -> list[Field]:
-    """The parameters of an experiment as fields.
-
-    Args:
-        kind: the experiment.
-    """
+    """The parameters of an experiment as fields."""
     bounds = {name: bound or Bound() for name, (_, bound) in field_types(kind).items()}
     return [
         Field(name, p.kind, bounds.get(name, Bound()), p.default, p.about)
@@ -458,11 +446,7 @@ def parameter_fields(kind: type[Experiment]) -> list[Field]:
 
 
 def parameter_unit(name: str) -> str:
-    """Unit of a parameter of any experiment, or of a field of a scenario; "" for none.
-
-    Args:
-        name: the parameter, or the dotted name.
-    """
+    """Unit of a parameter of any experiment, or of a field of a scenario; "" for none."""
     return field_unit(name, *EXPERIMENTS.values(), Scenario)
 
 
@@ -470,11 +454,7 @@ P = ParamSpec("P")
 
 
 def scenario_factory(kind: Callable[P, Experiment]) -> Callable[P, Scenario]:
-    """A function with the parameters of an experiment that returns its scenario.
-
-    Args:
-        kind: the experiment.
-    """
+    """A function with the parameters of an experiment that returns its scenario."""
     assert isinstance(kind, type)
     name = re.sub(r"(?<=.)(?=[A-Z])", "_", kind.__name__).lower()
     refused = "a value is out of its bounds, or the path out of reach."

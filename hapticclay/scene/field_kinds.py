@@ -20,11 +20,7 @@ ENTIRE = None  # key of the value of a whole field, besides those of its entries
 
 
 def terms_field(kind: type) -> str:
-    """The field of a class that only needs a tuple of parts, such as a sum; "" for other classes.
-
-    Args:
-        kind: the class.
-    """
+    """The field of a class that only needs a tuple of parts, such as a sum; "" for other classes."""
     hints = {name: hint for name, (hint, _) in field_types(kind).items()}
     name, hint = next(iter(hints.items()), ("", None))
     row = get_origin(hint) is tuple and get_args(hint)[1:] == (...,) and part_classes(hint)
@@ -33,20 +29,12 @@ def terms_field(kind: type) -> str:
 
 
 def union_members(hint: Any) -> tuple[Any, ...]:
-    """Members of a union; for another type, a tuple of the type itself.
-
-    Args:
-        hint: the type.
-    """
+    """Members of a union; for another type, a tuple of the type itself."""
     return get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
 
 
 def is_pair(hint: Any) -> bool:
-    """Whether a type is a pair of parts, one per axis.
-
-    Args:
-        hint: the type.
-    """
+    """Whether a type is a pair of parts, one per axis."""
     items = get_args(hint)
     return (
         get_origin(hint) is tuple
@@ -57,11 +45,7 @@ def is_pair(hint: Any) -> bool:
 
 
 def part_classes(hint: Any) -> dict[str, type]:
-    """Classes of parts that a type accepts, single or in a tuple, by lower-case name.
-
-    Args:
-        hint: the type; its subclasses count.
-    """
+    """Classes of parts that a type accepts, single or in a tuple, by lower-case name."""
     out: dict[str, type] = {}
     for member in union_members(hint):
         items = get_args(member) if get_origin(member) is tuple else (member,)
@@ -83,12 +67,7 @@ def _family(kind: type) -> Iterator[type]:
 
 
 def usual_class(hint: Any, classes: Mapping[str, type]) -> type | None:
-    """The class of a part without a kind; None if the kind is required.
-
-    Args:
-        hint: the type of the field.
-        classes: classes that it accepts, from `part_classes`.
-    """
+    """The class of a part without a kind; None if the kind is required."""
     if len(classes) == 1:
         return next(iter(classes.values()))
     own = [m for m in union_members(hint) if m in classes.values()]
@@ -96,13 +75,7 @@ def usual_class(hint: Any, classes: Mapping[str, type]) -> type | None:
 
 
 def entry_names(kind: Any, bound: Bound, old: Any = UNSET) -> dict[str, int]:
-    """Names of the numbers of a tuple, and their places.
-
-    Args:
-        kind: the type of the tuple.
-        bound: its bound, which holds the names.
-        old: the tuple itself, if its length is not fixed.
-    """
+    """Names of the numbers of a tuple, and their places."""
     if get_args(kind)[1:] == (...,):
         return {str(i): i for i in range(len(old) if isinstance(old, tuple | list) else 0)}
     out = {name: i for i, name in enumerate(bound.names)}
@@ -112,23 +85,12 @@ def entry_names(kind: Any, bound: Bound, old: Any = UNSET) -> dict[str, int]:
 
 
 def join_names(path: str, name: object) -> str:
-    """A dotted name.
-
-    Args:
-        path: the part, "" for the outermost.
-        name: of its field.
-    """
+    """A dotted name."""
     return f"{path}.{name}" if path else str(name)
 
 
 def no_field(name: str, value: Any, known: Sequence[str]) -> ParameterError:
-    """The error for an unknown field; it suggests the nearest one.
-
-    Args:
-        name: dotted name that was given.
-        value: its value.
-        known: dotted names that exist.
-    """
+    """The error for an unknown field; it suggests the nearest one."""
     if not known:
         whole = name.rpartition(".")[0]
         bound = f"{whole} is not given: give it as a whole, in a file as [[{whole}]]"
@@ -151,12 +113,7 @@ def no_field(name: str, value: Any, known: Sequence[str]) -> ParameterError:
 
 
 def default_of(kind: type, name: str) -> Any:
-    """The default of a field; UNSET if it has none.
-
-    Args:
-        kind: the class.
-        name: the field.
-    """
+    """The default of a field; UNSET if it has none."""
     return _defaults(kind)[name]
 
 

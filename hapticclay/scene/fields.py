@@ -49,13 +49,7 @@ class Field(NamedTuple):
 
 
 def fields_of(kind: type, path: str = "", part: Any = UNSET) -> tuple[Field, ...]:
-    """The fields of a class that accept numbers or words, including those of nested parts.
-
-    Args:
-        kind: the class.
-        path: dotted name of the part.
-        part: the part whose values are the defaults.
-    """
+    """The fields of a class that accept numbers or words, including those of nested parts."""
     out: list[Field] = []
     about = field_descriptions(kind)
     for name, (hint, bound) in field_types(kind).items():
@@ -88,25 +82,14 @@ def _fields_at(hint: Any, bound: Bound, path: str, default: Any, about: str) -> 
 
 
 def dotted_names(kind: type, path: str = "") -> list[str]:
-    """Names of all fields of a class, in the order of `fields_of`, then of parts without fields.
-
-    Args:
-        kind: the class.
-        path: dotted name of the part.
-    """
+    """Names of all fields of a class, in the order of `fields_of`, then of parts without fields."""
     names = [f.name for f in fields_of(kind, path)]
     heads = {n[len(path) + 1 if path else 0 :].partition(".")[0] for n in names}
     return names + [join_names(path, n) for n in field_types(kind) if n not in heads]
 
 
 def bounds_at(hint: Any, bound: Bound | None, names: Sequence[str]) -> list[Bound]:
-    """Bounds of the value at a dotted name below a field; empty if there is none.
-
-    Args:
-        hint: type of the field.
-        bound: its bound.
-        names: parts of the name below the field.
-    """
+    """Bounds of the value at a dotted name below a field; empty if there is none."""
     if not names:
         return [bound or Bound()]
     first, rest, out = names[0], names[1:], []
@@ -129,12 +112,7 @@ def bounds_at(hint: Any, bound: Bound | None, names: Sequence[str]) -> list[Boun
 
 
 def field_unit(name: str, *kinds: type) -> str:
-    """Unit of a number by its dotted name, in the first class that has one there; "" for none.
-
-    Args:
-        name: the dotted name.
-        *kinds: classes to look into.
-    """
+    """Unit of a number by its dotted name, in the first class that has one there; "" for none."""
     head, *rest = name.split(".")
     for kind in kinds:
         if head in field_types(kind):
@@ -148,14 +126,7 @@ def field_unit(name: str, *kinds: type) -> str:
 def function_of(
     kind: Callable[P, T], name: str, answer: Callable[[T], R], refused: str
 ) -> Callable[P, R]:
-    """Makes a function with the fields of a dataclass as arguments, and its description.
-
-    Args:
-        kind: the dataclass.
-        name: name of the function, in the module of `answer`.
-        answer: computes the result from an instance; its return annotation is the function's.
-        refused: why the function raises ParameterError.
-    """
+    """Makes a function with the fields of a dataclass as arguments, and its description."""
     assert isinstance(kind, type)
     signature, told = inspect.signature(kind), field_descriptions(kind)
 
@@ -176,11 +147,7 @@ def function_of(
 
 
 def field_descriptions(kind: type) -> dict[str, str]:
-    """Descriptions of fields from the docstrings of a dataclass and its bases, one line each.
-
-    Args:
-        kind: the class.
-    """
+    """Descriptions of fields from the docstrings of a dataclass and its bases, one line each."""
     out: dict[str, str] = {}
     for base in reversed(kind.__mro__):
         _, _, section = inspect.cleandoc(base.__doc__ or "").partition("Attributes:\n")

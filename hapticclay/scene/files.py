@@ -18,23 +18,12 @@ SCENARIO_FILES = (".toml", ".json")
 
 
 def is_scenario_file(word: str) -> bool:
-    """Whether a word names a scenario file.
-
-    Args:
-        word: the word.
-    """
+    """Whether a word names a scenario file."""
     return Path(word).suffix.lower() in SCENARIO_FILES
 
 
 def read_settings(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Reads a scenario file as plain data; a scenario without a name gets that of the file.
-
-    Args:
-        path: the file, .toml or .json.
-
-    Raises:
-        ParameterError: the file cannot be read, or is neither TOML nor JSON.
-    """
+    """Reads a scenario file as plain data; a scenario without a name gets that of the file."""
     file = Path(path)
     kind = _file_kind(file)
     try:
@@ -72,20 +61,7 @@ def _file_kind(file: Path, name: str = "scenario") -> str:
 def write_part(
     path: str | os.PathLike[str], head: Mapping[str, Any], part: Any, name: str = "scenario"
 ) -> Path:
-    """Writes the fields of a part that differ from the defaults, whole or not at all.
-
-    Args:
-        path: the file, .toml or .json.
-        head: values before those of the part.
-        part: the part.
-        name: the field to name in an error.
-
-    Returns:
-        The file.
-
-    Raises:
-        ParameterError: the file cannot be written, or the part holds something other than data.
-    """
+    """Writes the fields of a part that differ from the defaults, whole or not at all."""
     file, units = Path(path), {}
     kind = _file_kind(file, name)
     data = {**head, **plain_data(part, False, units)}
@@ -100,12 +76,7 @@ def write_part(
 
 
 def toml_text(data: Mapping[str, Any], units: Mapping[str, str] = {}) -> str:
-    """Plain data as TOML, the unit of a number behind it; "none" stands for None.
-
-    Args:
-        data: the data.
-        units: units by dotted name.
-    """
+    """Plain data as TOML, the unit of a number behind it; "none" stands for None."""
     return "\n".join(_toml_table(data, units)).strip("\n") + "\n"
 
 

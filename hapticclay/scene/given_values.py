@@ -30,17 +30,7 @@ T = TypeVar("T")
 def make_part(
     kind: type[T], data: Mapping[Any, Any], start: Mapping[str, Any] = {}, path: str = ""
 ) -> T:
-    """Makes a part from plain data.
-
-    Args:
-        kind: its class.
-        data: values by name; may be nested.
-        start: values of fields omitted in data; fields omitted here have their defaults.
-        path: dotted name of the part, for errors.
-
-    Raises:
-        ParameterError: a field is unknown, missing, or was refused.
-    """
+    """Makes a part from plain data."""
     values = merged_values(kind, data, start, path)
     lacking = [n for n in field_types(kind) if n not in values and default_of(kind, n) is UNSET]
     if lacking:
@@ -58,17 +48,7 @@ def make_part(
 def merged_values(
     kind: type, data: Mapping[Any, Any], start: Mapping[str, Any], path: str = ""
 ) -> dict[str, Any]:
-    """Applies plain data to the values of the fields of a part; returns arguments of its class.
-
-    Args:
-        kind: its class.
-        data: the changes.
-        start: the values before; defaults if omitted.
-        path: dotted name of the part, for errors.
-
-    Raises:
-        ParameterError: a field is unknown, or was refused.
-    """
+    """Applies plain data to the values of the fields of a part; returns arguments of its class."""
     types, out = field_types(kind), dict(start)
     for name, value in data.items():
         if name not in types:
@@ -80,11 +60,7 @@ def merged_values(
 
 
 def values_of(part: Any) -> dict[str, Any]:
-    """Fields of a part by name.
-
-    Args:
-        part: the part.
-    """
+    """Fields of a part by name."""
     return {name: getattr(part, name) for name in field_types(type(part))}
 
 
@@ -188,12 +164,7 @@ def _taken_pair(pair: Any, alone: list[Any], value: Any, path: str, old: Any) ->
 
 
 def laid_over(below: Any, above: Any) -> Any:
-    """Overrides plain data by other plain data.
-
-    Args:
-        below: data to override; a dictionary.
-        above: data that override.
-    """
+    """Overrides plain data by other plain data."""
     if not isinstance(above, Mapping) or not isinstance(below, Mapping):
         return above
     return {**below, **{k: laid_over(below.get(k), v) for k, v in above.items()}}

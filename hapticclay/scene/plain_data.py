@@ -35,18 +35,7 @@ def plain_data(
     units: dict[str, str] | None = None,
     left_out: list[str] | None = None,
 ) -> dict[str, Any]:
-    """Converts a part to plain data, from which `make_part` restores it.
-
-    Args:
-        part: the part.
-        full: whether to include fields with default values.
-        units: receives the unit of each field by dotted name; None for none.
-        left_out: receives the names of fields that are not data, such as functions; they are
-            written as None.
-
-    Raises:
-        ParameterError: the part holds something other than data, and left_out is None.
-    """
+    """Converts a part to plain data, from which `make_part` restores it."""
     return _as_data(part, UNSET if full else None, "", {} if units is None else units, left_out)
 
 

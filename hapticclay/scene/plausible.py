@@ -22,11 +22,7 @@ HAND_MOST = {"mass": (30.0, "kg"), "damper": (500.0, "N.s/m"), "spring": (1e4, "
 
 
 def warn_of(scenario: Scenario) -> None:
-    """Issues a `Warning` for each implausible value of a scenario, at the user's line.
-
-    Args:
-        scenario: the scenario to run.
-    """
+    """Issues a `Warning` for each implausible value of a scenario, at the user's line."""
     for text in implausible(scenario):
         warnings.warn(text, Warning, stacklevel=_users_level())
 
@@ -40,11 +36,7 @@ def _users_level() -> int:
 
 
 def implausible(scenario: Scenario) -> Iterator[str]:
-    """Field, value and plausible range of each implausible value.
-
-    Args:
-        scenario: the scenario.
-    """
+    """Field, value and plausible range of each implausible value."""
     hands, given = scenario.operators, scenario.operator
     for i, axis in enumerate(AXES if isinstance(given, tuple) else AXES[:1]):
         field = f"operator.{axis}" if isinstance(given, tuple) else "operator"

@@ -332,11 +332,7 @@ class Scenario:
 
 
 def choose_step(part: Any) -> None:
-    """Makes a dt that was not given a whole part of Ts; `is` recognises the default.
-
-    Args:
-        part: a scenario, or an experiment, before its fields are checked.
-    """
+    """Makes a dt that was not given a whole part of Ts; `is` recognises the default."""
     if not isinstance(part.control, str) or part.control != "sampled" or part.dt is not TS:
         return
     Ts = quantity("Ts", part.Ts, "s") if isinstance(part.Ts, str) else part.Ts

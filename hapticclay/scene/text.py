@@ -13,11 +13,7 @@ if TYPE_CHECKING:
 
 
 def scenario_rows(scenario: Any) -> list[tuple[str, str]]:
-    """Names and values, with units, that characterise a scenario.
-
-    Args:
-        scenario: the scenario.
-    """
+    """Names and values, with units, that characterise a scenario."""
     s = scenario
     rows = [("K", f"{_pair(s.gain)} 1/kg")]
     if s.controller is not None:
@@ -46,11 +42,7 @@ def scenario_rows(scenario: Any) -> list[tuple[str, str]]:
 
 
 def clay_text(clay: Clay | None) -> str:
-    """Resistance of clay, with the ranges of its quantities.
-
-    Args:
-        clay: the clay; None for none.
-    """
+    """Resistance of clay, with the ranges of its quantities."""
     return "none" if clay is None else ", ".join(x.text() for x in clay.words)
 
 

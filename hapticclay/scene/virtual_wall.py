@@ -197,19 +197,7 @@ class VirtualWall:
 
 
 def wall_law(t, q, qd, fh, state, params):
-    """Law of a virtual wall for a `Controller`: torque of joint 1, which moves the handle in x.
-
-    Args:
-        t: time [s].
-        q: joint angles as measured [rad].
-        qd: joint rates as measured [rad/s].
-        fh: hand force as measured, (x, y) [N]; not used.
-        state: velocity at the last sample [m/s], and 1.0 if there was one.
-        params: K [N/m], B [N.s/m], M [kg], lever of joint 1 [m], Ts [s], 1.0 for a surface.
-
-    Returns:
-        Torques of shoulder and elbow [N.m]; the next state.
-    """
+    """Law of a virtual wall for a `Controller`: torque of joint 1, which moves the handle in x."""
     K, B, M, lever, Ts, surface = params
     x, v = lever * (UPRIGHT - q[0]), -lever * qd[0]
     f = K * x + B * v + M * state[1] * (v - state[0]) / Ts

@@ -59,17 +59,7 @@ METHODS = {
 
 
 def parse_error(error: object) -> tuple[float, str]:
-    """Parses a requested error.
-
-    Args:
-        error: seconds, or a text of a number and a unit of time or length: "100 ns", "0.1 um".
-
-    Returns:
-        The number, and its unit, "s" or "m".
-
-    Raises:
-        ParameterError: no such number or unit, or an error too small beside rounding.
-    """
+    """Parses a requested error."""
     if not isinstance(error, str):
         return number("error", error, ROUNDING, 1.0, unit="s"), "s"
     for unit in UNITS:
@@ -91,24 +81,7 @@ def simulate_within(
     progress: Callable[[float, float], bool | None] | None = None,
     engine: str = "auto",
 ) -> Record:
-    """Runs a scenario with the integrator and the step that keep a requested error.
-
-    Args:
-        scenario: what to run; its integrator and dt are replaced. Sampled control keeps Ts (or dt
-            where Ts is None), and steps divide it.
-        error: as in parse_error.
-        every: keep each every-th sample, and the last.
-        progress: as in simulate; each run starts at 0 s.
-        engine: as in simulate.
-
-    Returns:
-        The record with Record.error. For an error in s it is that of the finest run. For an error
-        in m it is that of a run at four times this step, where positions are compared, if that run
-        keeps the error.
-
-    Raises:
-        ParameterError: as simulate; or an error in seconds in a scene without a border.
-    """
+    """Runs a scenario with the integrator and the step that keep a requested error."""
     asked, unit = parse_error(error)
     if unit == "s" and not _has_border(scenario):
         bound = "must be in m, as in '1e-6 m': this scene has no border whose crossing has a time"
@@ -172,19 +145,7 @@ def _finer(dt: float, found: Comparison, most: float, order: int) -> float:
 
 
 def choices(scenario: Scenario, asked: float, unit: str) -> list[tuple[str, float]]:
-    """Integrators for a requested error, cheapest by METHODS first, and steps of a finest run.
-
-    Args:
-        scenario: what to run; Ts is a number where control is sampled.
-        asked: requested error [unit].
-        unit: "s" or "m".
-
-    Returns:
-        Pairs of "fast" or "accurate" and a step [s]; the last is "fast", which accepts all scenes.
-
-    Raises:
-        ParameterError: Ts is too short to be divided.
-    """
+    """Integrators for a requested error, cheapest by METHODS first, and steps of a finest run."""
     steps = {}
     for name, method in METHODS.items():
         wanted = (MARGIN * asked / method.constants[unit]) ** (1.0 / method.order)
@@ -253,15 +214,7 @@ class Trial:
         self.traces: dict[float, Trace] = {}
 
     def compare(self, dt: float) -> tuple[Record, Comparison]:
-        """Runs at 4 dt, 2 dt and dt, unless done already, and compares.
-
-        Args:
-            dt: step of the finest run [s].
-
-        Returns:
-            The record (of the finest run for an error in s, of the coarsest for one in m) and the
-            comparison; if a run was interrupted, its record.
-        """
+        """Runs at 4 dt, 2 dt and dt, unless done already, and compares."""
         traces: dict[float, Trace] = {}
         kept = dt if self.unit == "s" else RATIO * dt
         record = None
@@ -286,12 +239,7 @@ class Trial:
         return self._thinned(record), compared
 
     def finest(self, dt: float, found: Comparison) -> tuple[Record, Comparison]:
-        """The record of the finest run, in place of the coarsest.
-
-        Args:
-            dt: step of the finest run [s].
-            found: the comparison.
-        """
+        """The record of the finest run, in place of the coarsest."""
         r = self._run(dt, dt)
         if r.outcome.code == "interrupted":
             return r, Comparison(None, None, False, "interrupted", True)

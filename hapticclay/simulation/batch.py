@@ -149,36 +149,17 @@ class BatchPool:
         return completed(scenario, every, "native", self.lane().place, None, brief)
 
     def run(self, scenario: Scenario) -> tuple[Run, float]:
-        """Makes a run.
-
-        Args:
-            scenario: what to run.
-
-        Returns:
-            The run and the seconds it took.
-        """
+        """Makes a run."""
         return self._go(scenario, self.every, False)
 
     def brief(self, scenario: Scenario) -> tuple[Any, ...]:
-        """The end of a run, without its samples.
-
-        Args:
-            scenario: what to run.
-        """
+        """The end of a run, without its samples."""
         return self._go(scenario, LAST_ONLY, True)[0].brief()
 
     def many(
         self, scenarios: Sequence[Scenario], keys: Sequence[Any]
     ) -> tuple[list[tuple[np.ndarray, dict[str, Any]]], list[int]]:
-        """Makes short runs of one kind together, without their samples.
-
-        Args:
-            scenarios: what to run.
-            keys: of each, from `kind_key`.
-
-        Returns:
-            As Lane.make.
-        """
+        """Makes short runs of one kind together, without their samples."""
         if self.stop.is_set():
             raise CancelledError
         return self.lane().make(scenarios, keys)
@@ -191,12 +172,7 @@ class _Records:
         self.found: list[Any] = []
 
     def put(self, first: int, results: Sequence[Any]) -> None:
-        """Stores the results of consecutive runs.
-
-        Args:
-            first: index of the first run.
-            results: of these runs.
-        """
+        """Stores the results of consecutive runs."""
         end = first + len(results)
         self.found += [None] * (end - len(self.found))
         self.found[first:end] = results
@@ -213,12 +189,7 @@ class Summaries:
         self.found, self.n = np.zeros(0, SUMMARY), 0
 
     def put(self, first: int, results: Any) -> None:
-        """Stores the results of consecutive runs.
-
-        Args:
-            first: index of the first run.
-            results: of these runs.
-        """
+        """Stores the results of consecutive runs."""
         end = first + len(results)
         self.n = max(self.n, end)
         if end > len(self.found):
@@ -232,15 +203,7 @@ class Summaries:
 
 
 def checked_scenarios(scenarios: Iterable[Any], seen: set[Any]) -> Iterator[Scenario]:
-    """The scenarios; a `Warning` names implausible values in the first WARNED kinds of scene.
-
-    Args:
-        scenarios: to check.
-        seen: kinds of scene checked so far.
-
-    Raises:
-        ParameterError: one is not a Scenario.
-    """
+    """The scenarios; a `Warning` names implausible values in the first WARNED kinds of scene."""
     for i, s in enumerate(scenarios):
         if not isinstance(s, Scenario):
             raise ParameterError(
@@ -297,13 +260,6 @@ def on_threads(
 
     The calling thread reads the scenarios and stores the results. So a generator runs where it was
     made, Ctrl-C reaches it, and at most two parts per thread are held.
-
-    Args:
-        parts: of the batch.
-        make: results of a part.
-        put: receives the index of the first run of a part, and the results.
-        threads: their number.
-        stop: set when the batch ends early.
     """
     at = 0
     working: dict[Future[Any], int] = {}
@@ -333,18 +289,7 @@ def summary_entry(
     last: Sequence[Any],
     energy: dict[str, float],
 ) -> tuple[Any, ...]:
-    """Entry of a run among summaries.
-
-    Args:
-        o: the outcome.
-        steps: of the engine.
-        crossings: of borders.
-        last: p, v, fh, fe, b at the last good sample, (x, y) each.
-        energy: as Record.energy.
-
-    Returns:
-        The fields of SUMMARY.
-    """
+    """Entry of a run among summaries."""
     first = crossings[:SUMMARY_CROSSINGS]
     rest = SUMMARY_CROSSINGS - len(first)
     return (

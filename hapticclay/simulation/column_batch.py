@@ -99,14 +99,7 @@ class Columns:
         return self.n
 
     def scenario(self, k: int) -> Scenario:
-        """One of the scenarios.
-
-        Args:
-            k: its row.
-
-        Raises:
-            ParameterError: the scenario was refused.
-        """
+        """One of the scenarios."""
         try:
             return with_fields(self.base, {n: float(x[k]) for n, x in self.columns.items()})
         except ParameterError as error:
@@ -117,12 +110,7 @@ class Columns:
         return map(self.scenario, range(self.n))
 
     def draws(self, first: int, end: int) -> Draws:
-        """Differences between the scenarios of some rows.
-
-        Args:
-            first: the first row.
-            end: the row after the last.
-        """
+        """Differences between the scenarios of some rows."""
         n, one = end - first, draws_of([self.like])
         values = one.values and [np.repeat(x, n, axis=0) for x in one.values]
         hands = None if one.hands is None else np.repeat(one.hands, n, axis=0)
@@ -140,11 +128,7 @@ class Columns:
         )  # fmt: skip
 
     def of_kind(self, d: Draws) -> np.ndarray:
-        """Which draws are of the kind of the first: equally delayed, with equally stiff clay.
-
-        Args:
-            d: the draws.
-        """
+        """Which draws are of the kind of the first: equally delayed, with equally stiff clay."""
         one, good = draws_of([self.like]), np.ones(len(d.gain), bool)
         if len(d.delays):
             good &= (d.delays > 0.0) == (one.delays[0] > 0.0)
@@ -161,12 +145,7 @@ class Columns:
 
 
 def places_of(name: str, base: Scenario) -> list[Place]:
-    """Where draws hold a field: names and indices; none for a field that needs a scenario.
-
-    Args:
-        name: dotted name of the field.
-        base: a scenario that has it.
-    """
+    """Where draws hold a field: names and indices; none for a field that needs a scenario."""
     head, *rest = name.split(".")
     axes = (0, 1)
     if rest and rest[0] in AXES:
@@ -218,11 +197,7 @@ class _Lanes:
         self.drawn, self.pool = drawn, batch.BatchPool(1)
 
     def run(self, threads: int) -> np.ndarray:
-        """Makes all runs.
-
-        Returns:
-            Their summaries.
-        """
+        """Makes all runs."""
         like, n = self.drawn.like, len(self.drawn)
         size = max(FEWEST, min(int(PART * like.dt / like.t_max), MOST))
         parts = (range(k, min(k + size, n)) for k in range(0, n, size))

@@ -13,15 +13,7 @@ _told = False
 
 
 def engine_for(engine: str, steps: float = 0.0) -> str:
-    """Who makes the steps, "python" or "native".
-
-    Args:
-        engine: as a user gives it; "auto" takes the compiled kernel where it is there.
-        steps: number of steps that are asked for; many in Python are worth a line on stderr.
-
-    Raises:
-        ParameterError: "native" where there is no compiled kernel.
-    """
+    """Who makes the steps, "python" or "native"."""
     engine = choice("engine", engine, ENGINES)
     if engine == "python":
         return engine
@@ -36,11 +28,7 @@ def engine_for(engine: str, steps: float = 0.0) -> str:
 
 
 def remedy(why: str) -> str:
-    """What gets the compiled kernel.
-
-    Args:
-        why: there is none, as `native.why_not` says it.
-    """
+    """What gets the compiled kernel."""
     root = native.PACKAGE.parent
     again = f"pip install -e {root}" if (root / "setup.py").is_file() else "pip install . again"
     lacks = "compiler" in why or "Python.h" in why
@@ -54,11 +42,7 @@ def made_by() -> str:
 
 
 def tell(why: str) -> None:
-    """Says once that runs are slow, why, and what helps.
-
-    Args:
-        why: there is no compiled kernel.
-    """
+    """Says once that runs are slow, why, and what helps."""
     global _told
     if not _told:
         _told = True

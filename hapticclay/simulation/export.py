@@ -24,20 +24,7 @@ ROWS = 4096  # lines of a text file that are written at once
 
 
 def export_record(record: Recorded, path: str | os.PathLike[str], kind: str | None = None) -> Path:
-    """Writes a record in a format of EXPORTS, whole or not at all; an older file is replaced.
-
-    Args:
-        record: the record.
-        path: the file.
-        kind: a name in EXPORTS; None takes it from the ending of the file's name.
-
-    Returns:
-        The file.
-
-    Raises:
-        ParameterError: there is no such format, a package for it is not installed, the record does
-            not fit into it, or the file cannot be written.
-    """
+    """Writes a record in a format of EXPORTS, whole or not at all; an older file is replaced."""
     file = Path(path)
     if kind is None:
         kind = file.suffix[1:].lower()

@@ -38,9 +38,6 @@ def kind_key(s: Scenario) -> tuple[Any, ...] | None:
 
     Runs of one kind differ in numbers: gain, force, operator, servo, start, velocity, origin, clay
     and delay.
-
-    Args:
-        s: the scenario.
     """
     clay, wires, hand = s.clay, s.hardware, s.operator
     if (
@@ -72,11 +69,7 @@ def kind_key(s: Scenario) -> tuple[Any, ...] | None:
 
 
 def is_plain(law: Any) -> bool:
-    """Whether the clay of an axis damps only, as a function of one coordinate.
-
-    Args:
-        law: of the axis.
-    """
+    """Whether the clay of an axis damps only, as a function of one coordinate."""
     return type(law) is Profile and not (law.growth or law.Fy or law.K or law.springs)
 
 
@@ -94,11 +87,7 @@ class Pattern:
         self.is_made = not self.row.m.formed
 
     def models(self, d: Draws) -> tuple[np.ndarray, list[np.ndarray]]:
-        """The models of runs, and the arrays that they name.
-
-        Args:
-            d: their differences.
-        """
+        """The models of runs, and the arrays that they name."""
         out, kept = np.repeat(self.row.models, len(d.gain)), []
         out["ox"], out["oy"] = d.origin.T
         axis = out["axis"]
@@ -186,11 +175,7 @@ class Draws(NamedTuple):
 
 
 def draws_of(jobs: Sequence[Scenario]) -> Draws:
-    """Differences between scenarios of one kind.
-
-    Args:
-        jobs: the scenarios.
-    """
+    """Differences between scenarios of one kind."""
     first, hands, values = jobs[0], None, None
     if any(first.operators):
         hands = np.array([[_hand_parts(th or NO_HAND) for th in s.operators] for s in jobs])
@@ -221,12 +206,7 @@ class Lane:
         self.place, self.known = place, dict[Any, Pattern]()
 
     def pattern(self, key: Any, scenario: Scenario) -> Pattern:
-        """The pattern of a kind.
-
-        Args:
-            key: from `kind_key`.
-            scenario: a run of the kind.
-        """
+        """The pattern of a kind."""
         if key not in self.known:
             if len(self.known) >= PATTERNS:
                 del self.known[next(iter(self.known))]
@@ -236,15 +216,7 @@ class Lane:
     def make(
         self, jobs: Sequence[Scenario], keys: Sequence[Any]
     ) -> tuple[list[tuple[np.ndarray, dict[str, Any]]], list[int]]:
-        """Makes those runs that it can.
-
-        Args:
-            jobs: scenarios.
-            keys: of each, from `kind_key`.
-
-        Returns:
-            Indices of runs with fields of their summaries, for each kind; indices of the rest.
-        """
+        """Makes those runs that it can."""
         kinds: dict[Any, list[int]] = {}
         for i, key in enumerate(keys):
             kinds.setdefault(key, []).append(i)
@@ -260,15 +232,7 @@ class Lane:
         return done, sorted(left)
 
     def group(self, p: Pattern, d: Draws) -> tuple[dict[str, Any], np.ndarray]:
-        """Makes runs of one kind.
-
-        Args:
-            p: its pattern.
-            d: the differences of the runs.
-
-        Returns:
-            Fields of the summaries of the good ones; which are good, shape (n,).
-        """
+        """Makes runs of one kind."""
         models, kept = p.models(d)
         n = len(models)
         states: Any = np.zeros(n, layout.dtype_of(records.State))
@@ -283,14 +247,7 @@ class Lane:
 
 
 def summary_columns(like: Scenario, m: Any, states: np.ndarray, outs: np.ndarray) -> dict[str, Any]:
-    """The fields of summaries, arrays over runs.
-
-    Args:
-        like: a run of their kind.
-        m: its model.
-        states: at their ends.
-        outs: their summaries.
-    """
+    """The fields of summaries, arrays over runs."""
     seen, moved, unbound, _ = states["watch"]["seen"].T
     saturated, stalled = monitor.at_rest(seen, moved, unbound, like.dt)
     ends = np.where(saturated, "saturated", np.where(stalled, "stalled", "time limit"))

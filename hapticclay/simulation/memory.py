@@ -14,11 +14,7 @@ GROUPS = (  # limit and use of a control group (of containers), version 2 and ve
 
 
 def memory_left(root: Path = Path("/")) -> float:
-    """Bytes that this process may still use, by machine, container and ulimit; inf if unknown.
-
-    Args:
-        root: root of the file system.
-    """
+    """Bytes that this process may still use, by machine, container and ulimit; inf if unknown."""
     return min(
         _machine(root),
         *(_group(root / most, root / taken) for most, taken in GROUPS),

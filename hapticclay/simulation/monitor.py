@@ -67,15 +67,7 @@ class StabilityMonitor:
         self._limits = PoseLimits(scenario)
 
     def look(self, rows: np.ndarray, first: int) -> tuple[int, Outcome | None]:
-        """Judges the next rows.
-
-        Args:
-            rows: (q, p, v, fh, tau, delta), shape (12, n).
-            first: index of the first row.
-
-        Returns:
-            (number of good rows, outcome that ends the run there or None).
-        """
+        """Judges the next rows."""
         dt = self.scenario.dt
         v, q2 = rows[4:6], rows[1]
         good = rows.shape[1]
@@ -122,14 +114,7 @@ class StabilityMonitor:
         )
 
     def end(self, outcome: Outcome) -> Outcome:
-        """The final outcome of a run, after all its rows.
-
-        Args:
-            outcome: how the run came to its end.
-
-        Returns:
-            The outcome, with code, cause and advice from the whole run.
-        """
+        """The final outcome of a run, after all its rows."""
         s = self.scenario
         if outcome.code == "interrupted":
             since = self.onset
@@ -309,17 +294,7 @@ class RangeMonitor(StabilityMonitor):
 
 
 def at_rest(seen: Any, moved: Any, unbound: Any, dt: float) -> tuple[Any, Any]:
-    """How a handle rests at the time limit, if it does. Numbers, or arrays over runs.
-
-    Args:
-        seen: samples.
-        moved: last sample with the handle faster than STILL.
-        unbound: last sample with no motor at its limit.
-        dt: length of a sample [s].
-
-    Returns:
-        Whether motors stay at their limits; whether the handle has been still for long.
-    """
+    """How a handle rests at the time limit, if it does. Numbers, or arrays over runs."""
     recent = np.maximum(1, np.minimum(seen, round(WHILE / dt)))
     return seen - 1 - unbound >= recent, seen - 1 - moved >= recent
 

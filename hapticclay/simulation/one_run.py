@@ -23,17 +23,7 @@ def run_once(
     engine: str,
     progress: Callable[[float, float], bool | None] | None = None,
 ) -> Record:
-    """Runs a scenario to its end, with its own integrator and dt.
-
-    Args:
-        scenario: what to run.
-        every: keep each every-th sample, and the last.
-        engine: a name in ENGINES.
-        progress: as in `simulate`.
-
-    Raises:
-        ParameterError: as in `simulate`.
-    """
+    """Runs a scenario to its end, with its own integrator and dt."""
     check_memory(scenario, every)
     if scenario.controller is not None:
         scenario.controller.function()  # refused before a run is made
@@ -43,15 +33,7 @@ def run_once(
 
 
 def check_memory(scenario: Scenario, every: int) -> None:
-    """Refuses a run whose record would not fit into memory if it lasted for t_max.
-
-    Args:
-        scenario: what to run.
-        every: the run keeps each every-th sample.
-
-    Raises:
-        ParameterError: the record would not fit.
-    """
+    """Refuses a run whose record would not fit into memory if it lasted for t_max."""
     steps = scenario.t_max / scenario.dt
     samples = math.floor(steps / every) + 2
     if SAMPLE * samples < SMALL_MEMORY or SAMPLE * samples < (room := memory_left()):

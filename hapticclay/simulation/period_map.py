@@ -53,16 +53,7 @@ class PeriodMaps:
         self.coupled: set[Any] = set()  # kinds of scene in which one axis has acted on the other
 
     def of(self, s: Scenario, i: int) -> PeriodMap | None:
-        """The map of a scene around its start, at rest.
-
-        Args:
-            s: the scene; its velocity and force count as 0.
-            i: axis along which small motions are asked for.
-
-        Returns:
-            None for a scene that has none: see `has_map`, and where the handle does not stay at
-            rest or the map is not linear.
-        """
+        """The map of a scene around its start, at rest."""
         end = (MOST + SETTLED) * (s.Ts or s.dt)  # longer than any map takes
         s = with_checked(s, velocity=(0.0, 0.0), force=(0.0, 0.0), t_max=end, length=None)
         row = ROWS[engine_for("auto")](s, self.movers.of(s), self.buffers)
@@ -81,12 +72,7 @@ class PeriodMaps:
 
 
 def has_map(s: Scenario, m: Any) -> bool:
-    """Whether small motions of a scene are linear, and alike in each period.
-
-    Args:
-        s: the scene.
-        m: its model.
-    """
+    """Whether small motions of a scene are linear, and alike in each period."""
     uneven = m.grows, m.smooth, m.flow, m.modal, m.groove, m.laws
     wires = m.encoder, m.chance, m.adc_bits, m.dac_bits, m.friction, m.guard
     return not (
@@ -95,11 +81,7 @@ def has_map(s: Scenario, m: Any) -> bool:
 
 
 def warm_periods(m: Any) -> int:
-    """Periods after which the rings of the hardware are full.
-
-    Args:
-        m: the model of a scene.
-    """
+    """Periods after which the rings of the hardware are full."""
     late = delay_in_samples(m.delay, m.Ts)[0] if m.delay > 0.0 else -1
     return max(SETTLED, m.window, late + 1) if m.ratio else SETTLED
 
@@ -108,11 +90,7 @@ def warm_periods(m: Any) -> int:
 
 
 def number_of(*names: Any) -> int:
-    """Index of a number of a state.
-
-    Args:
-        names: fields and indices that lead to it.
-    """
+    """Index of a number of a state."""
     kind, at = layout.dtype_of(records.State), 0
     for name in names:
         if isinstance(name, int):
@@ -143,13 +121,7 @@ class Ring(NamedTuple):
     columns: tuple[tuple[int, ...], tuple[int, ...]]
 
     def places(self, machine: Any, size: int, i: int) -> np.ndarray:
-        """Where the coordinates of an axis lie.
-
-        Args:
-            machine: of a state.
-            size: of the ring.
-            i: index of the axis.
-        """
+        """Where the coordinates of an axis lie."""
         if not self.first:
             return np.array(self.columns[i], int)
         rows = size // self.width
@@ -163,10 +135,6 @@ def coordinates(m: Any, i: int) -> list[int]:
 
     Link i moves the handle along axis i at the nominal pose. Angle and rate of its joint come
     first.
-
-    Args:
-        m: a model.
-        i: index of the axis.
     """
     joint = [number_of("q2" if i else "q1"), number_of("w2" if i else "w1")]
     names = ["owed"] if m.special and m.acts else []
@@ -188,11 +156,7 @@ def coordinates(m: Any, i: int) -> list[int]:
 
 
 def rings_of(m: Any) -> list[Ring]:
-    """The rings of the hardware, and the state of the user's own controller.
-
-    Args:
-        m: the model of a scene.
-    """
+    """The rings of the hardware, and the state of the user's own controller."""
     found = []
     if m.window:
         found.append(Ring("angles", "oldest", "", 3, ((1,), (2,))))
@@ -220,11 +184,7 @@ class Copies(NamedTuple):
     rings: list[np.ndarray]
 
     def repeated(self, n: int) -> Copies:
-        """Each copy several times.
-
-        Args:
-            n: how often.
-        """
+        """Each copy several times."""
         return Copies(np.repeat(self.states, n), [np.repeat(x, n, axis=0) for x in self.rings])
 
     @property
@@ -251,13 +211,7 @@ class Map:
         self.torques = [number_of("now", "axis", i, "tau") for i in (0, 1)]
 
     def of(self, s: Scenario, i: int, warm: int) -> PeriodMap | None:
-        """The map.
-
-        Args:
-            s: the scene.
-            i: axis of the small motions.
-            warm: periods after which rings are full.
-        """
+        """The map."""
         n, q = self.row.m.ratio or 1, (self.row.s.q1, self.row.s.q2)
         rest = self._at_rest(warm * n)
         if rest is None:
@@ -335,14 +289,7 @@ class Map:
 
 
 def push_of(s: Scenario, q: tuple[float, float], i: int, j: int) -> tuple[float, float]:
-    """Rate of joint j per velocity of the handle along axis i, and the reverse.
-
-    Args:
-        s: the scene.
-        q: joint angles at its start [rad].
-        i: index of the axis.
-        j: index of the joint.
-    """
+    """Rate of joint j per velocity of the handle along axis i, and the reverse."""
     u = arm.jacobian(*q, s.arm.links)
     r1, r2 = arm.joint_velocity(float(i == 0), float(i == 1), u, 1.0)
     # the rate of joint 2 is that of link 2 less that of link 1
@@ -350,23 +297,12 @@ def push_of(s: Scenario, q: tuple[float, float], i: int, j: int) -> tuple[float,
 
 
 def coordinates_at(x: Copies, places: list[np.ndarray]) -> np.ndarray:
-    """Coordinates of copies, shape (copies, n).
-
-    Args:
-        x: the copies.
-        places: where they lie, in each array.
-    """
+    """Coordinates of copies, shape (copies, n)."""
     return np.concatenate([a[:, at] for a, at in zip(x.arrays, places, strict=True)], axis=1)
 
 
 def kick(x: Copies, places: list[list[np.ndarray]], others: list[list[np.ndarray]]) -> None:
-    """Kicks copy j in the j-th of some coordinates, and the last copy in all.
-
-    Args:
-        x: the copies.
-        places: of these coordinates: by axis, in each array.
-        others: of those that are kicked in the last copy alone.
-    """
+    """Kicks copy j in the j-th of some coordinates, and the last copy in all."""
     j = 0
     for axis in places:
         for array, at in zip(x.arrays, axis, strict=True):
@@ -378,11 +314,6 @@ def kick(x: Copies, places: list[list[np.ndarray]], others: list[list[np.ndarray
 
 
 def linear_map(ends: np.ndarray) -> np.ndarray | None:
-    """The map of copies that were kicked, shape (n, n); None where it is not linear.
-
-    Args:
-        ends: coordinates a period later, less those at rest, per kick: of the copies that were
-            kicked in one coordinate, and of the one kicked in all, shape (n + 1, n).
-    """
+    """The map of copies that were kicked, shape (n, n); None where it is not linear."""
     each, missed = ends[:-1], np.abs(ends[:-1].sum(axis=0) - ends[-1])
     return each.T if (missed <= LINEAR * np.abs(each).sum(axis=0) + ROUNDED).all() else None

@@ -512,14 +512,7 @@ def _accuracy(d: dict[str, Any] | None) -> Accuracy | None:
 
 
 def brief(r: Record) -> tuple[Outcome, int, tuple[Crossing, ...], list[Any], dict[str, float]]:
-    """The end of a record, without its samples.
-
-    Args:
-        r: the record.
-
-    Returns:
-        Outcome, steps, crossings, the last (p, v, fh, fe, b), energy.
-    """
+    """The end of a record, without its samples."""
     last = [x[-1] if len(x) else (np.nan, np.nan) for x in (r.p, r.v, r.fh, r.fe, r.b)]
     return r.outcome, r.steps, r.crossings, last, r.energy
 

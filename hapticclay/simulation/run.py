@@ -225,11 +225,7 @@ class Run:
     # ---- steps
 
     def advance(self, room: int = CHUNK - 1) -> None:
-        """Makes steps until rows are filled, or the run is over.
-
-        Args:
-            room: number of rows that may be filled, with those not judged yet.
-        """
+        """Makes steps until rows are filled, or the run is over."""
         if self.recorded and not self.filled and not (self.without_samples and self.looked):
             self._saved = self.row.saved()  # of what has been judged
         self._make(room)
@@ -275,11 +271,7 @@ class Run:
         s.steps = s.crossing = s.stopped = 0
 
     def draw(self, n: int) -> None:
-        """Draws the random effects on the next control samples.
-
-        Args:
-            n: whole steps in which they lie.
-        """
+        """Draws the random effects on the next control samples."""
         m, k = self.row.m, self.row.s.now.k
         if not m.chance:
             return
@@ -294,11 +286,7 @@ class Run:
         self._noise.forget(k)
 
     def take_over(self, controller: Controller) -> None:
-        """Lets the user's own controller act, before the first step of a sampled run.
-
-        Args:
-            controller: of the user.
-        """
+        """Lets the user's own controller act, before the first step of a sampled run."""
         self._controller = controller
         self.row.take(self.scenario, controller)
         self.row.begin(self.scenario)
@@ -321,11 +309,7 @@ class Run:
                 break
 
     def restore(self, saved: Saved) -> None:
-        """Returns to a sample; the record is not changed.
-
-        Args:
-            saved: from `row.saved` there.
-        """
+        """Returns to a sample; the record is not changed."""
         self.row.restore(saved)
         self._shown = None
 
@@ -346,11 +330,7 @@ class Run:
         return Snapshot(self.scenario, saved, self._saved, buffers.rows[:n].copy(), rendered, kept)
 
     def return_to(self, x: Snapshot) -> None:
-        """Returns to a snapshot.
-
-        Args:
-            x: of a run of this scenario, or of one that it was changed from.
-        """
+        """Returns to a snapshot."""
         if x.scenario != self.scenario:
             self.scenario = x.scenario
             self.row.take(x.scenario, self._controller)
@@ -361,21 +341,13 @@ class Run:
             setattr(self, name, value)
 
     def change(self, scenario: Scenario) -> None:
-        """Continues in another scene.
-
-        Args:
-            scenario: with another gain, operator, force or clay between the same borders.
-        """
+        """Continues in another scene."""
         self.scenario = self.watch.scenario = scenario
         self.row.change(scenario, self._controller)
         self._shown = None
 
     def go(self, progress: Callable[[float, float], bool | None] | None) -> None:
-        """Runs to the end, or until sample `pause`.
-
-        Args:
-            progress: as in `simulate`.
-        """
+        """Runs to the end, or until sample `pause`."""
         while self.outcome is None and self.i < self.pause:
             self.advance(int(min(CHUNK - 1, self.pause - self.looked)))
             if self.filled >= CHUNK - 1 or self.outcome:
@@ -384,14 +356,7 @@ class Run:
                 self.flush()
 
     def hop(self, n: int) -> bool:
-        """Makes steps where there is nothing to prepare, nor a check among them.
-
-        Args:
-            n: how many.
-
-        Returns:
-            Whether they are made, or the run is over.
-        """
+        """Makes steps where there is nothing to prepare, nor a check among them."""
         row, s = self.row, self.row.s
         filled = s.row
         if not filled or filled + n >= CHUNK - 1 or self._prepares:
@@ -417,20 +382,12 @@ class Run:
         self.flush()
 
     def change_force(self, force: tuple[float, float]) -> None:
-        """Continues under another constant muscle force.
-
-        Args:
-            force: the force, (x, y) [N].
-        """
+        """Continues under another constant muscle force."""
         self.scenario = with_checked(self.scenario, force=force)
         self.push_evenly((0.0, *self.scenario.steady_force, 0.0, 0.0))
 
     def change_gain(self, gain: tuple[float, float]) -> None:
-        """Continues with another gain.
-
-        Args:
-            gain: K of x and y [1/kg].
-        """
+        """Continues with another gain."""
         changed = with_checked(self.scenario, gain=gain)
         if scene.takes_gain(self.row.m):
             self.scenario = self.watch.scenario = changed
@@ -441,11 +398,7 @@ class Run:
             self.change(changed)
 
     def push_evenly(self, steady: tuple[float, ...]) -> None:
-        """Continues under a muscle force that changes evenly.
-
-        Args:
-            steady: time since which it does [s], force (x, y) [N] then, its rates (x, y) [N/s].
-        """
+        """Continues under a muscle force that changes evenly."""
         m = self.row.m
         m.push_since, x, y, x_rate, y_rate = steady
         m.axis[0].push, m.axis[1].push = x, y
@@ -453,20 +406,12 @@ class Run:
         self._shown = None
 
     def position(self, h: float = 0.0) -> tuple[float, float]:
-        """Handle position after the joints have turned at their present rates, (x, y) [m].
-
-        Args:
-            h: for so long [s].
-        """
+        """Handle position after the joints have turned at their present rates, (x, y) [m]."""
         s = self.row.s
         return arm.place(self.row.m, s.q1 + h * s.w1, s.q2 + h * s.w2)
 
     def finish(self, code: str) -> None:
-        """Ends the run now.
-
-        Args:
-            code: as Outcome.code.
-        """
+        """Ends the run now."""
         self.end_time = self.t
         self._end(monitor.Outcome(code, self.t, self.i))
 
@@ -503,12 +448,7 @@ class Run:
         return list(self._shown)
 
     def torque_reached(self, n: int, k: int) -> list[float]:
-        """As `torque_reached`, in the last rows of those not judged yet.
-
-        Args:
-            n: number of rows, at most.
-            k: how many reach it.
-        """
+        """As `torque_reached`, in the last rows of those not judged yet."""
         end = self.filled
         return torque_reached(self.place.buffers.rows[max(end - n, 0) : end], k).tolist()
 
@@ -567,11 +507,7 @@ class Run:
                 self.last_rendered = self.place.buffers.rendered[good - 1, :2].tolist()
 
     def look(self, made: np.ndarray) -> tuple[int, monitor.Outcome | None]:
-        """Judges the next rows, as StabilityMonitor.look.
-
-        Args:
-            made: rows of the record, shape (n, rows.ROW).
-        """
+        """Judges the next rows, as StabilityMonitor.look."""
         if self.calm:
             if self._still_calm(len(made)):
                 return len(made), None
@@ -592,14 +528,7 @@ class Run:
         return True
 
     def judge(self, made: np.ndarray) -> int:
-        """Adds samples to the record, up to the end of the good part of the run.
-
-        Args:
-            made: rows of the record, shape (n, rows.ROW).
-
-        Returns:
-            Number of samples taken.
-        """
+        """Adds samples to the record, up to the end of the good part of the run."""
         good, found = self.look(made)
         if found is not None:
             self.outcome, self.end_time = found, None
@@ -708,14 +637,6 @@ def balance(work: Sequence[Any], first: Sequence[Any], last: Sequence[Any]) -> d
     """muscle + motors = clay + hand_damper + kinetic + hand_stored + residual [J].
 
     Floats, or arrays over runs.
-
-    Args:
-        work: of muscle, motors, clay and damper of the hand, and sum of the magnitudes [J].
-        first: from `stored`, at the start.
-        last: from `stored`, at the end.
-
-    Returns:
-        Record.energy.
     """
     muscle, motors, clay, damper, through = work
     kinetic, at_hand = last[0] - first[0], last[1] - first[1]
@@ -732,22 +653,12 @@ def balance(work: Sequence[Any], first: Sequence[Any], last: Sequence[Any]) -> d
 
 
 def torque_reached(made: np.ndarray, k: int) -> np.ndarray:
-    """|tau| of shoulder and elbow that at least k rows reach [N.m]; 0 if there are fewer rows.
-
-    Args:
-        made: rows of the record, shape (n, rows.ROW).
-        k: how many, at least 1.
-    """
+    """|tau| of shoulder and elbow that at least k rows reach [N.m]; 0 if there are fewer rows."""
     return np.sort(np.abs(made[:, 8:10]), axis=0)[-k] if len(made) >= k else np.zeros(2)
 
 
 def with_checked(scenario: Scenario, **fields: Any) -> Scenario:
-    """A scenario with other fields, whose values have been checked, as has all else.
-
-    Args:
-        scenario: the scenario.
-        **fields: the fields.
-    """
+    """A scenario with other fields, whose values have been checked, as has all else."""
     made = object.__new__(type(scenario))
     made.__dict__.update(scenario.__dict__, **fields)
     return made
@@ -775,19 +686,7 @@ def completed(
     progress: Callable[[float, float], bool | None] | None = None,
     brief: bool = False,
 ) -> tuple[Run, float]:
-    """Makes a run; repeats it if the monitor must check rows that are not kept.
-
-    Args:
-        scenario: what to run.
-        every: keep each every-th sample, and the last.
-        engine: who makes the steps, "python" or "native".
-        place: where it is made.
-        progress: as in `simulate`.
-        brief: keep no samples, for `brief` alone.
-
-    Returns:
-        The run and the seconds it took.
-    """
+    """Makes a run; repeats it if the monitor must check rows that are not kept."""
     brief = brief and scenario.stop_when_unstable
     watched = every > 1 and progress is not None  # progress must not start again
     while True:

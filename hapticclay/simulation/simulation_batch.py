@@ -325,14 +325,7 @@ class SimulationBatch:
 
 
 def _each(field: str, value: Any, n: int, several: bool) -> Sequence[Any]:
-    """One value per run: those given, or one for all.
-
-    Args:
-        field: name for the error.
-        value: the value, or a sequence of them.
-        n: number of runs.
-        several: whether it is a sequence.
-    """
+    """One value per run: those given, or one for all."""
     if not several:
         return [value] * n
     values = list(value)

@@ -65,12 +65,6 @@ def compare_times(coarse: Trace, middle: Trace, fine: Trace, *, order: int) -> C
     """The error of the crossing times of the finest of three runs [s].
 
     Where the differences shrink with the order, it is the last one over 2^order - 1.
-
-    Args:
-        coarse: at step 4h.
-        middle: at 2h.
-        fine: at h.
-        order: of the integrator.
     """
     if _unstable(middle, fine):
         return Comparison(None, None, False, UNSTABLE, True)
@@ -98,12 +92,6 @@ def compare_positions(coarse: Trace, middle: Trace, fine: Trace, *, order: int) 
     The first sample after a hit has a larger error than others. Its size depends on where in a
     step the border lies, so the differences do not shrink evenly. The finest run has all samples of
     the coarsest, and 4^-order of its error.
-
-    Args:
-        coarse: at step 4h.
-        middle: at 2h.
-        fine: at h; all with samples at the same times.
-        order: of the integrator.
     """
     if _unstable(coarse, fine):
         return Comparison(None, None, False, UNSTABLE, True)
@@ -136,13 +124,7 @@ def _bounces(trace: Trace) -> bool:
 
 
 def hides_events(coarse: Trace, _: Trace, fine: Trace) -> bool:
-    """Whether all runs make the same step from a border to the next sample, with one error.
-
-    Args:
-        coarse: the run at 4h.
-        _: that at 2h.
-        fine: that at h.
-    """
+    """Whether all runs make the same step from a border to the next sample, with one error."""
     return any((-c.time) % coarse.dt < fine.dt for c in fine.crossings)
 
 

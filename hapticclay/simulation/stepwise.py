@@ -407,37 +407,17 @@ class _Alone:
 
 
 def sample_of(t: float, row: np.ndarray) -> Sample:
-    """A sample from its row.
-
-    Args:
-        t: its time [s].
-        row: from Run.ahead.
-    """
+    """A sample from its row."""
     return Sample(t, *[row[place] for place in PLACES])
 
 
 def gain_of(value: object) -> tuple[float, float]:
-    """Gains K of x and y [1/kg], checked as those of a scenario.
-
-    Args:
-        value: the gains.
-
-    Raises:
-        ParameterError: there are not two, or one is out of bounds.
-    """
+    """Gains K of x and y [1/kg], checked as those of a scenario."""
     return pair("gain", value, 0.0, MOST_GAIN, unit="1/kg")
 
 
 def started_with_operator(scenario: Scenario, operator: object) -> None:
-    """Refuses an operator for a run that began without one.
-
-    Args:
-        scenario: of the run.
-        operator: the one given, for the error.
-
-    Raises:
-        ParameterError: the scenario has no operator.
-    """
+    """Refuses an operator for a run that began without one."""
     if not any(scenario.operators):
         bound = "must be given from the start on: this run has no operator"
         raise ParameterError("operator", operator, bound)

@@ -17,14 +17,7 @@ LATEST = 9e9  # [s] the latest time that formats of whole nanoseconds hold
 
 
 def check_headers(archive: zipfile.ZipFile) -> None:
-    """Checks the headers of the arrays of an .npz file, without reading the arrays.
-
-    Args:
-        archive: the file.
-
-    Raises:
-        ValueError: an array is not what its header says, or they do not fit into memory.
-    """
+    """Checks the headers of the arrays of an .npz file, without reading the arrays."""
     for member in archive.infolist():
         _check_header(archive, member)
     size = sum(x.file_size for x in archive.infolist())
@@ -47,14 +40,7 @@ def _check_header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> None:
 
 
 def check_times(t: np.ndarray) -> None:
-    """Checks the times of samples.
-
-    Args:
-        t: times [s], shape (n,).
-
-    Raises:
-        ValueError: they do not ascend from 0 s on, or are later than LATEST.
-    """
+    """Checks the times of samples."""
     if len(t) and not 0.0 <= t[0] <= t[-1] <= LATEST:
         raise ValueError(f"array t must lie from 0 to {LATEST:g} s, are {t[0]:g} to {t[-1]:g} s")
     back = np.flatnonzero(np.diff(t) <= 0.0)
@@ -96,14 +82,7 @@ TABLES: dict[str, Check] = {"energy": _is_number, "versions": _is_text}  # names
 
 
 def check_head(head: dict[str, Any]) -> None:
-    """Checks the types of all entries in the summary of a record but the scenario.
-
-    Args:
-        head: the summary.
-
-    Raises:
-        ValueError: an entry is of another type.
-    """
+    """Checks the types of all entries in the summary of a record but the scenario."""
     _check_entries("", head, PARTS[""])
     _check_entries("outcome.", head["outcome"], PARTS["outcome"])
     for name in ("crossings", "stops"):

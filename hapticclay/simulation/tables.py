@@ -39,29 +39,17 @@ LONG_NAMES = {
 
 
 def recorded_arrays(record: Recorded) -> dict[str, np.ndarray]:
-    """The arrays over time of a record by name, t among them, then those in `extra`.
-
-    Args:
-        record: the record.
-    """
+    """The arrays over time of a record by name, t among them, then those in `extra`."""
     return {name: getattr(record, name) for name in ARRAYS} | record.extra
 
 
 def parts_of(name: str) -> tuple[str, ...]:
-    """Names of the columns of an array: axes or joints; empty for an array of one number a sample.
-
-    Args:
-        name: of the array.
-    """
+    """Names of the columns of an array: axes or joints; empty for an array of one number a sample."""
     return () if name in SCALAR else JOINTS if name in OF_JOINTS else AXES
 
 
 def record_columns(record: Recorded) -> dict[str, np.ndarray]:
-    """Each number of a sample as a column, shape (n,): t, p_x, p_y, v_x, ..., tau_elbow, ...
-
-    Args:
-        record: the record.
-    """
+    """Each number of a sample as a column, shape (n,): t, p_x, p_y, v_x, ..., tau_elbow, ..."""
     out = {}
     for name, x in recorded_arrays(record).items():
         parts = parts_of(name)
@@ -70,11 +58,7 @@ def record_columns(record: Recorded) -> dict[str, np.ndarray]:
 
 
 def column_units(record: Recorded) -> dict[str, str]:
-    """Unit of each of the `record_columns`.
-
-    Args:
-        record: the record.
-    """
+    """Unit of each of the `record_columns`."""
     return {
         f"{name}_{part}" if part else name: ARRAY_UNITS[name]
         for name in recorded_arrays(record)
@@ -83,15 +67,7 @@ def column_units(record: Recorded) -> dict[str, str]:
 
 
 def told_of(record: Recorded) -> dict[str, Any]:
-    """Texts and numbers that go with the arrays into any file.
-
-    Args:
-        record: the record.
-
-    Returns:
-        title, source (the release), status, outcome (its code), end_time [s]; scenario, JSON of all
-        its fields; and summary, JSON of `Record.summary` without scenario and regions.
-    """
+    """Texts and numbers that go with the arrays into any file."""
     summary = {k: v for k, v in record.summary().items() if k not in ("scenario", "regions")}
     return {
         "title": f"hapticclay record: {record.scenario.name}",
@@ -105,14 +81,7 @@ def told_of(record: Recorded) -> dict[str, Any]:
 
 
 def to_frame(record: Recorded) -> DataFrame:
-    """A record as a pandas DataFrame: see `Record.to_frame`.
-
-    Args:
-        record: the record.
-
-    Raises:
-        ParameterError: pandas is not installed.
-    """
+    """A record as a pandas DataFrame: see `Record.to_frame`."""
     with needing("to_frame", "pandas"):
         import pandas as pd
 
@@ -123,14 +92,7 @@ def to_frame(record: Recorded) -> DataFrame:
 
 
 def to_xarray(record: Recorded) -> Dataset:
-    """A record as an xarray Dataset: see `Record.to_xarray`.
-
-    Args:
-        record: the record.
-
-    Raises:
-        ParameterError: xarray is not installed.
-    """
+    """A record as an xarray Dataset: see `Record.to_xarray`."""
     with needing("to_xarray", "xarray"):
         import xarray as xr
 

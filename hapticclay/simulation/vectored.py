@@ -94,20 +94,11 @@ class VectoredRuns:
         return run
 
     def scenario(self, k: int) -> Scenario:
-        """The scenario of a run, with all that is now in effect.
-
-        Args:
-            k: its index.
-        """
+        """The scenario of a run, with all that is now in effect."""
         return self._sync(k).scenario
 
     def restart(self, k: int, scenario: Scenario | None) -> None:
-        """Restarts a run.
-
-        Args:
-            k: its index.
-            scenario: what it runs from now on; None for what it was given last.
-        """
+        """Restarts a run."""
         run = self.runs[k]
         is_alone = run.drives is not None or run.row.is_called
         if scenario is None and not self.changed[k] and not is_alone:
@@ -120,12 +111,7 @@ class VectoredRuns:
         self._begin(k)
 
     def change(self, k: int, change: Callable[[Scenario], Scenario]) -> None:
-        """Continues with other numbers, unless the run has ended.
-
-        Args:
-            k: its index.
-            change: the scenario with these numbers, from the present one.
-        """
+        """Continues with other numbers, unless the run has ended."""
         if self.over[k]:
             return
         run = self._sync(k)
@@ -134,12 +120,7 @@ class VectoredRuns:
         self.changed[k], self.is_shown = True, False
 
     def set_gain(self, which: np.ndarray, gain: np.ndarray) -> None:
-        """Continues with other gains, in runs that have not ended.
-
-        Args:
-            which: indices of the runs.
-            gain: K of each, shape (n, 2) [1/kg].
-        """
+        """Continues with other gains, in runs that have not ended."""
         other = (gain != self.gain[which]).any(axis=1) & ~self.over[which]
         which, gain = which[other], gain[other]
         self.gain[which], self.changed[which] = gain, True
@@ -155,12 +136,7 @@ class VectoredRuns:
     # ---- steps
 
     def push(self, which: np.ndarray, force: np.ndarray) -> None:
-        """Sets constant muscle forces.
-
-        Args:
-            which: indices of the runs.
-            force: of each, shape (n, 2) [N].
-        """
+        """Sets constant muscle forces."""
         other = (force != self.force[which]).any(axis=1)
         which, force = which[other], force[other]
         if not len(which):
@@ -179,12 +155,7 @@ class VectoredRuns:
                 self.runs[k].push_evenly((0.0, *f, 0.0, 0.0))
 
     def advance(self, which: np.ndarray, n: int) -> None:
-        """Makes steps of runs that have not ended.
-
-        Args:
-            which: indices of the runs.
-            n: how many.
-        """
+        """Makes steps of runs that have not ended."""
         if not len(which):
             return
         self.is_shown = False
@@ -293,12 +264,7 @@ class VectoredRuns:
             self.runs[k]._with_force(shown[k])
 
     def torque_reached(self, n: int, k: int) -> np.ndarray:
-        """As `run.torque_reached`, in the last rows of each run, shape (runs, 2).
-
-        Args:
-            n: number of rows, at most.
-            k: how many reach it.
-        """
+        """As `run.torque_reached`, in the last rows of each run, shape (runs, 2)."""
         pairs = [(run.place.buffers.rows, run.filled) for run in self.runs]
         return np.array([torque_reached(rows[max(i - n, 0) : i], k) for rows, i in pairs])
 

@@ -61,11 +61,7 @@ class Setting:
     status: str
 
     def error(self, unit: str) -> float | None:
-        """Error of the setting.
-
-        Args:
-            unit: "s" for border times, "m" for positions.
-        """
+        """Error of the setting."""
         return self.time if unit == "s" else self.position
 
 
@@ -96,21 +92,12 @@ class Ladder:
         return [u for u in ("s", "m") if any(x.error(u) is not None for x in self.settings)]
 
     def shown(self, setting: Setting, unit: str) -> float | None:
-        """The error of a setting if it clearly exceeds that of the reference; else None.
-
-        Args:
-            setting: one of them.
-            unit: "s" or "m".
-        """
+        """The error of a setting if it clearly exceeds that of the reference; else None."""
         error, left = setting.error(unit), self.left[unit]
         return error if error and error >= CLEAR * (left or 0.0) else None
 
     def cheapest(self, unit: str) -> dict[float, Setting]:
-        """The fastest setting by requested error; sampled control replaces no continuous setting.
-
-        Args:
-            unit: "s" or "m".
-        """
+        """The fastest setting by requested error; sampled control replaces no continuous setting."""
         out = {}
         for asked in ASKED:
             # bound for an error that does not clearly exceed that of the reference
@@ -169,17 +156,6 @@ def accuracy_ladder(
 
     A continuous scenario also runs under sampled control with Ts = dt. A sampled scenario keeps its
     Ts, and its steps divide Ts.
-
-    Args:
-        scenario: what to run; its dt and integrator are replaced.
-        quick: fewer rungs.
-        progress: wraps the iterable of the runs.
-
-    Returns:
-        The ladder.
-
-    Raises:
-        ParameterError: Ts is too short to be divided.
     """
     if scenario.control == "sampled":
         scenario = dataclasses.replace(scenario, Ts=scenario.Ts or scenario.dt)

@@ -150,12 +150,7 @@ class PushedLoop(Loop):
 
 
 def of_scenario(subject: Subject | Scenario, axis: str) -> Subject | PushedLoop:
-    """Converts a scenario to the loop of an axis that a study runs; other subjects are unchanged.
-
-    Args:
-        subject: a scenario, a loop or a wall.
-        axis: of the scenario, "x" or "y".
-    """
+    """Converts a scenario to the loop of an axis that a study runs; other subjects are unchanged."""
     return PushedLoop.of(subject, axis) if isinstance(subject, Scenario) else subject
 
 
@@ -164,9 +159,6 @@ def classify_run(loop: PushedLoop) -> str:
 
     The growth rate assumes linear motion, so a run that ends with saturated motors is repeated for
     longer.
-
-    Args:
-        loop: the loop.
     """
     limit = (1.0 - 1e-9) * np.array(loop.torque_limit)
     for t_max in CLASSIFIED_SPANS:
@@ -183,16 +175,7 @@ def classify_run(loop: PushedLoop) -> str:
 
 
 def find_crossing(rate: Callable[[float], float], guess: float, most: float) -> float:
-    """Parameter at which a growth rate changes from negative to positive.
-
-    Args:
-        rate: function of a positive parameter.
-        guess: start of the search.
-        most: end of the search.
-
-    Returns:
-        The parameter, within BRACKET of it; inf if the rate stays negative, 0 if it stays positive.
-    """
+    """Parameter at which a growth rate changes from negative to positive."""
     search = crossing_search(guess, most)
     try:
         x = next(search)
@@ -207,13 +190,6 @@ def crossing_search(guess: float, most: float) -> Generator[float, float, float]
 
     Each rate needs a run and may be infinite. Hence a bracketed secant method on a ratio, two runs
     per step, instead of `brentq`.
-
-    Args:
-        guess: start of the search.
-        most: end of the search.
-
-    Returns:
-        As `find_crossing`.
     """
     step = 1.05
     low, high = guess / step, guess * step
@@ -248,37 +224,19 @@ def crossing_search(guess: float, most: float) -> Generator[float, float, float]
 
 
 def simulated_gain(loop: PushedLoop, guess: float | None = None, most: float = 200.0) -> float:
-    """Gain K above which the oscillation grows in the steps of a run; the loop's own K is ignored.
-
-    Args:
-        loop: all but K.
-        guess: start of the search; None for the limit of the linear loop.
-        most: end of the search.
-    """
+    """Gain K above which the oscillation grows in the steps of a run; the loop's own K is ignored."""
     guess = nominal_limit(loop) if guess is None else guess
     guess = min(guess, most) if guess > 0.0 else 1.0
     return _simulated(loop, "K", guess, most)
 
 
 def simulated_damping(loop: PushedLoop, guess: float, most: float = 1e5) -> float:
-    """Clay b [N.s/m] above which the oscillation grows likewise; the loop's own b is ignored.
-
-    Args:
-        loop: all but b.
-        guess: start of the search [N.s/m].
-        most: end of the search [N.s/m].
-    """
+    """Clay b [N.s/m] above which the oscillation grows likewise; the loop's own b is ignored."""
     return _simulated(loop, "b", guess, most)
 
 
 def simulated_stiffness(loop: PushedLoop, guess: float | None = None, most: float = 1e7) -> float:
-    """Clay's k [N/m] above which the oscillation grows likewise; the loop's own k is ignored.
-
-    Args:
-        loop: all but k.
-        guess: start of the search [N/m]; None for the limit of the linear loop.
-        most: end of the search [N/m].
-    """
+    """Clay's k [N/m] above which the oscillation grows likewise; the loop's own k is ignored."""
     guess = gain_limits.stiffness_limit(loop.linear) if guess is None else guess
     return _simulated(loop, "k", min(guess, most) if guess > 0.0 else 1.0, most)
 
@@ -295,11 +253,7 @@ def _simulated(loop: PushedLoop, field: str, guess: float, most: float) -> float
 
 
 def nominal_limit(loop: PushedLoop) -> float:
-    """Largest stable K of the linear loop at the nominal pose; the loop's own K is ignored.
-
-    Args:
-        loop: all but K.
-    """
+    """Largest stable K of the linear loop at the nominal pose; the loop's own K is ignored."""
     return gain_limits.gain_limit(loop.linear)
 
 
@@ -308,13 +262,6 @@ def pose_matrix(loop: PushedLoop) -> np.ndarray:
 
     Without shaping W = Lambda^-1 of that pose replaces the gains of Sh and couples the axes
     (docs/equations.md, section 3).
-
-    Args:
-        loop: the loop.
-
-    Returns:
-        A, shape (m, m): z' = A z in continuous time (see `linear_loop.state_space`), else
-        x(k+1) = A x(k) (see `linear_loop.sampled_differences`).
     """
     i, links = AXES.index(loop.axis), loop.arm.links
     other = Loop(
@@ -339,15 +286,7 @@ def pose_matrix(loop: PushedLoop) -> np.ndarray:
 
 
 def pose_limit(loop: PushedLoop, most: float = 200.0) -> float:
-    """Smallest K at which the linear loop at the handle's pose is unstable.
-
-    Args:
-        loop: all but K.
-        most: end of the search.
-
-    Returns:
-        K; inf if there is none up to most, 0 if it is below 1e-3.
-    """
+    """Smallest K at which the linear loop at the handle's pose is unstable."""
     first, second = (pose_matrix(replace(loop, K=K)) for K in (1.0, 2.0))
     # It is linear in K, unless direct feedthrough of C acts on the hand's mass.
     straight = len(loop.compensator.num) == len(loop.compensator.den) and loop.hand.mass > 0.0
@@ -366,11 +305,7 @@ def pose_limit(loop: PushedLoop, most: float = 200.0) -> float:
 
 
 def continuous_stable(loop: PushedLoop) -> bool:
-    """Whether the linear loop at the nominal pose is stable in continuous time.
-
-    Args:
-        loop: the loop.
-    """
+    """Whether the linear loop at the nominal pose is stable in continuous time."""
     return gain_crossings.is_stable(replace(loop.linear, **TIMING))
 
 
@@ -379,13 +314,6 @@ def explain_disagreement(loop: PushedLoop, stable: bool) -> str:
 
     One property of the run is changed at a time, then two at a time, until the run agrees with
     theory.
-
-    Args:
-        loop: the loop of the run.
-        stable: whether the run settles.
-
-    Returns:
-        Names of the properties; "not found" if no pair explains the difference.
     """
     changes: list[tuple[str, dict]] = [
         ("saturation", dict(torque_limit=(1e6, 1e6))),

@@ -58,12 +58,5 @@ class Chart:
 
 
 def curve(name: str, x: Any, y: Any, kind: CurveKind = "line") -> Curve:
-    """A curve of two sequences of numbers.
-
-    Args:
-        name: in the legend.
-        x: shape (n,).
-        y: shape (n,).
-        kind: as in `Curve`.
-    """
+    """A curve of two sequences of numbers."""
     return Curve(name, np.asarray(x, dtype=float), np.asarray(y, dtype=float), kind)

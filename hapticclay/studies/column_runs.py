@@ -98,19 +98,11 @@ class ColumnRuns:
         return -(-len(self) // self.chunk)
 
     def chunk_runs(self, number: int) -> range:
-        """The runs of one file.
-
-        Args:
-            number: of the file, from 0.
-        """
+        """The runs of one file."""
         return range(number * self.chunk, min((number + 1) * self.chunk, len(self)))
 
     def chunk_rows(self, number: int) -> list[dict[str, Any]]:
-        """Makes the runs of one file, one row per run.
-
-        Args:
-            number: of the file, from 0.
-        """
+        """Makes the runs of one file, one row per run."""
         runs = self.chunk_runs(number)
         part = {name: x[runs.start : runs.stop] for name, x in self.columns.items()}
         # a worker is one of several processes, one per core
@@ -144,11 +136,7 @@ class ColumnRuns:
 
 
 def table_of_ends(made: np.ndarray) -> dict[str, list[Any]]:
-    """Columns of summaries.
-
-    Args:
-        made: an array of SUMMARY.
-    """
+    """Columns of summaries."""
     through = np.where(made["throughput"] > 0.0, made["throughput"], np.nan)
     out = {
         "status": made["code"], "axis": made["axis"], "end_time": made["time"],

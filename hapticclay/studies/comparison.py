@@ -146,11 +146,7 @@ def compare_files(
 
 
 def is_wall_file(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is that of a virtual wall.
-
-    Args:
-        path: the file, .toml or .json.
-    """
+    """Whether a file is that of a virtual wall."""
     data = read_settings(path)
     return data.get("schema") in (WALL_SCHEMA, WALL_SCHEMA_0_2) or bool(
         WALL_WORDS & {k.split(".")[0] for k in data}
@@ -162,11 +158,6 @@ def compared_scenario(path: str | os.PathLike[str], name: str, axis: str) -> Com
 
     Margins, worst hand, passivity and steady damper are computed in continuous time without delay;
     the gain limit is computed with the scenario's own sampling and delay.
-
-    Args:
-        path: the file.
-        name: name to show.
-        axis: "x" or "y".
     """
     scenario = Scenario.load(path)
     loop = Loop.of(scenario, axis)
@@ -196,13 +187,7 @@ def compared_scenario(path: str | os.PathLike[str], name: str, axis: str) -> Com
 
 
 def compared_wall(path: str | os.PathLike[str], name: str, axis: str = "x") -> Compared:
-    """Judges and runs the wall of a file.
-
-    Args:
-        path: the file.
-        name: name to show.
-        axis: not used; as in `compared_scenario`.
-    """
+    """Judges and runs the wall of a file."""
     wall = VirtualWall.load(path)
     record, error = run_and_error(wall.scenario(PUSHED_TIME, push=PUSHED))
     low, high = wall_limits.stiffness_band(wall)
@@ -231,11 +216,7 @@ def compared_wall(path: str | os.PathLike[str], name: str, axis: str = "x") -> C
 
 
 def worst_limit(loop: Loop) -> float:
-    """Largest K up to which every hand of COMPARED_HANDS is stable; NaN for a gain of zero.
-
-    Args:
-        loop: one axis, in continuous time.
-    """
+    """Largest K up to which every hand of COMPARED_HANDS is stable; NaN for a gain of zero."""
     return hand_boxes.worst_case(loop, COMPARED_HANDS).limit if loop.gain else math.nan
 
 
@@ -246,15 +227,7 @@ def _passivity_margin(loop: Loop) -> float:
 
 
 def run_and_error(scenario: Scenario) -> tuple[Record, float]:
-    """Runs a scenario, and again at half the step.
-
-    Args:
-        scenario: the run.
-
-    Returns:
-        The record; the largest change of position at the samples that both have [m], NaN where they
-        end differently. This is about 3 times the error of the second run.
-    """
+    """Runs a scenario, and again at half the step."""
     sampled = scenario.control == "sampled"
     finer = replace(
         scenario, dt=0.5 * scenario.dt, Ts=(scenario.Ts or scenario.dt) if sampled else None
@@ -289,11 +262,7 @@ def _run_numbers(record: Record, error: float) -> dict[str, float]:
 
 
 def differing_fields(found: Comparison) -> dict[str, list[Any]]:
-    """Fields that differ between files: the value of each file, None if it has no such field.
-
-    Args:
-        found: from `compare_files`.
-    """
+    """Fields that differ between files: the value of each file, None if it has no such field."""
     names = dict.fromkeys(name for x in found for name in x.settings if name != "name")
     rows = {name: [x.settings.get(name) for x in found] for name in names}
     return {name: row for name, row in rows.items() if any(v != row[0] for v in row[1:])}

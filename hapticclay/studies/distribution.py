@@ -146,11 +146,7 @@ class Distribution:
 
 
 def normal_score(u: np.ndarray) -> np.ndarray:
-    """Quantiles of the standard normal distribution.
-
-    Args:
-        u: shares, 0 < u < 1, any shape.
-    """
+    """Quantiles of the standard normal distribution."""
     from scipy.special import ndtri
 
     return ndtri(u)
@@ -163,15 +159,7 @@ def _normal_share(z: np.ndarray) -> np.ndarray:
 
 
 def parse_laws(text: str, unit_of: Callable[[str], str] = lambda _: "") -> dict[str, Distribution]:
-    """Reads "delay=uniform:0:1e-3 pose.x=normal:0:0.02".
-
-    Args:
-        text: the distributions.
-        unit_of: unit of a parameter by name; by default no parameter has one.
-
-    Raises:
-        ParameterError: a word is not name=law:number:number, or a name stands twice.
-    """
+    """Reads "delay=uniform:0:1e-3 pose.x=normal:0:0.02"."""
     out: dict[str, Distribution] = {}
     if not isinstance(text, str):
         raise ParameterError("vary", text, "must be a text such as delay=uniform:0:1e-3")

@@ -55,35 +55,19 @@ class FlowParameter:
 
 
 def to_theta(values: Sequence[float], law: str) -> np.ndarray:
-    """Converts parameters to the vector theta of `Flowing`.
-
-    Args:
-        values: parameters of the law.
-        law: in FLOW_LAWS.
-    """
+    """Converts parameters to the vector theta of `Flowing`."""
     pairs = zip(FLOW_LAWS[law].names, values, strict=True)
     return np.array([math.log(max(x, 1e-300)) if name == "K" else x for name, x in pairs])
 
 
 def of_theta(theta: np.ndarray, law: str) -> list[float]:
-    """Converts the vector theta of `Flowing` to parameters of a law.
-
-    Args:
-        theta: vector of parameters.
-        law: in FLOW_LAWS.
-    """
+    """Converts the vector theta of `Flowing` to parameters of a law."""
     pairs = zip(FLOW_LAWS[law].names, theta.tolist(), strict=True)
     return [math.exp(min(x, 700.0)) if name == "K" else x for name, x in pairs]
 
 
 def first_guesses(law: str, v: np.ndarray, f: np.ndarray) -> np.ndarray:
-    """Initial parameters of a fit: linear least squares over a grid of flow indices.
-
-    Args:
-        law: in FLOW_LAWS.
-        v: speeds [m/s].
-        f: forces against the motion [N].
-    """
+    """Initial parameters of a fit: linear least squares over a grid of flow indices."""
     names, best = FLOW_LAWS[law].names, None
     for n in TRIAL_INDICES if "n" in names else (1.0,):
         columns = {"Fy": np.ones(len(v)), "b": v, "K": v**n}
@@ -103,13 +87,7 @@ def first_guesses(law: str, v: np.ndarray, f: np.ndarray) -> np.ndarray:
 
 
 def best_fit(joint: Joint, law: str, start: np.ndarray) -> tuple[Minimum, Minimum]:
-    """Least-squares fits with Fy, b >= 0, and with Fy, b of any sign.
-
-    Args:
-        joint: motion and force.
-        law: in FLOW_LAWS.
-        start: parameters to start from.
-    """
+    """Least-squares fits with Fy, b >= 0, and with Fy, b of any sign."""
     flowing = FLOW_LAWS[law]
     free = found = joint.least(flowing, start)
     held = np.zeros(len(start), dtype=bool)
@@ -125,9 +103,6 @@ def far_forces(s: Sliding) -> np.ndarray:
 
     The law is the richest, fitted to the speeds of the motion; the noise is that of the median.
     Near rest it grows by that of the speed. None is far where many are: the law is then wrong.
-
-    Args:
-        s: sliding samples.
     """
     law, v = FLOW_LAWS["Herschel-Bulkley"], s.speeds
     least = SMALLEST_OUTLIER / OUTLYING * float(np.median(np.abs(s.f)))
@@ -152,12 +127,7 @@ def far_forces(s: Sliding) -> np.ndarray:
 
 
 def refit_nested(joint: Joint, found: dict[str, tuple[Minimum, Minimum]]) -> None:
-    """Fit the richest law again from a simpler law that it contains, if that one fits better.
-
-    Args:
-        joint: motion and force.
-        found: fits by law; the fit of the richest is replaced.
-    """
+    """Fit the richest law again from a simpler law that it contains, if that one fits better."""
     rich = "Herschel-Bulkley"
     for law in found:
         a, least = (
@@ -173,12 +143,7 @@ def refit_nested(joint: Joint, found: dict[str, tuple[Minimum, Minimum]]) -> Non
 
 
 def student_quantile(level: float, freedom: float) -> float:
-    """Student's t quantile of a two-sided interval.
-
-    Args:
-        level: confidence level.
-        freedom: degrees of freedom.
-    """
+    """Student's t quantile of a two-sided interval."""
     from scipy.stats import t
 
     return float(t.ppf(0.5 + 0.5 * level, max(freedom, 1.0)))
@@ -187,16 +152,7 @@ def student_quantile(level: float, freedom: float) -> float:
 def parameter_intervals(
     joint: Joint, law: str, best: Minimum, free: Minimum, variance: float, quantile: float
 ) -> tuple[FlowParameter, ...]:
-    """Profile intervals: where the profiled sum of squares rises by quantile^2 variance.
-
-    Args:
-        joint: motion and force.
-        law: in FLOW_LAWS.
-        best: the fit within the bounds.
-        free: the fit with Fy and b of any sign.
-        variance: of a residual.
-        quantile: half width of the interval in standard deviations.
-    """
+    """Profile intervals: where the profiled sum of squares rises by quantile^2 variance."""
     names, out = FLOW_LAWS[law].names, []
     values = of_theta(best.theta, law)
     for j, (name, value) in enumerate(zip(names, values, strict=True)):

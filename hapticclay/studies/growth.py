@@ -44,15 +44,6 @@ def growth_rate(
 
     The modes of the velocity are those of a linear prediction of low rank (ESPRIT: Roy, Kailath,
     IEEE Trans. ASSP 37, 1989), exact for a linear loop, whatever the sampling.
-
-    Args:
-        record: of the motion.
-        axis: "x" or "y".
-        sample: approximate spacing of the samples used [s].
-        slowest: slower modes are ignored [rad/s, 1/s].
-
-    Returns:
-        [1/s], negative if the oscillation decays; inf for a run that ended before it could be read.
     """
     i, dt = AXES.index(choice("axis", axis, AXES)), record.scenario.dt
     if len(record.t) > 2:  # kept each so many steps
@@ -68,14 +59,7 @@ def growth_rate(
 
 
 def growth_of_run(record: Record, sample: float, slowest: float, axis: str = "x") -> float:
-    """Growth rate of a run; a mean rate if the run decayed into rounding or grew very large.
-
-    Args:
-        record: of a free motion.
-        sample: as in `growth_rate` [s].
-        slowest: as there [rad/s, 1/s].
-        axis: "x" or "y".
-    """
+    """Growth rate of a run; a mean rate if the run decayed into rounding or grew very large."""
     speed = np.abs(record.v[:, AXES.index(axis)])
     n = len(speed)
     share = math.ceil(0.1 * n)
@@ -122,14 +106,6 @@ def short_growth(v: np.ndarray, dt: float) -> np.ndarray:
     """Growth rates of the oscillations of many free motions, from their least damped modes.
 
     Modes slower than `SLOWEST_MODE` do not count.
-
-    Args:
-        v: velocities, evenly sampled, in any unit, shape (motions, samples).
-        dt: between two samples [s].
-
-    Returns:
-        [1/s], shape (motions,); negative where the oscillation decays, NaN where the samples are
-        inconclusive.
     """
     out = np.full(len(v), np.nan)
     size = np.abs(v).max(axis=1, initial=0.0)
@@ -188,15 +164,7 @@ def _least_damped_of(
 
 
 def growth_of_map(m: PeriodMap, slowest: float = SLOWEST_MODE) -> float:
-    """Growth rate of the oscillation after a push, from the map of a period.
-
-    Args:
-        m: the map.
-        slowest: as in `growth_rate`.
-
-    Returns:
-        [1/s], as `growth_rate`; NaN where growing modes cannot be told apart.
-    """
+    """Growth rate of the oscillation after a push, from the map of a period."""
     rate, swings = _rates(np.linalg.eigvals(m.matrix), m.period, slowest)
     if not (swings & (rate > -NEUTRAL / m.period)).any():
         return float(rate.max(where=swings, initial=-math.inf))
@@ -210,14 +178,7 @@ def growth_of_map(m: PeriodMap, slowest: float = SLOWEST_MODE) -> float:
 
 
 def mapped_growth(s: Scenario, axis: str, maps: PeriodMaps, slowest: float = SLOWEST_MODE) -> float:
-    """As `growth_of_map`, of a scene; NaN for one without a map.
-
-    Args:
-        s: the scene.
-        axis: "x" or "y".
-        maps: those made before.
-        slowest: as in `growth_rate`.
-    """
+    """As `growth_of_map`, of a scene; NaN for one without a map."""
     m = maps.of(s, AXES.index(axis))
     return math.nan if m is None else growth_of_map(m, slowest)
 

@@ -233,12 +233,7 @@ class Identified(Result):
 
 
 def response_tables(results: Sequence[Identified], paper: bool = True) -> dict[str, dict[str, Any]]:
-    """Returns the numbers of the figure of one block: the response on each axis, and its equations.
-
-    Args:
-        results: of one block, on one axis or both.
-        paper: whether the printed equation is one of them.
-    """
+    """Returns the numbers of the figure of one block: the response on each axis, and its equations."""
     unit = {"G": "m/m", "S": "m/N", "Th": "N/m"}[results[0].what]
     out: dict[str, dict[str, Any]] = {}
     for r in results:
@@ -258,12 +253,7 @@ def response_tables(results: Sequence[Identified], paper: bool = True) -> dict[s
 
 
 def endpoint_mobility(x: float, y: float) -> tuple[float, float]:
-    """Diagonal of the arm's mobility, Wxx and Wyy [1/kg].
-
-    Args:
-        x: world position of the handle [m].
-        y: world position of the handle [m].
-    """
+    """Diagonal of the arm's mobility, Wxx and Wyy [1/kg]."""
     links = Arm().links
     q1, q2 = arm_law.inverse_kinematics(x, y, links)
     wxx, _, wyy = arm_law.mobility(arm.jacobians(q1, q2, links), links)
@@ -273,16 +263,7 @@ def endpoint_mobility(x: float, y: float) -> tuple[float, float]:
 def measured(
     record: Record, noise: Noise | None, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Handle position [m] and hand force [N] as measured by the sensors.
-
-    Args:
-        record: of a run.
-        noise: of the sensors; None for none.
-        rng: random generator of the force sensor.
-
-    Returns:
-        p and fh, shape (n, 2) each.
-    """
+    """Handle position [m] and hand force [N] as measured by the sensors."""
     if noise is None:
         return record.p, record.fh
     count = 2.0 * np.pi / noise.encoder_counts
@@ -353,12 +334,7 @@ class Identification:
         )
 
     def identified(self) -> Identified:
-        """Makes the runs, and fits the block to them.
-
-        Raises:
-            ParameterError: a value is out of its bounds, the handle is out of reach, or a run ended
-                early or saturated the motors.
-        """
+        """Makes the runs, and fits the block to them."""
         from scipy.fft import next_fast_len
 
         what, noise = self.what, self.noise
@@ -447,26 +423,14 @@ def _signals(
 
 
 def format_coefficient(c: Coefficient) -> str:
-    """Fitted value and half its interval, rounded to two digits of the latter: "41.793 +- 0.012".
-
-    Args:
-        c: the coefficient.
-    """
+    """Fitted value and half its interval, rounded to two digits of the latter: "41.793 +- 0.012"."""
     half = 0.5 * (c.high - c.low)
     digits = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 6
     return f"{c.value:.{digits}f} \u00b1 {half:.{digits}f}"
 
 
 def printed_form(what: str, axis: str) -> tuple[float, ...]:
-    """The printed coefficients of G (Eqs. 15, 16), Sh (Eqs. 17, 18) or Th (Eq. 19).
-
-    Args:
-        what: "G", "S" (Sh) or "Th".
-        axis: "x" or "y".
-
-    Returns:
-        In the order of COEFFICIENT_NAMES.
-    """
+    """The printed coefficients of G (Eqs. 15, 16), Sh (Eqs. 17, 18) or Th (Eq. 19)."""
     i = AXES.index(axis)
     block = {"G": G[i], "S": S[i], "Th": Operator()}[what]
     return tuple(getattr(block, name) for name in COEFFICIENT_NAMES[what])
@@ -478,15 +442,7 @@ def response(
     frequency: np.ndarray,
     dt: float | None = None,
 ) -> np.ndarray:
-    """Complex response of a block, shape (n,).
-
-    Args:
-        what: "G", "S" (Sh) or "Th".
-        coefficients: in the order of COEFFICIENT_NAMES.
-        frequency: [Hz], shape (n,).
-        dt: step of the loop [s], with central differences for derivatives and springs on the mean
-            (1, 2, 1)/4 of three positions; None for the printed form in continuous time.
-    """
+    """Complex response of a block, shape (n,)."""
     s2, s, one = _derivatives(frequency, dt)
     a, b, c = coefficients
     return a * s2 + b * s + c * one if what == "Th" else a / (s2 + b * s + c)
@@ -508,11 +464,6 @@ def estimate_response(signals: np.ndarray, n: int, bins: np.ndarray) -> Estimate
 
     The reference has no noise, so S_ry/S_ru is unbiased even with noise on the input and in a
     closed loop (Pintelon, Schoukens 2012, sec. 2.6.4). Windows of whole periods do not leak.
-
-    Args:
-        signals: reference, input and output, (runs, 3, periods n); more than one run, or period.
-        n: samples in a period.
-        bins: the lines, as multiples of 1/period, (lines,).
     """
     from scipy.signal import csd
 
@@ -546,9 +497,6 @@ def noise_deviation(found: Estimate) -> np.ndarray:
     The model has two parameters, fitted to the scatter of all lines. Weights from the scatter of a
     few lines over a few runs favour lines with accidentally small errors, and the fit becomes worse
     than its intervals. The intervals hold for any weights; for coloured noise they are wider.
-
-    Args:
-        found: the response of several runs; for a single run its own deviation is returned.
     """
     from scipy.optimize import nnls
 
@@ -585,17 +533,6 @@ def fit(
     follow from the influence of each run on the coefficients (Student's t, one degree of freedom
     fewer than runs). The misfit would not do: encoder counts cause errors common to all lines,
     which leave no misfit. For a single run the intervals follow from the misfit.
-
-    Args:
-        what: "G", "S" (Sh) or "Th".
-        frequency: [Hz], (n,), n >= 3.
-        H: response, complex, (n,).
-        deviation: of H, (n,).
-        errors: of each run, (runs, n), as in `Estimate`; None for a single run.
-        dt: as in `response`.
-
-    Returns:
-        Coefficients and half of their intervals, (3,) each, in the order of COEFFICIENT_NAMES.
     """
     from scipy.optimize import least_squares
     from scipy.special import stdtrit
@@ -643,16 +580,7 @@ def fitted_coefficients(
     dt: float | None,
     floor: float,
 ) -> tuple[Coefficient, ...]:
-    """Fit a block and return the coefficients with the printed ones.
-
-    Args:
-        what: "G", "S" (Sh) or "Th".
-        axis: "x" or "y".
-        frequency: [Hz], (n,).
-        found: the response.
-        dt: as in `response`.
-        floor: relative error of the fitted form itself, included in the interval.
-    """
+    """Fit a block and return the coefficients with the printed ones."""
     value, half = fit(what, frequency, found.response, noise_deviation(found), found.errors, dt)
     half = np.hypot(half, floor * np.abs(value))
     names, units = COEFFICIENT_NAMES[what], COEFFICIENT_UNITS[what]

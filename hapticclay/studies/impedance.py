@@ -113,12 +113,7 @@ class MeasuredImpedance(Result):
 
 
 def computed_impedance(subject: Subject, omega: np.ndarray) -> Impedance:
-    """The computed impedance of a loop or a wall, at the nominal pose.
-
-    Args:
-        subject: a `PushedLoop` or a `VirtualWall`.
-        omega: [rad/s], > 0, shape (n,).
-    """
+    """The computed impedance of a loop or a wall, at the nominal pose."""
     if isinstance(subject, VirtualWall):
         return wall_response(subject, omega)
     return loop_response(subject.linear, omega)

@@ -99,12 +99,7 @@ def _swinging(wall: VirtualWall, K: float) -> Scenario:
 
 
 def wall_lab(quick: bool, tell: Tell) -> Lab:
-    """A wall and its rate: the largest stable stiffness over the control sample.
-
-    Args:
-        quick: fewer rates.
-        tell: called with the name of each step.
-    """
+    """A wall and its rate: the largest stable stiffness over the control sample."""
     rates = RATES[1::2] if quick else RATES
     tell("stable walls")
     walls = [replace(WALL, Ts=T) for T in rates]
@@ -143,12 +138,7 @@ def wall_lab(quick: bool, tell: Tell) -> Lab:
 
 
 def zwidth_lab(quick: bool, tell: Tell) -> Lab:
-    """The Z-width: the K and B that a device renders stably.
-
-    Args:
-        quick: one damper and three values of B.
-        tell: called with the name of each step.
-    """
+    """The Z-width: the K and B that a device renders stably."""
     dampers, dampings = (DAMPERS[1:2], DAMPINGS[:4:2]) if quick else (DAMPERS, DAMPINGS)
     rows: list[tuple[float, float, float, float]] = []
     curves, areas = [], []
@@ -186,12 +176,7 @@ def zwidth_lab(quick: bool, tell: Tell) -> Lab:
 
 
 def delay_lab(quick: bool, tell: Tell) -> Lab:
-    """Delay and passivity: the effect of a delayed force.
-
-    Args:
-        quick: two delays.
-        tell: called with the name of each step.
-    """
+    """Delay and passivity: the effect of a delayed force."""
     delays = DELAYS[::2][:2] if quick else DELAYS
     walls = [replace(WALL, delay=d * TS) for d in delays]
     tell("stable walls")
@@ -236,12 +221,7 @@ def delay_lab(quick: bool, tell: Tell) -> Lab:
 
 
 def pressed_wall(change: float, device: Device) -> Scenario:
-    """The run in which a hand presses a wall of STIFFNESS (1 + change) with FORCE.
-
-    Args:
-        change: of the stiffness, as a share.
-        device: device that renders the wall.
-    """
+    """The run in which a hand presses a wall of STIFFNESS (1 + change) with FORCE."""
     K = STIFFNESS * (1.0 + change)
     damping = 0.5 * math.sqrt(K * device.mass)
     wall = VirtualWall(K=K, B=damping, device=device, Ts=TS)
@@ -249,11 +229,7 @@ def pressed_wall(change: float, device: Device) -> Scenario:
 
 
 def felt_changes(device: Device) -> np.ndarray:
-    """Change of stiffness at the hand for CHANGES: force over indentation, by runs.
-
-    Args:
-        device: device that renders the walls.
-    """
+    """Change of stiffness at the hand for CHANGES: force over indentation, by runs."""
     depths = []
     for record in simulate_batch(pressed_wall(float(x), device) for x in CHANGES):
         x = record.p[:, 0]
@@ -262,12 +238,7 @@ def felt_changes(device: Device) -> np.ndarray:
 
 
 def jnd_lab(quick: bool, tell: Tell) -> Lab:
-    """A just-noticeable difference of stiffness, by staircases on a known observer.
-
-    Args:
-        quick: fewer staircases.
-        tell: called with the name of each step.
-    """
+    """A just-noticeable difference of stiffness, by staircases on a known observer."""
     tell("rendered stiffness")
     felt = felt_changes(replace(ROUGH, quantum=0.0))
     rough = felt_changes(ROUGH)

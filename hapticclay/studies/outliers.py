@@ -42,21 +42,12 @@ class Cleaned(NamedTuple):
 
 
 def robust_deviation(x: np.ndarray) -> float:
-    """Standard deviation of normal noise that has the same median absolute value.
-
-    Args:
-        x: residuals, (n,), n >= 1.
-    """
+    """Standard deviation of normal noise that has the same median absolute value."""
     return NORMAL * float(np.median(np.abs(x)))
 
 
 def cleaned(x: np.ndarray, count: float = 0.0) -> Cleaned:
-    """A column that is smooth but for noise, without its outliers.
-
-    Args:
-        x: evenly spaced samples, (n,), n >= 100.
-        count: their quantum; 0 for none.
-    """
+    """A column that is smooth but for noise, without its outliers."""
     given, bad = np.asarray(x, dtype=float), np.zeros(len(x), dtype=bool)
     now, at = given, _jumps(given, count)
     for _ in range(5):  # small outliers stand beside large ones
@@ -73,12 +64,7 @@ def cleaned(x: np.ndarray, count: float = 0.0) -> Cleaned:
 
 
 def bridged(x: np.ndarray, bad: np.ndarray) -> np.ndarray:
-    """The column with outliers replaced by the cubic through the good samples on both sides.
-
-    Args:
-        x: samples, (n,).
-        bad: mask of those to replace, (n,).
-    """
+    """The column with outliers replaced by the cubic through the good samples on both sides."""
     out, good = x.copy(), np.flatnonzero(~bad)
     for first, stop in runs_of(bad):
         i = int(np.searchsorted(good, first))
@@ -89,34 +75,19 @@ def bridged(x: np.ndarray, bad: np.ndarray) -> np.ndarray:
 
 
 def runs_of(mask: np.ndarray) -> list[tuple[int, int]]:
-    """(start, stop) of each run of True in a mask.
-
-    Args:
-        mask: (n,).
-    """
+    """(start, stop) of each run of True in a mask."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def sentence(column: str, t: Sequence[float] | np.ndarray, samples: int, why: str) -> str:
-    """A warning about samples that are left out.
-
-    Args:
-        column: "position", "force", ...
-        t: their times [s], (m,).
-        samples: number of samples of the column.
-        why: what is wrong with them.
-    """
+    """A warning about samples that are left out."""
     are = "are" if len(t) > 1 else "is"
     return f"{len(t)} of {samples} {column}s {are} left out, at t = {times(t)} s: {why}"
 
 
 def times(t: Sequence[float] | np.ndarray) -> str:
-    """The first of some times, in words.
-
-    Args:
-        t: the times [s].
-    """
+    """The first of some times, in words."""
     more = ", ..." if len(t) > NAMED else ""
     return ", ".join(f"{x:.6g}" for x in t[:NAMED]) + more
 

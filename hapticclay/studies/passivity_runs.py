@@ -282,14 +282,7 @@ def passive_region(
 
 
 def rendered_energy(record: Record) -> np.ndarray:
-    """Energy absorbed by rendered clay up to each sample, over both axes.
-
-    Args:
-        record: of a run.
-
-    Returns:
-        [J], shape (n,).
-    """
+    """Energy absorbed by rendered clay up to each sample, over both axes."""
     taken = (record.fe[:-1] * np.diff(record.p, axis=0)).sum(axis=1)
     return np.concatenate(((0.0,), np.cumsum(taken)))
 

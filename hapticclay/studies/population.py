@@ -179,26 +179,14 @@ POPULATIONS = {
 
 
 def hands_of(given: str | Hands) -> Hands:
-    """A population, itself or by its name in POPULATIONS.
-
-    Args:
-        given: the population, or its name.
-
-    Raises:
-        ParameterError: there is no such population.
-    """
+    """A population, itself or by its name in POPULATIONS."""
     if isinstance(given, Hands):
         return given
     return POPULATIONS[choice("hands", given, tuple(POPULATIONS))]
 
 
 def open_uniform(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
-    """Uniform random numbers in 0 < u < 1, whose normal scores are finite.
-
-    Args:
-        rng: generator.
-        shape: of the array.
-    """
+    """Uniform random numbers in 0 < u < 1, whose normal scores are finite."""
     return (rng.integers(0, 2**52, shape) + 0.5) * 2.0**-52
 
 

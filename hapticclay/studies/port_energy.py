@@ -112,13 +112,6 @@ def imposed(wall: VirtualWall, path: Path, periods: int = 3, steps: int = PATH_S
 
     The hand supplies, kick by kick, the force that mass, damper, friction and wall require along
     the path. The wall's force is its law applied to the path as measured by encoder and difference.
-
-    Args:
-        wall: the wall, without a hand of its own.
-        path: the path.
-        periods: periods over which energy is counted, after those that fill window, delay and
-            filter.
-        steps: engine steps per sample.
     """
     return _imposed(wall, path, periods, steps)[0]
 

@@ -20,14 +20,6 @@ def clopper_pearson(events: Any, runs: Any, level: float = LEVEL) -> tuple[np.nd
     """Exact confidence interval of a probability: coverage is at least the nominal level.
 
     Clopper, Pearson, Biometrika 26, 1934.
-
-    Args:
-        events: number of events, any shape.
-        runs: number of runs, of the same shape.
-        level: of confidence, 0 to 1.
-
-    Returns:
-        Lower and upper ends; 0 and 1 where there are no runs.
     """
     from scipy.special import betaincinv
 

@@ -33,12 +33,6 @@ def block_of_clay(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     """Extent of the block of clay in a picture; without clay, of the work area.
 
     The block ends at the borders of the clay; without borders it extends slightly beyond the path.
-
-    Args:
-        scenario: whose clay.
-
-    Returns:
-        Lowest and highest corner [m], shape (2,) each.
     """
     start, length = np.array(scenario.start), scenario.length
     low, high = start - HALF_BREADTH, start + HALF_BREADTH
@@ -86,14 +80,7 @@ class Removal:
         cell: float | None = None,
         path: np.ndarray | None = None,
     ):
-        """Lay the grid over the block, or over the path where one is given.
-
-        Args:
-            scenario: whose clay.
-            tool: the cutter.
-            cell: largest size of a cell [m]; None to choose it from the tool's width.
-            path: of the handle [m], shape (n, 2); None for the block of a picture.
-        """
+        """Lay the grid over the block, or over the path where one is given."""
         fit = (
             min(CELL_SIZE, tool.width / PICTURE_CELLS)
             if path is None
@@ -132,15 +119,7 @@ class Removal:
         self.cut, self.volume = self._before.copy(), 0.0
 
     def sweep(self, begin: Any, end: Any) -> float:
-        """Move the tool in a straight line.
-
-        Args:
-            begin: its place before [m], (2,).
-            end: its place after [m], (2,).
-
-        Returns:
-            The removed volume [m^3].
-        """
+        """Move the tool in a straight line."""
         r, reach = 0.5 * self.tool.width, 0.5 * self.tool.width + self.cell
         (x0, y0), (x1, y1) = begin, end
         i = _window(self.x, min(x0, x1) - reach, max(x0, x1) + reach)
@@ -171,9 +150,6 @@ class Removal:
         """Height of the clay over the ground at the cells [m], shape (ny, nx).
 
         For a groove whose clay exceeds the thickness, heights are reduced in proportion.
-
-        Args:
-            thickness: of the block [m].
         """
         if self.ground:
             scale = min(1.0, HIGHEST * thickness / (self.ground.highest or thickness))

@@ -244,14 +244,7 @@ class Cost:
 
 
 def measure_cost(trials: Trials, left: int, out: Path | None = None, workers: int = 1) -> Cost:
-    """Estimates the cost of runs from a few of the first chunk.
-
-    Args:
-        trials: specification of the runs.
-        left: number of runs.
-        out: folder for the runs; None for none.
-        workers: number of processes.
-    """
+    """Estimates the cost of runs from a few of the first chunk."""
     threads = None if workers == 1 else 1
     points = trials.points(0)[:PROBED]
     trials.judge(points[:4], threads)  # the first run imports

@@ -271,15 +271,7 @@ def parse_grid(text: str) -> dict[str, Range]:
 
 
 def grid_in_units(text: str, unit_of: Callable[[str], str]) -> dict[str, Range]:
-    """Reads ranges as `parse_grid` does.
-
-    Args:
-        text: the ranges.
-        unit_of: unit of a parameter by name.
-
-    Raises:
-        ParameterError: as `parse_grid`.
-    """
+    """Reads ranges as `parse_grid` does."""
     how = (
         "must be name=low:high:n, name=low:high:nlog, name=low:high (sampled) or name=a,b,c, "
         "each name once"
@@ -294,14 +286,7 @@ def grid_in_units(text: str, unit_of: Callable[[str], str]) -> dict[str, Range]:
 
 
 def parse_fixed(text: str) -> dict[str, Any]:
-    """Reads "t_max=2 inertia_shaping=true force=1,0 growth=30/s arm.l1=30cm".
-
-    Args:
-        text: the values.
-
-    Raises:
-        ParameterError: a word is not name=value, or a name stands twice.
-    """
+    """Reads "t_max=2 inertia_shaping=true force=1,0 growth=30/s arm.l1=30cm"."""
     return named_values("fixed", text.split())
 
 
@@ -317,17 +302,7 @@ def _split_words(field: str, text: str, how: str) -> dict[str, str]:
 
 
 def load_sweep(path: Path) -> dict[str, Any]:
-    """Reads a sweep from TOML: experiment or scenario, design, runs, seed, chunk; [vary], [fixed].
-
-    Args:
-        path: the file; `scenario` in it is the path of a scenario file, relative to it.
-
-    Returns:
-        Arguments of `Sweep`.
-
-    Raises:
-        ParameterError: the file cannot be read, or does not hold a sweep.
-    """
+    """Reads a sweep from TOML: experiment or scenario, design, runs, seed, chunk; [vary], [fixed]."""
     try:
         data = parse_toml(read_text(path, MOST_SETTINGS))
     except (OSError, ValueError) as error:

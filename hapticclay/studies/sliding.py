@@ -86,15 +86,7 @@ class Sliding(NamedTuple):
 
 
 def of_record(r: Record, axis: str | None) -> tuple[str, Any, Any, Any, Any, Any]:
-    """Axis, position, velocity, force, which samples lie inside clay, and the clay at them.
-
-    Args:
-        r: the record.
-        axis: as for `fit_flow`.
-
-    Raises:
-        ParameterError: it has no clay, or none whose law is observable along this axis.
-    """
+    """Axis, position, velocity, force, which samples lie inside clay, and the clay at them."""
     clay = r.scenario.clay
     if clay is None:
         raise ParameterError("data", r.scenario.name, "must be a record with clay")
@@ -126,15 +118,7 @@ def of_record(r: Record, axis: str | None) -> tuple[str, Any, Any, Any, Any, Any
 
 
 def check_met(met: Met, inside: np.ndarray) -> None:
-    """Refuse samples in clays of several laws, or in clay whose force depends on more variables.
-
-    Args:
-        met: the clay at the samples.
-        inside: mask of the samples used.
-
-    Raises:
-        ParameterError: they do.
-    """
+    """Refuse samples in clays of several laws, or in clay whose force depends on more variables."""
     for name, where in met.dented.items():
         if np.any(where[inside]):
             bound = "must lie in clay whose force follows from the velocity alone"
@@ -152,17 +136,7 @@ def check_met(met: Met, inside: np.ndarray) -> None:
 
 
 def of_known_speed(t: np.ndarray, v: np.ndarray, f: np.ndarray, inside: np.ndarray) -> Sliding:
-    """Moving samples of known velocity whose velocity changes little in a step.
-
-    Args:
-        t: time [s].
-        v: velocity [m/s].
-        f: force of the clay [N].
-        inside: mask of the samples used.
-
-    Raises:
-        ParameterError: there are too few.
-    """
+    """Moving samples of known velocity whose velocity changes little in a step."""
     change = np.abs(np.diff(v, prepend=v[:1]))
     change = np.maximum(change, np.append(change[1:], 0.0))
     speed = np.abs(v)
@@ -185,18 +159,7 @@ def _too_few(count: int) -> ParameterError:
 def of_positions(
     t: np.ndarray, p: Cleaned, f: np.ndarray, inside: np.ndarray, out: np.ndarray
 ) -> Sliding:
-    """Sliding stretches and the splines along them.
-
-    Args:
-        t: time [s].
-        p: position [m].
-        f: force of the clay [N].
-        inside: mask of the samples used.
-        out: mask of forces to leave out.
-
-    Raises:
-        ParameterError: there are too few.
-    """
+    """Sliding stretches and the splines along them."""
     inside, good, p = _unbroken(inside, p), ~p.bad, p.x - p.x.mean()
     told, count = good & ~out, quantum(p[good])
     runs = [(a, b) for a, b in runs_of(inside) if b - a >= LEAST_STRETCH]
@@ -311,11 +274,7 @@ def _between_rests(
 
 
 def quantum(x: np.ndarray) -> float:
-    """Quantum of quantised samples: all differences are multiples of it; 0 for other samples.
-
-    Args:
-        x: samples, (n,).
-    """
+    """Quantum of quantised samples: all differences are multiples of it; 0 for other samples."""
     steps = np.diff(np.unique(x))
     steps = steps[steps > 1e-9 * np.max(np.abs(x), initial=0.0)]  # rounding of the numbers
     if not len(steps):
@@ -325,13 +284,7 @@ def quantum(x: np.ndarray) -> float:
 
 
 def wrong_way(f: np.ndarray, p: Cleaned | None, v: np.ndarray | None) -> np.ndarray:
-    """Mask of the forces that drive the motion, (n,).
-
-    Args:
-        f: force of the clay on the tool, counted as resistance [N].
-        p: position [m]; None where the velocity is known.
-        v: velocity [m/s], where it is known.
-    """
+    """Mask of the forces that drive the motion, (n,)."""
     if v is None:
         assert p is not None
         v = np.gradient(p.x)

@@ -235,12 +235,7 @@ def _band(what: str, band: object, dt: float, n: int) -> tuple[float, float]:
 
 
 def _period(u: np.ndarray, high: float) -> int:
-    """Samples per period of u, if it has at least three periods; 0 otherwise.
-
-    Args:
-        u: the signal, (n,).
-        high: highest relevant frequency, in lines of a sample.
-    """
+    """Samples per period of u, if it has at least three periods; 0 otherwise."""
     from scipy.fft import irfft, next_fast_len, rfft
     from scipy.signal import find_peaks
 

@@ -115,15 +115,7 @@ class StabilityMap:
 def stability_map(
     kind: str, loop: PushedLoop, quick: bool = False, progress: Progress = iter
 ) -> StabilityMap:
-    """Make a map.
-
-    Args:
-        kind: "gain-damping", "delay-damping" (the loop's own K; sampled every 0.36 ms if it is
-            continuous) or "gain-pose" (without shaping, and with it).
-        loop: the fixed parts.
-        quick: four columns of three cells instead of eight of five.
-        progress: wraps the iterable of the columns.
-    """
+    """Make a map."""
     columns, rows = (4, 3) if quick else (8, 5)
     make = {"gain-damping": _gain_damping, "delay-damping": _delay_damping, "gain-pose": _gain_pose}
     return make[choice("map", kind, MAP_KINDS)](loop, columns, rows, progress)

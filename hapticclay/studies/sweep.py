@@ -54,22 +54,7 @@ def run_part(
     patience: float = math.inf,
     ended: Callable[[], bool] = lambda: False,
 ) -> tuple[int, float]:
-    """Makes runs and writes their file, in any process.
-
-    Args:
-        sweep: the sweep.
-        runs: a chunk, or where chunks have no size, any runs.
-        out: folder of the sweep.
-        patience: time after which fewer runs are made, at least one, if chunks have no size [s].
-        ended: whether to make no more than those.
-
-    Returns:
-        Number of runs made, and their time [s].
-
-    Raises:
-        ParameterError: the file cannot be written.
-        FileNotFoundError: the folder was removed.
-    """
+    """Makes runs and writes their file, in any process."""
     begin, number = time.perf_counter(), part_number(sweep, runs)
     check_begun(sweep, Path(out))  # before the work, too: a cluster repeats what has failed
     if isinstance(sweep, Sweep):
@@ -109,11 +94,7 @@ class Work:
         return max(self.least, CHUNK_SHARE * (time.perf_counter() - self.begin))
 
     def take(self, workers: int) -> range | None:
-        """The next runs for one process; None if none are left.
-
-        Args:
-            workers: number of processes that share the work.
-        """
+        """The next runs for one process; None if none are left."""
         if not self.left:
             return None
         runs = self.left.pop()
@@ -128,13 +109,7 @@ class Work:
         return runs
 
     def give_back(self, runs: range, made: int, seconds: float) -> None:
-        """Notes what a process has made; the rest of its runs is to be made.
-
-        Args:
-            runs: what it took.
-            made: how many of them it made.
-            seconds: in what time [s].
-        """
+        """Notes what a process has made; the rest of its runs is to be made."""
         self.each = seconds / made
         self.count += len(runs) - made
         self._put_back(runs[made:])
@@ -185,21 +160,7 @@ def run_chunks(
     workers: int | None = None,
     scheduler: str | None = None,
 ) -> Generator[int, None, None]:
-    """Makes the missing runs of a sweep whose folder is locked; yields the number in each file.
-
-    Args:
-        sweep: the sweep.
-        out: its folder.
-        todo: the missing runs.
-        workers: processes on this machine; None for one per core.
-        scheduler: address of a dask scheduler to use instead.
-
-    Raises:
-        ParameterError: a file cannot be written, or a package is missing.
-        ChildProcessError: workers here cannot be started, or one was killed.
-        ConnectionError: the connection to the scheduler is lost.
-        FileNotFoundError: the folder, or a file in it, was removed while the runs were made.
-    """
+    """Makes the missing runs of a sweep whose folder is locked; yields the number in each file."""
     work = Work(sweep, todo, CLUSTER_CHUNK_TIME if scheduler else CHUNK_TIME)
     if scheduler:
         yield from _run_on_cluster(work, str(out.resolve()), scheduler)
@@ -209,13 +170,7 @@ def run_chunks(
 
 
 def processes(sweep: Plan, todo: list[range], workers: int | None) -> int:
-    """Number of processes that make runs on this machine.
-
-    Args:
-        sweep: the sweep.
-        todo: the runs.
-        workers: largest number to use; None for one per core.
-    """
+    """Number of processes that make runs on this machine."""
     tasks = sum(map(len, todo)) if sweep.chunk is None else len(todo)
     return max(1, min(workers or cores(), tasks))
 
@@ -345,11 +300,7 @@ def _quiet(name: str) -> Iterator[None]:
 
 
 def estimate_time(sweep: Sweep) -> tuple[float, float]:
-    """Process time [s] and disk space [bytes] of a run, estimated from a random sample.
-
-    Args:
-        sweep: the sweep.
-    """
+    """Process time [s] and disk space [bytes] of a run, estimated from a random sample."""
     probed(sweep, 0.0)  # the first run imports
     rows, spent = probed(sweep, PROBE_TIME)
     each = spent / len(rows)

@@ -39,11 +39,7 @@ RESULT_COLUMNS = {  # unit, what it is; crossing1 and x stand for their likes
 
 
 def column_told(name: str) -> tuple[str, str]:
-    """Unit and description of a column of the data set, "" if it has none.
-
-    Args:
-        name: name of the column: a result, or a parameter.
-    """
+    """Unit and description of a column of the data set, "" if it has none."""
     like = re.sub("_y$", "_x", re.sub(r"^crossing\d$", "crossing1", name))
     return RESULT_COLUMNS.get(like) or (parameter_unit(name), "parameter of the run")
 
@@ -51,15 +47,7 @@ def column_told(name: str) -> tuple[str, str]:
 def result_row(
     index: int, names: list[str], point: np.ndarray, r: Record | None, refused: str = ""
 ) -> dict[str, Any]:
-    """One row of the data set: parameters, outcome and measurements; NaN for none.
-
-    Args:
-        index: number of the run.
-        names: names of its parameters.
-        point: their values.
-        r: its record; None if it was refused.
-        refused: why it was refused.
-    """
+    """One row of the data set: parameters, outcome and measurements; NaN for none."""
     nan = math.nan
     out: dict[str, Any] = {"run": index, **dict(zip(names, point.tolist(), strict=True))}
     out |= {
@@ -103,13 +91,7 @@ def _least_limit(r: Record, axis: str, stretch: dict[str, Any] | None) -> float:
 
 
 def run_point(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:
-    """Makes one run of a sweep and returns its row.
-
-    Args:
-        sweep: the sweep.
-        index: number of the run.
-        point: its parameters.
-    """
+    """Makes one run of a sweep and returns its row."""
     names = list(sweep.vary)
     try:
         scenario = sweep.run_scenario(point)
@@ -119,12 +101,7 @@ def run_point(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:
 
 
 def probed(sweep: Sweep, patience: float) -> tuple[list[dict[str, Any]], float]:
-    """Rows of random runs, and their total time [s].
-
-    Args:
-        sweep: whose runs.
-        patience: time after which fewer than PROBES runs are made [s].
-    """
+    """Rows of random runs, and their total time [s]."""
     rows, spent, begin = [], 0.0, time.perf_counter()
     for i in np.random.default_rng(0).integers(0, len(sweep), PROBES).tolist():
         rows.append(run_point(sweep, i, sweep.points(i, i + 1)[0]))

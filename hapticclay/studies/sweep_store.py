@@ -45,19 +45,11 @@ class Stored(Protocol):
         ...
 
     def chunk_runs(self, number: int) -> range:
-        """The runs of one file.
-
-        Args:
-            number: of the file, from 0.
-        """
+        """The runs of one file."""
         ...
 
     def chunk_rows(self, number: int) -> list[dict[str, Any]]:
-        """Makes the runs of one file.
-
-        Args:
-            number: of the file, from 0.
-        """
+        """Makes the runs of one file."""
         ...
 
     def blank_row(self) -> dict[str, Any]:
@@ -78,12 +70,7 @@ P = TypeVar("P", bound=Plan)
 
 
 def part_number(sweep: Plan, runs: range) -> int:
-    """Number of the file of some runs: of their chunk, or of the first run without a chunk size.
-
-    Args:
-        sweep: the sweep.
-        runs: the runs.
-    """
+    """Number of the file of some runs: of their chunk, or of the first run without a chunk size."""
     return runs.start // (sweep.chunk or 1)
 
 
@@ -91,10 +78,6 @@ def parquet_schema(sweep: Plan, number: int) -> Any:
     """The pyarrow Schema of a file; its metadata identify sweep and file.
 
     Metadata of each field are its unit and description.
-
-    Args:
-        sweep: the sweep.
-        number: of the file, see `part_number`.
     """
     import pyarrow as pa
 
@@ -117,13 +100,7 @@ def _told(schema: Any) -> Any:
 
 
 def write_part(rows: list[dict[str, Any]], schema: Any, file: Any) -> None:
-    """Writes the rows of a file.
-
-    Args:
-        rows: the rows.
-        schema: schema of the rows.
-        file: path of the file.
-    """
+    """Writes the rows of a file."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -131,11 +108,7 @@ def write_part(rows: list[dict[str, Any]], schema: Any, file: Any) -> None:
 
 
 def _read_part(file: Path) -> Any:
-    """A part as a pyarrow Table, each page checked by its checksum; None if it is no such file.
-
-    Raises:
-        ParameterError: it cannot be read at all.
-    """
+    """A part as a pyarrow Table, each page checked by its checksum; None if it is no such file."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -153,12 +126,7 @@ def _read_part(file: Path) -> Any:
 
 
 def sweep_part(out: Path, number: int) -> Path:
-    """A file of a sweep.
-
-    Args:
-        out: folder of the sweep.
-        number: of the file, see `part_number`.
-    """
+    """A file of a sweep."""
     return out / "data" / f"part-{number:06d}.parquet"
 
 
@@ -174,12 +142,7 @@ def _part_files(out: Path) -> list[Path]:
 
 
 def missing_parts(sweep: Plan, out: Path) -> list[range]:
-    """Runs without a file, in ranges: each a chunk, or all between two files.
-
-    Args:
-        sweep: the sweep.
-        out: its folder.
-    """
+    """Runs without a file, in ranges: each a chunk, or all between two files."""
     if sweep.chunk is not None:
         chunks = ((sweep.chunk_runs(n), sweep_part(out, n)) for n in range(sweep.chunks))
         return [runs for runs, file in chunks if not file.is_file()]
@@ -204,15 +167,7 @@ def _count_rows(file: Path) -> int:
 
 
 def check_complete(sweep: Plan, out: Path) -> None:
-    """Checks, after the last run, that the folder still holds all runs.
-
-    Args:
-        sweep: the sweep.
-        out: its folder.
-
-    Raises:
-        FileNotFoundError: it does not.
-    """
+    """Checks, after the last run, that the folder still holds all runs."""
     missing = sum(map(len, missing_parts(sweep, out)))
     if missing:
         raise FileNotFoundError(
@@ -222,15 +177,7 @@ def check_complete(sweep: Plan, out: Path) -> None:
 
 
 def check_begun(sweep: Plan, out: Path) -> None:
-    """Checks, before a file is written, that the folder is still that of the sweep.
-
-    Args:
-        sweep: the sweep.
-        out: its folder.
-
-    Raises:
-        FileNotFoundError: it was removed, or another sweep took its place.
-    """
+    """Checks, before a file is written, that the folder is still that of the sweep."""
     if stored_digest(out) != sweep.digest():
         raise FileNotFoundError(
             f"{out} was removed or replaced while the sweep ran: its runs there are lost"
@@ -238,11 +185,7 @@ def check_begun(sweep: Plan, out: Path) -> None:
 
 
 def stored_digest(out: Path) -> str | None:
-    """Digest of the sweep in a folder; None if it holds none.
-
-    Args:
-        out: the folder.
-    """
+    """Digest of the sweep in a folder; None if it holds none."""
     begun = _begun(out)
     return None if begun is None else str(begun.get("digest", "unreadable"))
 
@@ -254,13 +197,6 @@ def begin_sweep(sweep: Plan, out: Path) -> list[range]:
 
     Parts that are damaged or belong elsewhere are named and removed, as are temporary files of
     killed writers.
-
-    Args:
-        sweep: the sweep.
-        out: its folder.
-
-    Raises:
-        ParameterError: the folder holds another sweep, or a file that is not part of a sweep.
     """
     _file, digest = out / "sweep.json", stored_digest(out)
     if digest is not None:
@@ -333,11 +269,7 @@ def _with_chunk(sweep: P, out: Path) -> P:
 
 
 def chunk_size(seconds: float) -> int:
-    """Number of runs that take CHUNK_TIME.
-
-    Args:
-        seconds: duration of one run.
-    """
+    """Number of runs that take CHUNK_TIME."""
     return max(1, min(MOST_IN_CHUNK, int(CHUNK_TIME / max(seconds, 1e-6))))
 
 
@@ -371,14 +303,6 @@ def claimed(sweep: P, out: Path) -> Iterator[tuple[P, list[range]]]:
     """Locks the folder for this process and prepares it.
 
     Yields the sweep, with the chunk of the folder if it was None, and the runs to make.
-
-    Args:
-        sweep: the sweep.
-        out: its folder.
-
-    Raises:
-        ParameterError: the folder holds another sweep, another process uses it, a file cannot be
-            written, or a package is missing.
     """
     try:
         import pyarrow  # noqa: F401
@@ -422,12 +346,7 @@ def _hold(lock: int, out: Path) -> None:
 
 
 def row_size(sweep: Plan, rows: list[dict[str, Any]]) -> float:
-    """Disk space [bytes] per run in files of a whole chunk.
-
-    Args:
-        sweep: the sweep.
-        rows: some of its rows.
-    """
+    """Disk space [bytes] per run in files of a whole chunk."""
     import pyarrow as pa
 
     sizes = []

@@ -86,35 +86,19 @@ class Motion:
         self._gram = self._products(self._place, self._first)
 
     def place(self, c: np.ndarray) -> np.ndarray:
-        """Positions at the samples [m].
-
-        Args:
-            c: coefficients [m], (size,).
-        """
+        """Positions at the samples [m]."""
         return np.einsum("ij,ij->i", self._place, c[_nearby(self._first)])
 
     def velocity(self, c: np.ndarray) -> np.ndarray:
-        """Velocities of the samples that slide, forward [m/s].
-
-        Args:
-            c: coefficients [m], (size,).
-        """
+        """Velocities of the samples that slide, forward [m/s]."""
         return np.einsum("ij,ij->i", self._velocity, c[_nearby(self._near)])
 
     def follow(self, p: np.ndarray) -> np.ndarray:
-        """Coefficients of the best fit to samples.
-
-        Args:
-            p: positions [m], (n,).
-        """
+        """Coefficients of the best fit to samples."""
         return _solved(self._gram, self._gathered(self._place, self._first, p))
 
     def deviation(self, some: np.ndarray) -> np.ndarray:
-        """Standard deviation of velocities per standard deviation of the positions [1/s].
-
-        Args:
-            some: indices of samples that slide, (m,).
-        """
+        """Standard deviation of velocities per standard deviation of the positions [1/s]."""
         rows = np.zeros((self.size, len(some)))
         for k, i in enumerate(some.tolist()):
             rows[_nearby(self._near[i : i + 1])[0], k] = self._velocity[i]
@@ -123,18 +107,7 @@ class Motion:
     def eliminated(
         self, ratio: float, slope: np.ndarray, columns: np.ndarray, rest: np.ndarray, p: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The coefficients' part of a Gauss-Newton step, normal equations A c + G theta = g.
-
-        Args:
-            ratio: weight of a squared position relative to a squared force [N^2/m^2].
-            slope: change of each force by its velocity [N.s/m], (n,).
-            columns: change of each force by the law's parameters, (n, k).
-            rest: residual forces [N], (n,).
-            p: residual positions [m], (m,).
-
-        Returns:
-            (A^-1 g, (size,); A^-1 G, (size, k); G, (size, k)).
-        """
+        """The coefficients' part of a Gauss-Newton step, normal equations A c + G theta = g."""
         A = ratio * self._gram + self._products(self._velocity, self._near, slope * slope)
         g = ratio * self._gathered(self._place, self._first, p)
         g += self._gathered(self._velocity, self._near, slope * rest)
@@ -208,14 +181,7 @@ class Series(NamedTuple):
 
 
 def chosen_spacing(series: Sequence[Series]) -> tuple[float, list[float]]:
-    """Best spacing of the knots of splines for some series, by Akaike's criterion.
-
-    Args:
-        series: one or more.
-
-    Returns:
-        (spacing [s], residual variance of each series).
-    """
+    """Best spacing of the knots of splines for some series, by Akaike's criterion."""
     times = [x.t for x in series[0].stretches]
     finest = LEAST_PER_KNOT * float(np.median(np.diff(times[0])))
     longest = max(2.0 * finest, *(float(t[-1] - t[0]) for t in times))
@@ -247,24 +213,11 @@ class Flowing(NamedTuple):
     names: tuple[str, ...]
 
     def force(self, theta: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Forces at some speeds [N].
-
-        Args:
-            theta: parameters, with log K in place of K.
-            v: speeds [m/s], above 0.
-        """
+        """Forces at some speeds [N]."""
         return self.slopes(theta, v)[0]
 
     def slopes(self, theta: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Forces, and how they change with speed and parameters.
-
-        Args:
-            theta: parameters, with log K in place of K.
-            v: speeds [m/s], above 0, (n,).
-
-        Returns:
-            (force [N], (n,); by speed [N.s/m], (n,); by parameters, (n, k)).
-        """
+        """Forces, and how they change with speed and parameters."""
         a = dict(zip(self.names, theta.tolist(), strict=True))
         force = np.full(len(v), a.get("Fy", 0.0))
         slope = np.full(len(v), a.get("b", 0.0))
@@ -325,14 +278,7 @@ class Joint(NamedTuple):
         held: Sequence[bool] = (),
         near: np.ndarray | None = None,
     ) -> Minimum:
-        """Least sum of squares over parameters and motion, by the Gauss-Newton method.
-
-        Args:
-            law: the law.
-            theta: initial parameters.
-            held: fixed parameters; empty for none.
-            near: initial coefficients [m]; None for `start`.
-        """
+        """Least sum of squares over parameters and motion, by the Gauss-Newton method."""
         k = len(law.names)
         free = ~np.array(held, dtype=bool) if len(held) else np.ones(k, dtype=bool)
         low, high = np.array([FIT_RANGES[x] for x in law.names]).T
@@ -406,9 +352,6 @@ def correlation_time(x: np.ndarray) -> float:
 
     The sum runs over a window that grows until it holds WINDOW correlation times (A. Sokal 1997). A
     value that differs from 1 by less than twice its standard deviation is set to 1.
-
-    Args:
-        x: samples, (n,).
     """
     from scipy.fft import irfft, next_fast_len, rfft
 

@@ -72,16 +72,6 @@ def judge(
     a scene has no map, or where the push matters, a short run is made and read; so is a longer one
     if map or run leaves the verdict open. A run that ends early, or saturates the motors after so
     small a push, is unstable.
-
-    Args:
-        cases: the runs, by index; all of loops or all of walls.
-        n: number of verdicts; those without a case cannot be run.
-        pushed: whether the push matters.
-        threads: as in `simulate_batch`.
-
-    Returns:
-        Whether each is unstable: 1 or 0, NOT_RUN for one that cannot be run, shape (n,); whether a
-        longer run was made, shape (n,).
     """
     are_walls = any(isinstance(x.base, VirtualWall) for x in cases.values())
     reading = WALLS if are_walls else ARMS
@@ -97,12 +87,7 @@ def judge(
 
 
 def mapped_rates(cases: Cases, reading: Reading) -> Rates:
-    """Growth rates of those cases that have a map.
-
-    Args:
-        cases: what to judge.
-        reading: of such cases.
-    """
+    """Growth rates of those cases that have a map."""
     maps, rate = PeriodMaps(), {}
     for i, case in cases.items():
         m = maps.of(case.scenario, AXES.index(case.axis))
@@ -114,12 +99,7 @@ def mapped_rates(cases: Cases, reading: Reading) -> Rates:
 
 
 def lasting(s: Scenario, steps: float) -> Scenario:
-    """A scenario of another length.
-
-    Args:
-        s: the scenario.
-        steps: its length.
-    """
+    """A scenario of another length."""
     return replace(s, t_max=steps * s.dt)
 
 
@@ -127,21 +107,12 @@ def lasting(s: Scenario, steps: float) -> Scenario:
 
 
 def arm_scale(case: Case) -> tuple[float, float]:  # noqa: ARG001
-    """Reading.scale of a loop.
-
-    Args:
-        case: the loop.
-    """
+    """Reading.scale of a loop."""
     return growth.SLOWEST_MODE, LEAST_OF_MAP
 
 
 def short_arms(cases: Cases, threads: int | None) -> Rates:
-    """Growth rates of loops from a few samples.
-
-    Args:
-        cases: the loops.
-        threads: as in `simulate_batch`.
-    """
+    """Growth rates of loops from a few samples."""
     # Odd, so that half the sampling frequency is not aliased onto zero.
     steps = {i: 2 * round(0.5 * growth.GROWTH_SAMPLE / x.scenario.dt) + 1 for i, x in cases.items()}
     rate = {}
@@ -168,12 +139,7 @@ def _short_arms(cases: list[Case], every: int, threads: int | None) -> list[floa
 
 
 def long_arms(cases: Cases, threads: int | None) -> Rates:
-    """Growth rates of loops from longer runs.
-
-    Args:
-        cases: the loops.
-        threads: as in `simulate_batch`.
-    """
+    """Growth rates of loops from longer runs."""
     made = [x.scenario for x in cases.values()]
     jobs = [lasting(s, max(boundary.GROWTH_SPAN / s.dt, SPAN_STEPS)) for s in made]
     records = simulate_batch(jobs, threads=threads)
@@ -187,22 +153,13 @@ def long_arms(cases: Cases, threads: int | None) -> Rates:
 
 
 def wall_scale(case: Case) -> tuple[float, float]:
-    """Reading.scale of a wall.
-
-    Args:
-        case: the wall.
-    """
+    """Reading.scale of a wall."""
     n, _, slowest = wall_runs.growth_reading(case.base)
     return slowest, WALL_MAP_TOLD / (n * case.base.Ts)
 
 
 def short_walls(cases: Cases, threads: int | None) -> Rates:
-    """Growth rates of walls from a run each.
-
-    Args:
-        cases: the walls.
-        threads: as in `simulate_batch`.
-    """
+    """Growth rates of walls from a run each."""
     rate, span = long_walls(cases, threads, WALL_SPANS[0]), {}
     for i, x in cases.items():
         n, *_ = wall_runs.growth_reading(x.base, WALL_SPANS[0])
@@ -211,13 +168,7 @@ def short_walls(cases: Cases, threads: int | None) -> Rates:
 
 
 def long_walls(cases: Cases, threads: int | None, span: float = WALL_SPANS[1]) -> Rates:
-    """Growth rates of walls from longer runs.
-
-    Args:
-        cases: the walls.
-        threads: as in `simulate_batch`.
-        span: length of the runs, as in `growth_reading`.
-    """
+    """Growth rates of walls from longer runs."""
     # Those with as many steps a sample run together: their records keep one step of so many.
     steps = {i: round(x.base.Ts / x.scenario.dt) for i, x in cases.items()}
     rate = {}

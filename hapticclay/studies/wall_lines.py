@@ -61,35 +61,21 @@ class Limit:
 
 
 def wall_at(wall: Wall, K: float, B: float) -> Wall:
-    """The wall with the given K and B.
-
-    Args:
-        wall: the wall; for an arm, k and b change.
-        K: stiffness [N/m].
-        B: damping [N.s/m].
-    """
+    """The wall with the given K and B."""
     if isinstance(wall, VirtualWall):
         return replace(wall, K=K, B=B)
     return replace(wall, k=K, b=B)
 
 
 def is_linear(wall: Wall) -> bool:
-    """Whether the loop of a wall is linear: no friction, no encoder, no surface.
-
-    Args:
-        wall: the wall; the loop of an arm is linear for small motions.
-    """
+    """Whether the loop of a wall is linear: no friction, no encoder, no surface."""
     if isinstance(wall, boundary.PushedLoop):
         return True
     return not (wall.unilateral or wall.device.friction or wall.device.quantum)
 
 
 def theoretical_damping(wall: Wall) -> float:
-    """Largest B of the linear loop that is stable at K = 0 [N.s/m]; 0 for none.
-
-    Args:
-        wall: all but K and B.
-    """
+    """Largest B of the linear loop that is stable at K = 0 [N.s/m]; 0 for none."""
     unit = moving_mass(wall) / sample_time(wall)
 
     def stable(B: float) -> bool:
@@ -107,12 +93,7 @@ def theoretical_damping(wall: Wall) -> float:
 
 
 def worst_hand(wall: Wall, box: Box) -> Operator:
-    """The hand with the least stable K among those at ends and middles of a box.
-
-    Args:
-        wall: all but K and the hand, which are ignored.
-        box: the hands.
-    """
+    """The hand with the least stable K among those at ends and middles of a box."""
     sides = [
         sorted({low, 0.5 * (low + high), high}) for low, high in (box.mass, box.damper, box.spring)
     ]
@@ -122,56 +103,33 @@ def worst_hand(wall: Wall, box: Box) -> Operator:
 
 @functools.lru_cache(maxsize=2048)  # used as a line, as a guess, and for comparison with the runs
 def exact_limit(wall: Wall) -> float:
-    """Largest stable K of the linear loop [N/m].
-
-    Args:
-        wall: all but K.
-    """
+    """Largest stable K of the linear loop [N/m]."""
     if isinstance(wall, VirtualWall):
         return wall_limits.stiffness_band(wall)[1]
     return gain_limits.stiffness_limit(wall.linear)
 
 
 def softest(wall: Wall, top: float) -> float:
-    """Least K at which a wall is tested [N/m].
-
-    Args:
-        wall: all but K and B.
-        top: largest B of its linear loop [N.s/m].
-    """
+    """Least K at which a wall is tested [N/m]."""
     first, scale = (exact_limit(wall_at(wall, 0.0, share * top)) for share in (0.0, 0.5))
     scale = max(first, scale) or wall.hand.spring + moving_mass(wall) / sample_time(wall) ** 2
     return min(max(SOFTEST * first, SOFT_BOUNDS[0] * scale), SOFT_BOUNDS[1] * scale)
 
 
 def moving_mass(wall: Wall) -> float:
-    """Mass of device and hand [kg].
-
-    Args:
-        wall: the wall.
-    """
+    """Mass of device and hand [kg]."""
     if isinstance(wall, VirtualWall):
         return wall.device.mass + wall.hand.mass
     return 1.0 / wall.servo.S.gain + wall.hand.mass
 
 
 def sample_time(wall: Wall) -> float:
-    """Sampling period [s]; that of the paper if the wall has none.
-
-    Args:
-        wall: the wall.
-    """
+    """Sampling period [s]; that of the paper if the wall has none."""
     return wall.Ts or TS
 
 
 def theory_limits(wall: Wall, top: float, grid: Sequence[float]) -> list[Limit]:
-    """Lines of theory, from the least B up to top.
-
-    Args:
-        wall: all but K and B.
-        top: largest B [N.s/m].
-        grid: values of B at which walls are also tested [N.s/m], ascending.
-    """
+    """Lines of theory, from the least B up to top."""
     first = next((B for B in grid if B > 0.0), 1.0)
     fine = [*np.linspace(min(grid[0], 0.0), first, 5)[:-1]]
     if top > first:

@@ -43,11 +43,7 @@ Share = Callable[[float], None]
 
 
 def unshown(share: float) -> None:
-    """Ignores the progress.
-
-    Args:
-        share: completed share of the work.
-    """
+    """Ignores the progress."""
 
 
 @named
@@ -82,15 +78,7 @@ def stiffest(
     press: Press,
     show: Share,
 ) -> list[float]:
-    """Largest stable K of each wall [N/m], by runs.
-
-    Args:
-        walls: all but K; they differ only in B.
-        exact: limit of the linear loop for each [N/m]: start of the search.
-        softest: least K in the search [N/m].
-        press: push for a wall that is not linear.
-        show: called with the completed share of the work.
-    """
+    """Largest stable K of each wall [N/m], by runs."""
     if is_linear(walls[0]):
         searches = [
             boundary.crossing_search(K if 0.0 < K < math.inf else softest, 0.1 * STIFFNESS_MAX)
@@ -118,14 +106,7 @@ def _damping(wall: Wall) -> float:
 
 
 def most_damping(wall: Wall, top: float, K: float, press: Press) -> float:
-    """Largest stable B at a K [N.s/m], by runs.
-
-    Args:
-        wall: all but K and B.
-        top: limit of the linear loop at K = 0 [N.s/m]: start of the search.
-        K: stiffness [N/m].
-        press: push for a wall that is not linear.
-    """
+    """Largest stable B at a K [N.s/m], by runs."""
     if top == 0.0:
         return 0.0
 
@@ -184,10 +165,6 @@ def growth_rates(walls: Sequence[Wall], maps: PeriodMaps | None = None) -> list[
     """Growth rate of the oscillation of each wall's linear loop [1/s].
 
     It is that of the map of a sample; that of a run where there is none.
-
-    Args:
-        walls: the walls.
-        maps: those made before; None for none.
     """
     maps = maps or PeriodMaps()
     rates = [_mapped_rate(wall, maps) for wall in walls]
@@ -229,25 +206,12 @@ def _rates_of_runs(walls: Sequence[Wall]) -> list[float]:
 
 
 def growth_steps(wall: VirtualWall) -> int:
-    """Engine steps per sample of a run for a growth rate.
-
-    Args:
-        wall: the wall.
-    """
+    """Engine steps per sample of a run for a growth rate."""
     return _engine_steps([wall], GROWTH_STEPS)
 
 
 def growth_reading(wall: VirtualWall, span: float = 1.0) -> tuple[int, float, float]:
-    """Parameters for the growth rate of a wall's oscillation, on the scale of its samples.
-
-    Args:
-        wall: the wall.
-        span: length of the run, relative to the shortest that decides most walls.
-
-    Returns:
-        Samples of the run; approximate spacing of the samples used [s]; rate below which modes are
-        ignored [rad/s, 1/s].
-    """
+    """Parameters for the growth rate of a wall's oscillation, on the scale of its samples."""
     omega = math.sqrt((wall.K + wall.hand.spring) / moving_mass(wall))
     order = wall.velocity_window + wall.delay / wall.Ts
     n = max(
@@ -286,10 +250,6 @@ def come_to_rest(walls: Sequence[VirtualWall], press: Press = Press()) -> list[b
     `press.still`. While a larger oscillation decays, the run is extended, up to 64 times. Without
     an encoder, an oscillation that still decays at the end is stable, too. With an encoder it may
     end in a limit cycle of about a quantum, so the wall must come to rest.
-
-    Args:
-        walls: the walls.
-        press: the push and the criterion of rest.
     """
     rests: dict[int, bool] = {}
     steps = _engine_steps(walls, REST_STEPS)

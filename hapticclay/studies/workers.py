@@ -36,12 +36,6 @@ def started(crew: int) -> Iterator[Callable[..., Future[Any]]]:
     """Processes that call functions; yields the function that submits a call.
 
     At the end no further call begins, `ended` is true in those at work, and they are waited for.
-
-    Args:
-        crew: number of processes.
-
-    Raises:
-        ChildProcessError: processes cannot be started, or one ended before its time.
     """
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor

@@ -101,14 +101,7 @@ class Drift:
 
 
 def poses(spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points of a square grid through the nominal pose that lie within reach, y >= 0.
-
-    Args:
-        spacing: of the grid [m].
-
-    Returns:
-        World x and y [m], shape (m,) each.
-    """
+    """Points of a square grid through the nominal pose that lie within reach, y >= 0."""
     reach = L1 + L2
 
     def along(nominal: float, lowest: float) -> np.ndarray:

@@ -124,24 +124,13 @@ class YieldMap:
 
 
 def yielding_run(loop: PushedLoop, flow: Flow, t_max: float) -> Scenario:
-    """The scenario of a pushed loop in yielding clay, with unlimited motors.
-
-    Args:
-        loop: the loop; its own b is ignored.
-        flow: the law of the clay.
-        t_max: length of the run [s].
-    """
+    """The scenario of a pushed loop in yielding clay, with unlimited motors."""
     scenario = replace(loop, torque_limit=NO_LIMITS).scenario(t_max, stop_when_unstable=False)
     return replace(scenario, clay=slab(flow))
 
 
 def measured_cycle(record: Record, axis: str) -> MeasuredCycle | None:
-    """The oscillation in the last half of a run; None if it rests or completes no period.
-
-    Args:
-        record: of the motion.
-        axis: "x" or "y".
-    """
+    """The oscillation in the last half of a run; None if it rests or completes no period."""
     i = AXES.index(choice("axis", axis, AXES))
     last = record.t >= 0.5 * record.t[-1]
     t, v, p = record.t[last], record.v[last, i], record.p[last, i]
@@ -164,12 +153,7 @@ def measured_cycle(record: Record, axis: str) -> MeasuredCycle | None:
 
 
 def classify_push(loop: PushedLoop, flow: Flow) -> tuple[PushClass, float]:
-    """Outcome of a push in a run, and the largest velocity of its limit cycle [m/s], NaN for none.
-
-    Args:
-        loop: the loop; its own b is ignored.
-        flow: the law of the clay.
-    """
+    """Outcome of a push in a run, and the largest velocity of its limit cycle [m/s], NaN for none."""
     cycle = None
     for t_max in RUN_SPANS:
         record = simulate(yielding_run(loop, flow, t_max))
@@ -190,15 +174,6 @@ def yield_map(
     """Make the map of yield force and gain, for Bingham clay of the loop's b.
 
     Theory and runs use continuous time, no delay and unlimited motors.
-
-    Args:
-        loop: the fixed parts; its own K is ignored, its push is LARGE_PUSH.
-        quick: four gains of four yield forces, and seven on the lines, instead of six of seven, and
-            nineteen.
-        progress: wraps the iterable of the gains.
-
-    Raises:
-        ParameterError: the loop has no limit cycle at any gain.
     """
     loop = replace(loop, **TIMING, push=LARGE_PUSH)
     linear, unit = loop.linear, Flow(Fy=1.0, b=loop.b)

@@ -59,16 +59,7 @@ class Handle:
         place: tuple[float, float] = (0.0, 0.0),
         normal: tuple[float, float] = (1.0, 0.0),
     ) -> Handle:
-        """The handle of a scenario's arm and operator.
-
-        Args:
-            scenario: source of arm, origin and operator; compensator and servo are ignored.
-            place: position of the handle, p [m].
-            normal: normal of the wall, any length above 0.
-
-        Raises:
-            ParameterError: the place is out of reach, or the normal has no direction.
-        """
+        """The handle of a scenario's arm and operator."""
         place = pair("place", place, -10.0, 10.0, unit="m")
         size = math.hypot(*normal)
         if not (size > 0.0 and math.isfinite(size)):
@@ -89,21 +80,7 @@ class Handle:
 
 
 def client_map(handle: Handle, K: float, B: float, Ts: float, delay: float) -> np.ndarray:
-    """State matrix of the sampled loop, x(k+1) = A x(k): position, velocity, then delayed forces.
-
-    Args:
-        handle: arm and hand.
-        K: stiffness of the wall [N/m].
-        B: damping of the wall [N.s/m].
-        Ts: sampling period of the program [s].
-        delay: from a reading to the force computed from it [s].
-
-    Returns:
-        A, shape (n, n).
-
-    Raises:
-        ParameterError: the delay is of more than 500 samples.
-    """
+    """State matrix of the sampled loop, x(k+1) = A x(k): position, velocity, then delayed forces."""
     whole, part = linear_loop.whole_samples(delay, Ts)
     if whole > LONGEST_QUEUE:
         raise ParameterError("delay", delay, f"must be {LONGEST_QUEUE} samples at most")
@@ -136,15 +113,7 @@ def _held(handle: Handle, t: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def holds(handle: Handle, K: float, B: float, Ts: float, delay: float) -> bool:
-    """Whether the loop is stable: all modes but rigid motion lie within the unit circle.
-
-    Args:
-        handle: arm and hand.
-        K: stiffness of the wall [N/m].
-        B: damping of the wall [N.s/m].
-        Ts: sampling period of the program [s].
-        delay: from a reading to the force computed from it [s].
-    """
+    """Whether the loop is stable: all modes but rigid motion lie within the unit circle."""
     return bool(_stable(client_map(handle, K, B, Ts, delay)))
 
 
@@ -157,20 +126,7 @@ def _stable(maps: np.ndarray) -> np.ndarray:
 
 @checked
 def rendered_stiffness_limit(handle: Handle, B: float, Ts: float, delay: float = 0.0) -> float:
-    """Largest stable stiffness of a wall rendered by a program [N/m].
-
-    Args:
-        handle: arm and hand.
-        B: damping of the wall [N.s/m], -1e6 to 1e6.
-        Ts: sampling period of the program [s], 1e-6 to 1.
-        delay: from a reading to the force computed from it [s], 0 to 10.
-
-    Returns:
-        The limit; 0 if no wall is stable, inf if every tested wall is stable (1e-3 to 1e9 N/m).
-
-    Raises:
-        ParameterError: a number is out of its bounds, or the delay is of more than 500 samples.
-    """
+    """Largest stable stiffness of a wall rendered by a program [N/m]."""
     (limit,) = rendered_stiffness_limits(handle, (B,), Ts, delay)
     return limit
 
@@ -179,20 +135,7 @@ def rendered_stiffness_limit(handle: Handle, B: float, Ts: float, delay: float =
 def rendered_stiffness_limits(
     handle: Handle, B: Sequence[float], Ts: float, delay: float = 0.0
 ) -> tuple[float, ...]:
-    """Largest stable stiffness for several dampings of the wall: the Z-width of a program's loop.
-
-    Args:
-        handle: arm and hand.
-        B: dampings of the wall [N.s/m], -1e6 to 1e6 each.
-        Ts: sampling period of the program [s], 1e-6 to 1.
-        delay: from a reading to the force computed from it [s], 0 to 10.
-
-    Returns:
-        A limit for each [N/m].
-
-    Raises:
-        ParameterError: as `rendered_stiffness_limit`.
-    """
+    """Largest stable stiffness for several dampings of the wall: the Z-width of a program's loop."""
     dampings = [number("B", b, -1e6, 1e6) for b in B]
     Ts, delay = number("Ts", Ts, 1e-6, 1.0), number("delay", delay, 0.0, 10.0)
     free = client_map(handle, 0.0, 0.0, Ts, delay)  # the loop is linear in K and B
@@ -222,17 +165,6 @@ def slowest_period(handle: Handle, K: float, B: float, late: float, Ts: float) -
     """Longest sampling period, up to which a wall rendered by a program is stable [s].
 
     The wall is stable at this and at every shorter period that is tested: 33 in each factor of ten.
-
-    Args:
-        handle: arm and hand.
-        K: stiffness of the wall [N/m].
-        B: damping of the wall [N.s/m].
-        late: delay in samples, the same at every period.
-        Ts: the middle of the search [s]: from a thousandth to a thousand times it.
-
-    Returns:
-        The period; 0 if the loop is unstable at a thousandth of Ts, inf if it is stable at every
-        period up to a thousand times Ts.
     """
     grid = np.geomspace(1e-3 * Ts, 1e3 * Ts, PERIODS).tolist()
 

@@ -68,13 +68,6 @@ def amplitudes(flow: Flow, N: float) -> tuple[float, ...]:
 
     For n <= 1, N(V) falls, so there is at most one solution. For n > 1, N(V) falls to a minimum and
     rises again, so there are up to two, or one without a yield force.
-
-    Args:
-        flow: the law of the clay.
-        N: damping [N.s/m].
-
-    Returns:
-        V [m/s], ascending; empty for a damper, whose N does not depend on V.
     """
     from scipy.optimize import brentq
 
@@ -139,14 +132,7 @@ def _unstable_poles(loop: Loop, b: float) -> int:
 
 
 def damping_crossings(loop: Loop) -> tuple[DampingCrossing, ...]:
-    """Every damping of the clay at which the linear loop gains or loses a stable pole.
-
-    Args:
-        loop: the loop with its K, in continuous time without delay; its b is ignored.
-
-    Returns:
-        The crossings, b ascending.
-    """
+    """Every damping of the clay at which the linear loop gains or loses a stable pole."""
     found = roots.crossings(*_over_damping(loop))
     b = [x for x, _ in found]
     between = [math.sqrt(x * y) for x, y in zip(b[:-1], b[1:], strict=True)]
@@ -288,27 +274,13 @@ def push_outcomes(loop: Loop, *, flow: Flow) -> tuple[PushOutcome, PushOutcome]:
 
 
 def is_flow(flow: Flow) -> None:
-    """Refuses anything but a Flow.
-
-    Args:
-        flow: the law of the clay.
-
-    Raises:
-        ParameterError: it is not a Flow.
-    """
+    """Refuses anything but a Flow."""
     if not isinstance(flow, Flow):
         raise ParameterError("flow", flow, "must be a Flow")
 
 
 def without_spring(loop: Loop) -> None:
-    """Refuses a loop in elastic clay, where yielding clay would come to rest elsewhere.
-
-    Args:
-        loop: the loop.
-
-    Raises:
-        ParameterError: its k is not 0.
-    """
+    """Refuses a loop in elastic clay, where yielding clay would come to rest elsewhere."""
     if loop.k:
         raise ParameterError("k", loop.k, "must be 0 here: the analysis is of clay that yields")
 

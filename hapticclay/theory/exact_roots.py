@@ -23,30 +23,17 @@ NEAR = 1e-4  # of their size: closer real roots are separated by their common pa
 
 
 def exact(p: Polynomial) -> Polynomial:
-    """The polynomial with rational coefficients.
-
-    Args:
-        p: polynomial with real coefficients.
-    """
+    """The polynomial with rational coefficients."""
     return rational(p.coef.tolist())
 
 
 def rational(c: Iterable[Any]) -> Polynomial:
-    """The polynomial of these coefficients as rational numbers.
-
-    Args:
-        c: real numbers, lowest power first.
-    """
+    """The polynomial of these coefficients as rational numbers."""
     return Polynomial(np.array([Fraction(x) for x in c] or [Fraction(0)], dtype=object))
 
 
 def value(p: Polynomial, x: Fraction) -> Fraction:
-    """p(x) in exact arithmetic, which `Polynomial` leaves where it maps its domain.
-
-    Args:
-        p: polynomial with rational coefficients.
-        x: where.
-    """
+    """p(x) in exact arithmetic, which `Polynomial` leaves where it maps its domain."""
     common = math.lcm(*(c.denominator for c in p.coef))
     out, power = 0, 1  # of integers: one division at the end
     for c in p.coef[::-1]:
@@ -56,20 +43,12 @@ def value(p: Polynomial, x: Fraction) -> Fraction:
 
 
 def derivative(p: Polynomial) -> Polynomial:
-    """p' in exact arithmetic.
-
-    Args:
-        p: polynomial with rational coefficients.
-    """
+    """p' in exact arithmetic."""
     return rational([i * c for i, c in enumerate(p.coef)][1:])
 
 
 def approximate(p: Polynomial) -> Polynomial:
-    """The polynomial with coefficients of type float.
-
-    Args:
-        p: polynomial with rational coefficients.
-    """
+    """The polynomial with coefficients of type float."""
     return Polynomial(p.coef.astype(float))
 
 
@@ -82,9 +61,6 @@ def roots_right(p: Polynomial) -> tuple[int, int]:
     Along the axis the phase of p turns by a half for each root on its left and by minus a half for
     each on its right. Sturm's chain counts the turns (Gantmacher, The Theory of Matrices, 1959, ch.
     15).
-
-    Args:
-        p: polynomial with real coefficients, not zero.
     """
     c = _integers(p)
     c = c[next(i for i, x in enumerate(c) if x) :]
@@ -151,23 +127,14 @@ def _real_index(chain: Sequence[Sequence[int]]) -> int:
 
 
 def axis_parts(p: Polynomial) -> tuple[Polynomial, Polynomial]:
-    """p(j omega) = even + j omega odd, both polynomials in omega^2.
-
-    Args:
-        p: polynomial with real coefficients.
-    """
+    """p(j omega) = even + j omega odd, both polynomials in omega^2."""
     c = exact(p).coef
     even, odd = ([x if i % 2 == 0 else -x for i, x in enumerate(c[j::2])] for j in (0, 1))
     return rational(even), rational(odd)
 
 
 def within_rounding(p: Polynomial, x: Fraction) -> bool:
-    """Whether a change of its coefficients in their last digits makes p zero at omega^2 = x.
-
-    Args:
-        p: polynomial with real coefficients.
-        x: omega^2, > 0.
-    """
+    """Whether a change of its coefficients in their last digits makes p zero at omega^2 = x."""
     even, odd = axis_parts(p)
     sizes = (rational(map(abs, part.coef)) for part in (even, odd))
     least, most = (value(e, x) ** 2 + x * value(o, x) ** 2 for e, o in ((even, odd), sizes))
@@ -175,14 +142,7 @@ def within_rounding(p: Polynomial, x: Fraction) -> bool:
 
 
 def axis_roots(p: Polynomial) -> list[tuple[Fraction, int]]:
-    """Pairs of roots of p on the imaginary axis within rounding: omega^2, and their side of it.
-
-    Args:
-        p: polynomial with real coefficients, not zero.
-
-    Returns:
-        (omega^2, 1 right, 0 on, -1 left of the axis), omega^2 ascending.
-    """
+    """Pairs of roots of p on the imaginary axis within rounding: omega^2, and their side of it."""
     even, odd = axis_parts(p)
     slope_even, slope_odd = axis_parts(derivative(exact(p)))
     found: list[tuple[Fraction, int]] = []
@@ -195,21 +155,12 @@ def axis_roots(p: Polynomial) -> list[tuple[Fraction, int]]:
 
 
 def count_right(p: Polynomial) -> int:
-    """Number of roots right of the imaginary axis, without those on it within rounding.
-
-    Args:
-        p: polynomial with real coefficients, not zero.
-    """
+    """Number of roots right of the imaginary axis, without those on it within rounding."""
     return roots_right(p)[0] - 2 * sum(side > 0 for _, side in axis_roots(p))
 
 
 def unit_crossings(n: Polynomial, d: Polynomial) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies at which |n/d| = 1 [rad/s], and the phase of n/d ahead of -1, 0 to 2 pi.
-
-    Args:
-        n: numerator, of floats or rational.
-        d: denominator.
-    """
+    """Frequencies at which |n/d| = 1 [rad/s], and the phase of n/d ahead of -1, 0 to 2 pi."""
     (ne, no), (de, do) = axis_parts(n), axis_parts(d)
     omega2 = rational([0, 1])
     found = positive_roots(ne * ne + omega2 * no * no - de * de - omega2 * do * do)
@@ -227,11 +178,7 @@ def unit_crossings(n: Polynomial, d: Polynomial) -> tuple[np.ndarray, np.ndarray
 
 
 def positive_roots(p: Polynomial) -> list[Fraction]:
-    """Positive real roots of p to `BITS` bits, ascending, each once.
-
-    Args:
-        p: polynomial with real coefficients.
-    """
+    """Positive real roots of p to `BITS` bits, ascending, each once."""
     f, found = rational(_trimmed(p)), set()
     for group in _groups(_rough_roots(f)):
         found.update(_separated(f, group))
@@ -265,11 +212,7 @@ def _trimmed(p: Polynomial) -> list[Fraction]:
 
 
 def approximate_roots(p: Polynomial) -> np.ndarray:
-    """Roots other than zero in floats, of coefficients of any size.
-
-    Args:
-        p: polynomial, of floats or rational.
-    """
+    """Roots other than zero in floats, of coefficients of any size."""
     z, scale = _scaled_roots(p)
     return z * float(scale)
 
@@ -278,9 +221,6 @@ def root_sizes(p: Polynomial) -> tuple[float, float]:
     """Sizes of the smallest and the largest root other than zero, within a factor of their number.
 
     Fujiwara's bounds, which no rounding of roots loses.
-
-    Args:
-        p: polynomial, of floats or rational, with such a root.
     """
     c = _trimmed(p)
     logs = [math.log(abs(x.numerator)) - math.log(x.denominator) if x else -math.inf for x in c]
@@ -347,9 +287,5 @@ def _square_root(x: Fraction) -> Fraction:
 
 
 def square_root(x: Fraction) -> float:
-    """The square root of a rational number, to the last digit of a float.
-
-    Args:
-        x: >= 0.
-    """
+    """The square root of a rational number, to the last digit of a float."""
     return float(_square_root(x))

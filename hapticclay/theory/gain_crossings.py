@@ -36,14 +36,7 @@ SMALL_ANGLE = 1e-6  # eigenvalues below this share of the largest are computed f
 
 
 def critical_gain(loop: LinearLoop) -> tuple[float, float]:
-    """The gain limit and the frequency of oscillation at that gain.
-
-    Args:
-        loop: the loop, its K ignored.
-
-    Returns:
-        (K, omega [rad/s]).
-    """
+    """The gain limit and the frequency of oscillation at that gain."""
     if loop.Ts is not None or loop.delay:
         return first_instability(loop_family(loop))
     denominator, passive, driven = linear_loop.loop_polynomials(loop, rational)
@@ -51,11 +44,7 @@ def critical_gain(loop: LinearLoop) -> tuple[float, float]:
 
 
 def is_stable(loop: LinearLoop) -> bool:
-    """Whether the loop is stable at its K, whether or not it is stable at lower K.
-
-    Args:
-        loop: the loop with its K > 0.
-    """
+    """Whether the loop is stable at its K, whether or not it is stable at lower K."""
     K = number("K", loop.gain, 0.0, above=True)
     if loop.Ts is not None:
         return _within_circle(*_acting_map(loop)[:3], K)
@@ -65,11 +54,7 @@ def is_stable(loop: LinearLoop) -> bool:
 
 
 def loop_family(loop: LinearLoop) -> LoopFamily:
-    """The sampled or delayed loop for every gain.
-
-    Args:
-        loop: the loop, sampled or delayed, its K ignored.
-    """
+    """The sampled or delayed loop for every gain."""
     return delayed_loop(loop) if loop.Ts is None else sampled_loop(loop)
 
 
@@ -104,14 +89,7 @@ class LoopFamily:
 
 
 def first_instability(loop: LoopFamily) -> tuple[float, float]:
-    """Smallest K > 0 at which the loop stops being stable, and its frequency.
-
-    Args:
-        loop: the loop for every gain.
-
-    Returns:
-        (K, omega [rad/s]); (inf, nan) if it is always stable.
-    """
+    """Smallest K > 0 at which the loop stops being stable, and its frequency."""
     found = gain_crossings(loop)
     found = sorted(found + [(loop.most, math.inf)] if loop.most < math.inf else found)
     if not loop.stable(0.5 * found[0][0] if found else 1.0):
@@ -129,9 +107,6 @@ def gain_crossings(loop: LoopFamily) -> list[tuple[float, float]]:
     Two crossings closer than the grid appear as a dip of Im h without a change of sign, so the
     search also minimises every dip. Poles and zeros of h on the border of stability are no
     crossings: the loop has them at K = 0 and at infinity.
-
-    Args:
-        loop: the loop for every gain.
     """
 
     def phase_sine(x: np.ndarray) -> np.ndarray:
@@ -161,10 +136,6 @@ def unit_crossings(loop: LoopFamily, K: float) -> list[float]:
     """Every frequency up to the end of the grid at which |K h| = 1 [rad/s].
 
     Below the grid |h| is a power of the frequency: the search goes on to where it is past 1.
-
-    Args:
-        loop: the loop for every gain.
-        K: compensator gain, > 0.
     """
 
     def level(x: np.ndarray) -> np.ndarray:
@@ -274,13 +245,7 @@ def _inverse_quadratic(x: tuple[np.ndarray, ...], y: tuple[np.ndarray, ...]) -> 
 
 
 def frequency_grid(low: float, high: float, resonances: np.ndarray) -> np.ndarray:
-    """Logarithmic frequency grid, refined around resonances.
-
-    Args:
-        low: lowest [rad/s].
-        high: highest [rad/s].
-        resonances: real or complex, used by magnitude [rad/s], shape (n,).
-    """
+    """Logarithmic frequency grid, refined around resonances."""
     base = np.geomspace(low, high, 2 + int(math.log(high / low) / math.log(PHASE_STEP)))
     near = np.multiply.outer(
         np.abs(resonances), np.concatenate((1.0 - NEAR_AXIS, [1.0], 1.0 + NEAR_AXIS))
@@ -295,9 +260,6 @@ def delayed_loop(loop: LinearLoop) -> LoopFamily:
     or the force shapes the inertia. Then acceleration is fed back with delay and with constant gain
     at high frequency. That gain must stay below one (a neutral delay system: Hale, Verduyn Lunel,
     Introduction to Functional Differential Equations, 1993, ch. 9).
-
-    Args:
-        loop: the loop, in continuous time, its K ignored.
     """
     delay, parts = loop.delay, linear_loop.delayed_polynomials(loop, rational)
     while all(p.coef[0] == 0.0 for p in parts):  # the integrator that moves the handle
@@ -345,11 +307,7 @@ def delayed_loop(loop: LinearLoop) -> LoopFamily:
 
 
 def compensator_poles(loop: LinearLoop) -> tuple[float, ...]:
-    """Frequencies of the poles of C on the imaginary axis within rounding [rad/s].
-
-    Args:
-        loop: the loop.
-    """
+    """Frequencies of the poles of C on the imaginary axis within rounding [rad/s]."""
     found = exact_roots.axis_roots(loop.compensator.fraction[1])
     return tuple(exact_roots.square_root(x) for x, _ in found)
 
@@ -381,9 +339,6 @@ def sampled_loop(loop: LinearLoop) -> LoopFamily:
     The map is therefore one of differences, M - 1. Its states are relative to the rest, or steady
     motion, that the present states of C's integrators would give. The integrators' columns are then
     zero except for their own chain.
-
-    Args:
-        loop: the loop, sampled, its K ignored.
     """
     less, beta, gamma, free, integrators, unseen = _acting_map(loop)
     t, Ts, n = loop.environment, loop.Ts, len(less)
@@ -479,12 +434,7 @@ def _within_circle(less: np.ndarray, beta: np.ndarray, gamma: np.ndarray, K: flo
 def _acting_map(
     loop: LinearLoop,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int, int]:
-    """The sampled loop without the states that do not affect the force.
-
-    Returns:
-        M - 1, beta and gamma; M - 1 without C's integrators; number of these; number of omitted
-        states.
-    """
+    """The sampled loop without the states that do not affect the force."""
     loop = replace(loop, compensator=linear_loop.reduced(loop.compensator))
     less, beta, gamma = linear_loop.sampled_differences(loop)
     less, beta, gamma = _from_rest(loop, less, beta[:, 0], gamma[0])
@@ -537,9 +487,6 @@ def eigenvalues(a: np.ndarray) -> np.ndarray:
     """Eigenvalues, small ones as accurate as large ones: the small are computed from the inverse.
 
     Of a matrix that is singular in floats the smallest are 0, within its rounding.
-
-    Args:
-        a: matrix, shape (n, n).
     """
     z = np.linalg.eigvals(a)
     z = z[np.argsort(np.abs(z))]

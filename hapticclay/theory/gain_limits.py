@@ -62,16 +62,7 @@ def stiffness_limit(loop: Loop) -> float:
 
 
 def continuous_limit(scenario: Scenario, axis: str, b: float) -> float:
-    """Gain limit of the loop of a scenario for continuous control without delay.
-
-    Args:
-        scenario: the run.
-        axis: "x" or "y".
-        b: clay [N.s/m].
-
-    Returns:
-        K; inf if there is no limit, or if the scenario has a user's controller.
-    """
+    """Gain limit of the loop of a scenario for continuous control without delay."""
     if scenario.controller is not None:
         return math.inf
     return gain_limit(replace(Loop.of(scenario, axis, b), **TIMING))
@@ -82,14 +73,6 @@ def spring_crossover(scenario: Scenario, i: int, k: float) -> float:
 
     It solves k |P| = 1 with P = (G C + Sh)/(1 + m s^2 (G C + Sh)), the handle with the mass of the
     hand. Without shaping the gain of Sh is trace W, an upper bound over poses and directions.
-
-    Args:
-        scenario: the run, with continuous control.
-        i: axis, 0 for x, 1 for y.
-        k: stiffness [N/m].
-
-    Returns:
-        [rad/s]; 0 for none.
     """
     loop = Loop.of(scenario, AXES[i], 0.0)
     if not scenario.inertia_shaping:

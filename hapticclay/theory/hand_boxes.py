@@ -98,13 +98,6 @@ def critical_hand(loop: Loop, box: Box) -> tuple[Operator, float] | None:
     The closed-loop polynomial is A + E Th, so the pole s = j omega needs one value Th = -A/E. The
     values of the box at omega are a rectangle, spring - mass omega^2 by omega damper: -A/E lies in
     it where four polynomials in omega^2 have the right sign.
-
-    Args:
-        loop: the loop with its K, in continuous time; its hand is ignored.
-        box: the hands.
-
-    Returns:
-        (hand, frequency [rad/s]), or None if no hand of the box puts a pole there.
     """
     denominator, passive, driven = linear_loop.loop_polynomials(
         replace(loop, operator=None), rational
@@ -165,12 +158,6 @@ def rigid_limit(loop: Loop) -> tuple[float, float]:
     The closed-loop poles tend to the zeros of G C + Sh, so its numerator sets the limit for any
     clay. The paper remarks below Eq. 13 that no compensator is stable with a rigid arm. This is a
     property of its sufficient condition, not of the loop.
-
-    Args:
-        loop: the loop, in continuous time; clay, hand and K are ignored.
-
-    Returns:
-        (K, omega [rad/s]).
     """
     unit = replace(loop, b=0.0, k=0.0, operator=Operator(0.0, 0.0, 1.0))
     return roots.first_crossing(*linear_loop.loop_polynomials(unit, rational)[1:])

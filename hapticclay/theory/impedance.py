@@ -126,16 +126,7 @@ class HeldArm(NamedTuple):
 def held_arm(
     mass: float, damper: float, spring: float, Ts: float, delay: float, omega: np.ndarray
 ) -> HeldArm:
-    """Responses of a mass, damper and spring whose motor force is held from sample to sample.
-
-    Args:
-        mass: moving mass [kg], > 0.
-        damper: damping of the mass [N.s/m].
-        spring: stiffness on the mass [N/m].
-        Ts: control sample [s].
-        delay: from a sample to the force computed from it [s].
-        omega: [rad/s], > 0, shape (n,).
-    """
+    """Responses of a mass, damper and spring whose motor force is held from sample to sample."""
     whole, part = linear_loop.whole_samples(delay, Ts)
     own, s = np.array([-spring, -damper]) / mass, 1j * omega
     # under the force of one sample for a share `part`, then under the next
@@ -194,14 +185,7 @@ def loop_impedance(loop: Loop, omega: np.ndarray) -> np.ndarray:
 
 
 def frequencies(omega: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Frequencies as an array of floats.
-
-    Args:
-        omega: [rad/s], shape (n,).
-
-    Raises:
-        ParameterError: one is not above 0, or not finite.
-    """
+    """Frequencies as an array of floats."""
     out = np.atleast_1d(array_of("omega", omega))
     if out.ndim != 1 or not np.all(np.isfinite(out)) or np.any(out <= 0.0):
         raise ParameterError("omega", omega, "must be numbers above 0 rad/s, shape (n,)")
@@ -212,10 +196,6 @@ def late_impedance(loop: Loop, omega: np.ndarray) -> np.ndarray:
     """fh/v of a loop in continuous time with motors delayed by loop.delay [N.s/m], complex, (n,).
 
     The closed-loop polynomial is P + Th N with any hand Th, so p = (N/P) fh without one.
-
-    Args:
-        loop: the loop with its K, in continuous time.
-        omega: [rad/s], > 0, shape (n,).
     """
     s = 1j * omega
     late = np.exp(-s * loop.delay)

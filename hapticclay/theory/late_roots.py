@@ -19,13 +19,7 @@ from .exact_roots import axis_parts, value
 
 
 def roots_right(now: Polynomial, later: Polynomial, delay: float) -> int:
-    """Number of roots right of the axis (argument principle).
-
-    Args:
-        now: polynomial, of floats or rational; where s is infinite, the larger of the two.
-        later: polynomial.
-        delay: > 0 [s].
-    """
+    """Number of roots right of the axis (argument principle)."""
     now, later = exact_roots.exact(now).trim(), exact_roots.exact(later).trim()
     while not now.coef[0] and not later.coef[0]:  # roots at zero count on neither side
         now, later = (exact_roots.rational(p.coef[1:]) for p in (now, later))

@@ -109,16 +109,6 @@ def steady_speed(
     G/K as s goes to 0 (Eqs. 20, 21). Without an integrator in C the handle comes to rest. With two
     it speeds up until the clay carries all of the force; without clay its speed grows without
     bound.
-
-    Args:
-        K: compensator gain.
-        f: hand force [N].
-        b: clay [N.s/m], a float or an array.
-        compensator: shape of C.
-        servo: servo of the axis; the printed ones have a static gain of 1.
-
-    Returns:
-        The speed; inf with the sign of f where it grows without bound.
     """
     num, den = (p.coef for p in reduced(compensator).fraction)
     n = np.count_nonzero(np.cumsum(den != 0.0) == 0)  # integrators
@@ -133,16 +123,7 @@ def steady_speed(
 
 
 def steady_damper(K: float, compensator: Compensator = PRINTED, servo: Servo = SERVO[0]) -> float:
-    """Equivalent damper of the handle in steady motion, 10/K with the printed parts [N.s/m].
-
-    Args:
-        K: compensator gain.
-        compensator: shape of C.
-        servo: of the axis.
-
-    Returns:
-        1/(K c), c as in `steady_speed`; inf without an integrator, 0 with two.
-    """
+    """Equivalent damper of the handle in steady motion, 10/K with the printed parts [N.s/m]."""
     num, den = (p.coef for p in reduced(compensator).fraction)
     if den[0] != 0.0 or K == 0.0:
         return math.inf
@@ -150,18 +131,7 @@ def steady_damper(K: float, compensator: Compensator = PRINTED, servo: Servo = S
 
 
 def steady_velocity(f: Any, damper: Any, Fy: float, K: float, n: float) -> np.ndarray:
-    """Velocity in clay that yields under a constant force: f = damper v + (Fy + K |v|^n) v/|v|.
-
-    Args:
-        f: force along the axes on which the clay acts jointly [N], shape (n,).
-        damper: of `steady_damper` and the clay together, along each [N.s/m], shape (n,).
-        Fy: yield force [N].
-        K: consistency [N/(m/s)^n].
-        n: flow index.
-
-    Returns:
-        [m/s], shape (n,): 0 below the yield force, inf where nothing else resists.
-    """
+    """Velocity in clay that yields under a constant force: f = damper v + (Fy + K |v|^n) v/|v|."""
     f, damper = np.asarray(f, dtype=float), np.asarray(damper, dtype=float)
     size = math.hypot(*f)
     if size <= Fy:
@@ -185,11 +155,7 @@ def steady_velocity(f: Any, damper: Any, Fy: float, K: float, n: float) -> np.nd
 
 
 def reduced(compensator: Compensator) -> Compensator:
-    """A compensator with the common factors s of numerator and denominator cancelled.
-
-    Args:
-        compensator: shape of C.
-    """
+    """A compensator with the common factors s of numerator and denominator cancelled."""
     num, den = compensator.num, compensator.den
     while num[-1] == den[-1] == 0.0:
         num, den = num[:-1], den[:-1]
@@ -206,14 +172,6 @@ def loop_polynomials(
 
     The first is the common denominator of G, C and Sh, so the loop's transfer function
     (G C + Sh)(Te + Th) is (passive + K driven)/denominator.
-
-    Args:
-        loop: the loop, in continuous time without delay; its K is ignored.
-        polynomial: makes polynomials of coefficients; `exact_roots.rational` makes all of them, and
-            their products, exact.
-
-    Returns:
-        (denominator, passive, driven).
     """
     s, cg = loop.servo.S, _forward_denominator(loop, polynomial)
     t = polynomial(loop.environment.coef)
@@ -235,13 +193,6 @@ def delayed_polynomials(
             + (s^2 + kd s + kp) G C T)
 
     times the denominator of G C.
-
-    Args:
-        loop: the loop, in continuous time; its K is ignored.
-        polynomial: as in `loop_polynomials`.
-
-    Returns:
-        (physical, motors, driven).
     """
     physical, motors = delayed_servo(loop, polynomial)
     cg = _forward_denominator(loop, polynomial)
@@ -251,15 +202,7 @@ def delayed_polynomials(
 def delayed_servo(
     loop: LinearLoop, polynomial: Callable[[Any], Polynomial] = Polynomial
 ) -> tuple[Polynomial, Polynomial]:
-    """Parts of the closed-loop polynomial without compensator: physical + late motors.
-
-    Args:
-        loop: the loop, in continuous time; its K is ignored.
-        polynomial: as in `loop_polynomials`.
-
-    Returns:
-        (physical, motors).
-    """
+    """Parts of the closed-loop polynomial without compensator: physical + late motors."""
     s, th = loop.servo.S, loop.hand
     k, b = (loop.k, loop.b) if loop.render == "physical" else (0.0, 0.0)  # physical
     W = s.gain if loop.mobility is None else loop.mobility
@@ -279,35 +222,20 @@ def _forward_denominator(
 
 
 def characteristic(loop: LinearLoop) -> Polynomial:
-    """Closed-loop polynomial of 1 + (G C + Sh)(Te + Th), the denominator of Eq. 8.
-
-    Args:
-        loop: the loop, in continuous time without delay.
-
-    Returns:
-        Polynomial in s, of degree 6 with the printed compensator.
-    """
+    """Closed-loop polynomial of 1 + (G C + Sh)(Te + Th), the denominator of Eq. 8."""
     denominator, passive, driven = loop_polynomials(loop)
     return denominator + passive + loop.gain * driven
 
 
 def device_admittance(loop: LinearLoop) -> tuple[Polynomial, Polynomial]:
-    """G C + Sh, handle position over net force, as (numerator, denominator).
-
-    Args:
-        loop: the loop; hand and clay are ignored.
-    """
+    """G C + Sh, handle position over net force, as (numerator, denominator)."""
     unit_spring = replace(loop, b=0.0, k=0.0, operator=Operator(0.0, 0.0, 1.0))
     denominator, passive, driven = loop_polynomials(unit_spring)
     return passive + loop.gain * driven, denominator
 
 
 def device_impedance(loop: LinearLoop) -> tuple[Polynomial, Polynomial]:
-    """1/(s (G C + Sh)), net force over handle velocity, as (numerator, denominator).
-
-    Args:
-        loop: the loop; hand and clay are ignored.
-    """
+    """1/(s (G C + Sh)), net force over handle velocity, as (numerator, denominator)."""
     e, d = device_admittance(loop)
     return (d, roots.VARIABLE * e) if d.coef[0] else (d // roots.VARIABLE, e)
 
@@ -316,9 +244,6 @@ def stable(loop: LinearLoop) -> bool:
     """Return True if every closed-loop pole lies left of the imaginary axis, but free motion at 0.
 
     The answer is exact.
-
-    Args:
-        loop: the loop, in continuous time without delay.
     """
     denominator, passive, driven = loop_polynomials(loop, rational)
     return roots.hurwitz(denominator + passive + rational([loop.gain]) * driven)
@@ -333,14 +258,6 @@ def state_space(
     """The loop in continuous time: z' = A z + B uh, with y = G delta.
 
     The servo's law is that of docs/equations.md, section 3.
-
-    Args:
-        *loops: of one axis, or of x and y, with their K.
-        mobility: W = Lambda^-1 of the arm [1/kg], shape (n, n); None for the gains of Sh.
-
-    Returns:
-        A, shape (m, m), and B, shape (m, n); z holds (p, p', states of the compensator, y, y') of
-        each of the n axes. As printed, m = 6 n and those states are delta and delta'.
     """
     n, at = len(loops), _places(loops)
     W = _shaped_mobility(loops) if mobility is None else mobility
@@ -373,17 +290,6 @@ def sampled_differences(
     in the delay splits the hold in two (Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed.,
     3.2). As in `Sampled`, the net force f = gamma x that drives the compensator is measured before
     u changes, so its inertial part of the hand belongs to the previous u.
-
-    Args:
-        *loops: of one axis, or of x and y; Ts, delay and render are those of the first, the gains
-            are ignored.
-        pose: mobility of the arm [1/kg], shape (n, n), and whether the servo shapes the inertia;
-            None for the nominal pose.
-
-    Returns:
-        M - 1, shape (m, m), without the loss of digits of the difference; beta, shape (m, n);
-        gamma, shape (n, m). m = n (7 + N) with compensators of order 2. K is the diagonal matrix
-        of the gains.
     """
     n, at, first = len(loops), _places(loops), loops[0]
     Ts, implicit = first.Ts, first.render == "physical"
@@ -437,12 +343,7 @@ def sampled_differences(
 
 
 def whole_samples(delay: float, Ts: float) -> tuple[int, float]:
-    """Whole samples in a delay, and the rest of it as a share of one; 0.0 within rounding.
-
-    Args:
-        delay: [s].
-        Ts: control sample [s].
-    """
+    """Whole samples in a delay, and the rest of it as a share of one; 0.0 within rounding."""
     whole = math.floor(delay / Ts + 1e-9)
     part = delay / Ts - whole
     return whole, part if part > 1e-9 else 0.0
@@ -532,15 +433,7 @@ def _moved_together(force: np.ndarray, w: np.ndarray, t: float) -> tuple[np.ndar
 
 
 def held_change(loop: LinearLoop, K: float) -> tuple[np.ndarray, np.ndarray]:
-    """Compensator and reference model over a sample under held net force: z+ = z + D z + B f.
-
-    Args:
-        loop: the loop, sampled.
-        K: gain of the compensator.
-
-    Returns:
-        D, shape (n, n), without the loss of digits of a difference, and B, shape (n,).
-    """
+    """Compensator and reference model over a sample under held net force: z+ = z + D z + B f."""
     assert loop.Ts is not None
     A, B = controller.controller_matrices(loop.servo, loop.compensator, K)
     n = len(B)
@@ -562,14 +455,6 @@ def held_motion(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.nda
 
     The response to a pulse, and its integral, are divided differences of exp(s t) at the roots 0,
     slow and fast, written without cancellation for clay of any stiffness.
-
-    Args:
-        own: acceleration per place [1/s^2] and per velocity [1/s], shape (2,).
-        w: acceleration per force [1/kg].
-        t: the time [s].
-
-    Returns:
-        The change for p and v before, shape (2, 2), and for a held u, shape (2,).
     """
     fast = 0.5 * (own[1] - cmath.sqrt(own[1] * own[1] + 4.0 * own[0]))
     slow = -own[0] / fast if fast else 0.0
@@ -595,16 +480,6 @@ def crossing_times(
 
     The times are exact to rounding: between borders the loop is linear, so matrix exponentials
     advance it, and bisection locates the crossings (Brent 1973).
-
-    Args:
-        loop: the loop with its K, in continuous time; its clay is ignored.
-        uh: muscle force [N].
-        edges: borders, ascending [m].
-        b: clay before each border [N.s/m].
-        t_max: end of the search [s].
-
-    Returns:
-        One time for each border crossed before t_max [s].
     """
     from scipy.optimize import brentq
 

@@ -65,13 +65,6 @@ def colgate_schenkel(
         damping > Ts/2 1/(1 - cos omega Ts) Re{(1 - exp(-j omega Ts)) H(exp(j omega Ts))}
 
     for 0 < omega <= pi/Ts.
-
-    Args:
-        H: pulse transfer function from sampled position to held force [N/m] at complex z, (n,) to
-            (n,).
-        Ts: control sample [s].
-        damping: physical damping of the device [N.s/m].
-        n: number of frequencies.
     """
     Ts = number("Ts", Ts, 0.0, above=True, unit="s")
     damping = number("damping", damping, 0.0, unit="N.s/m")

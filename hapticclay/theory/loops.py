@@ -106,15 +106,6 @@ def of_loop(
     `f(loop, ...)`, `f(loop, K=2.0, ...)`; `f(scenario, "x", ...)`, with b= for another clay, which
     calls `Loop.of`; or `f("x", *order, servo=..., compensator=..., ...)`: the axis, what `order`
     names by position or by name, and every other part of a Loop by name.
-
-    Args:
-        order: parts of the loop and arguments of the analysis that may follow the axis by position;
-            all but the operator are required. After a Loop only arguments of the analysis may
-            follow by position.
-        timing: whether the analysis supports sampled and delayed loops.
-
-    Returns:
-        A decorator.
     """
 
     def decorate(analysis: Callable[..., Answer]) -> Callable[..., Answer]:

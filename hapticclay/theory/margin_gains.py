@@ -27,20 +27,7 @@ Region = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]  # of omega,
 
 
 def first_gain(loop: Loop, at: str, gain: float, phase: float, disk: float, late: float) -> float:
-    """Least K > 0 at which one of the margins is used up.
-
-    Args:
-        loop: the loop, in continuous time without delay, its K ignored.
-        at: where the loop is opened (see `stability_margins.open_loop`).
-        gain: least gain margin, >= 1.
-        phase: least phase margin [rad].
-        disk: least disk margin.
-        late: least delay margin [s].
-
-    Returns:
-        K; inf if there is none, 0 if a margin is missed at every small K. Where the loop is opened
-        at the compensator, a gain margin is a matter of the gain limit alone and is left out.
-    """
+    """Least K > 0 at which one of the margins is used up."""
     blank, passive, driven = linear_loop.loop_polynomials(loop)
     if at == "compensator":
         fixed, driven, below = Polynomial([0.0]), driven, blank + passive

@@ -74,13 +74,7 @@ class PoseLimits:
         self.known: tuple[Known, Known] = {}, {}
 
     def at(self, i: int, p: tuple[float, float], b: tuple[float, float]) -> float:
-        """The gain limit with the handle at a place [1/kg]; inf for none.
-
-        Args:
-            i: axis, 0 for x, 1 for y.
-            p: position of the handle [m].
-            b: damping of the clay there, along both axes of the clay [N.s/m].
-        """
+        """The gain limit with the handle at a place [1/kg]; inf for none."""
         s, known = self.scenario, self.known[i]
         if s.controller is not None:
             return math.inf
@@ -98,12 +92,7 @@ class PoseLimits:
         return known[key]
 
     def stable_if_shaped(self, i: int, b: float) -> bool:
-        """Whether inertia shaping makes the loop of an axis stable at its gain, at every pose.
-
-        Args:
-            i: axis, 0 for x, 1 for y.
-            b: damping of the clay [N.s/m].
-        """
+        """Whether inertia shaping makes the loop of an axis stable at its gain, at every pose."""
         s = self.scenario
         if not self._coupled or s.rotated:
             return False
@@ -128,11 +117,6 @@ class PoseLimits:
         """The least gain limit over the places of a box.
 
         Places are multiples of SPACING, the start, and both sides of each border of the clay.
-
-        Args:
-            i: axis, 0 for x, 1 for y.
-            low: lowest corner of the box [m].
-            high: highest corner of the box [m].
         """
         s, clay = self.scenario, self.scenario.clay
         edges = clay.edges if clay else ((), ())
@@ -159,9 +143,6 @@ class PoseLimits:
 
         A constant force along x alone moves the handle straight from start to length. A run that
         is driven otherwise may meet all of the clay. A run without a force stays at its start.
-
-        Args:
-            i: axis, 0 for x, 1 for y.
         """
         s = self.scenario
         force = s.steady_force
@@ -209,12 +190,7 @@ class _CoupledLoop:
         self._driven = n * Dj, n * cj, n * nj
 
     def limit(self, W: np.ndarray, T: list[list[Polynomial]]) -> float:
-        """Least gain at which the loop is unstable.
-
-        Args:
-            W: gains of Sh, shape (2, 2) [1/kg].
-            T: Te + Th of both axes, 2 by 2.
-        """
+        """Least gain at which the loop is unstable."""
         i, j = self.i, 1 - self.i
         own, there, across = T[i][i], T[j][j], T[0][1]
         det = own * there - across * across

@@ -182,18 +182,6 @@ def critical_push(loop: Loop, *, flow: Flow) -> float:
     exponentials advance the loop. Bisection finds the velocity and assumes that every stronger push
     keeps sliding, too. The result differs from the speed of the threshold, to which a motion at the
     limit converges.
-
-    Args:
-        loop: the loop with its K, its b ignored; or axis, flow, K, operator, and other parts by
-            name; or a Scenario and an axis.
-        flow: the law of the clay: a yield force and optionally a damper.
-
-    Returns:
-        [m/s], within 1 %; inf where every push is predicted to end stuck, 0 where none is.
-
-    Raises:
-        ParameterError: the clay has no yield force, or a consistency with n other than 1; or the
-            compensator has no integrator, so that only the handle moves.
     """
     pieces, moving = _pieces(loop, flow), _moving_state(loop)
     cycles = [x for x in limit_cycles(loop, flow=flow) if x.kind == "threshold"]

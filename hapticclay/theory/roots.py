@@ -31,29 +31,17 @@ SAME = 1e-12  # of their size: roots that cross at such K leave no room between 
 
 
 def roots(p: Polynomial) -> np.ndarray:
-    """Roots of p, with roots at zero exactly zero (`polyroots` returns rounding errors).
-
-    Args:
-        p: polynomial.
-    """
+    """Roots of p, with roots at zero exactly zero (`polyroots` returns rounding errors)."""
     return np.roots(p.coef[::-1])
 
 
 def nonzero_roots(p: Polynomial) -> np.ndarray:
-    """Roots of p other than zero.
-
-    Args:
-        p: polynomial.
-    """
+    """Roots of p other than zero."""
     return np.roots(np.trim_zeros(p.coef)[::-1])
 
 
 def positive_roots(p: Polynomial) -> np.ndarray:
-    """Positive real roots of a real polynomial; imaginary parts up to 1e-6 count as rounding.
-
-    Args:
-        p: polynomial with real coefficients.
-    """
+    """Positive real roots of a real polynomial; imaginary parts up to 1e-6 count as rounding."""
     x = nonzero_roots(p)
     return x[(np.abs(x.imag) <= 1e-6 * np.abs(x)) & (x.real > 0.0)].real
 
@@ -62,58 +50,33 @@ def hurwitz(p: Polynomial) -> bool:
     """Return True if every root of p other than zero lies left of the imaginary axis.
 
     The answer is exact.
-
-    Args:
-        p: polynomial, of floats or rational.
     """
     return not np.any(p.coef) or exact_roots.roots_right(p) == (0, 0)
 
 
 def multiplicity_of_zero(p: Polynomial) -> int:
-    """Number of roots of p at zero.
-
-    Args:
-        p: polynomial.
-    """
+    """Number of roots of p at zero."""
     return int(np.argmax(p.coef != 0.0))
 
 
 def on_axis(p: Polynomial) -> Polynomial:
-    """p(j omega) as a polynomial in omega with complex coefficients.
-
-    Args:
-        p: polynomial with real coefficients.
-    """
+    """p(j omega) as a polynomial in omega with complex coefficients."""
     powers: Any = 1j ** np.arange(len(p.coef))
     return Polynomial(p.coef * powers)
 
 
 def cross_spectrum(p: Polynomial, q: Polynomial) -> Polynomial:
-    """p(j omega) q(j omega)*, with * the conjugate, as a polynomial in omega.
-
-    Args:
-        p: polynomial with real coefficients.
-        q: polynomial with real coefficients.
-    """
+    """p(j omega) q(j omega)*, with * the conjugate, as a polynomial in omega."""
     return on_axis(p) * Polynomial(on_axis(q).coef.conj())
 
 
 def real_part(p: Polynomial, q: Polynomial) -> Polynomial:
-    """Re p(j omega) q(j omega)* as a polynomial in omega^2.
-
-    Args:
-        p: polynomial with real coefficients.
-        q: polynomial with real coefficients.
-    """
+    """Re p(j omega) q(j omega)* as a polynomial in omega^2."""
     return Polynomial(cross_spectrum(p, q).coef.real[::2])
 
 
 def squared_magnitude(p: Polynomial) -> Polynomial:
-    """|p(j omega)|^2 as a polynomial in omega^2.
-
-    Args:
-        p: polynomial with real coefficients.
-    """
+    """|p(j omega)|^2 as a polynomial in omega^2."""
     return real_part(p, p)
 
 
@@ -124,13 +87,6 @@ def crossings(A: Polynomial, B: Polynomial) -> list[tuple[float, float]]:
     of this polynomial in omega give every K at which a pair of roots can cross. A single root can
     cross at 0 and at infinity. Roots that stay at zero do not count. Roots of A and of B on the
     axis within rounding do not count either: the loop has them at K = 0 and at infinity.
-
-    Args:
-        A: polynomial, of floats or rational.
-        B: polynomial, of no higher degree.
-
-    Returns:
-        (K, omega [rad/s]), K ascending.
     """
     return [(x.K, x.omega) for x in _every_crossing(A, B) if not x.end]
 
@@ -165,16 +121,7 @@ def _every_crossing(A: Polynomial, B: Polynomial) -> list[_Crossing]:
 
 
 def first_crossing(A: Polynomial, B: Polynomial) -> tuple[float, float]:
-    """Smallest K > 0 at which a root of A + K B leaves the left half plane, and its frequency.
-
-    Args:
-        A: polynomial, of floats or rational.
-        B: polynomial, of no higher degree.
-
-    Returns:
-        (K, omega [rad/s]); (inf, nan) if no root crosses, (0, nan) if one lies right of the axis at
-        small K.
-    """
+    """Smallest K > 0 at which a root of A + K B leaves the left half plane, and its frequency."""
     A, B = exact(A), exact(B)
 
     def stable(low: float, high: float) -> bool:
@@ -200,15 +147,7 @@ def first_crossing(A: Polynomial, B: Polynomial) -> tuple[float, float]:
 
 
 def least_ratio(R: Polynomial, Q: Polynomial) -> tuple[float, float]:
-    """Smallest value of R/Q over all frequencies, 0 and infinity included, and its frequency.
-
-    Args:
-        R: polynomial in omega^2.
-        Q: polynomial in omega^2, Q >= 0.
-
-    Returns:
-        (value, omega [rad/s]).
-    """
+    """Smallest value of R/Q over all frequencies, 0 and infinity included, and its frequency."""
     unit = _typical_size(R, Q)
     R, Q = _in_unit(R, unit), _in_unit(Q, unit)
     found = np.concatenate((nonzero_roots(R), nonzero_roots(Q)))
@@ -221,13 +160,6 @@ def peak_ratio(p: Polynomial, q: Polynomial) -> tuple[float, float]:
 
     The values come from p and q themselves: their squares lose half of the digits at a lightly
     damped root of q.
-
-    Args:
-        p: polynomial with real coefficients.
-        q: polynomial with real coefficients.
-
-    Returns:
-        (value, omega [rad/s]).
     """
     unit = _typical_size(p, q)
     p, q = _in_unit(p, unit), _in_unit(q, unit)
@@ -299,12 +231,6 @@ def refined_minimum(
     """A minimum of f, and its place, from the values y at ascending x around the least, y[i].
 
     The function may be infinite; the search then ends at the border of where it is finite.
-
-    Args:
-        f: function of arrays, shape (n,) to (n,).
-        x: shape (n,).
-        y: f(x), shape (n,).
-        i: index of a y that is no larger than its neighbours.
     """
     for _ in range(REFINED):
         if math.isinf(y[i]):
@@ -353,11 +279,7 @@ def _scan(found: np.ndarray) -> np.ndarray:
 
 
 def positive_bands(p: Polynomial) -> tuple[tuple[float, float], ...]:
-    """Bands of omega [rad/s] in which a polynomial in omega^2 is positive.
-
-    Args:
-        p: polynomial with real coefficients.
-    """
+    """Bands of omega [rad/s] in which a polynomial in omega^2 is positive."""
     x = np.concatenate(([0.0], np.sort(positive_roots(p))))
     inside = np.concatenate((0.5 * (x[1:] + x[:-1]), [2.0 * x[-1] + 1.0]))
     edges = np.concatenate((np.sqrt(x), [math.inf]))
@@ -365,11 +287,7 @@ def positive_bands(p: Polynomial) -> tuple[tuple[float, float], ...]:
 
 
 def runs_of_true(mask: np.ndarray) -> list[tuple[int, int]]:
-    """First and last index of each run of True.
-
-    Args:
-        mask: shape (n,).
-    """
+    """First and last index of each run of True."""
     padded = np.concatenate(([False], mask, [False]))
     first = np.flatnonzero(padded[1:] & ~padded[:-1])
     last = np.flatnonzero(padded[:-1] & ~padded[1:]) - 1
@@ -379,17 +297,7 @@ def runs_of_true(mask: np.ndarray) -> list[tuple[int, int]]:
 def bisect(
     holds: Callable[[float], bool], low: float, high: float, rtol: float = 1e-12
 ) -> tuple[float, float]:
-    """Narrow the bracket of a change by bisection.
-
-    Args:
-        holds: the property; true at low, false at high.
-        low: lower end of the bracket.
-        high: upper end of the bracket.
-        rtol: width of the result, relative to its upper end.
-
-    Returns:
-        (low, high), the property true at low and false at high.
-    """
+    """Narrow the bracket of a change by bisection."""
     while high - low > rtol * high:
         middle = 0.5 * (low + high)
         if middle in (low, high):
@@ -404,18 +312,7 @@ def first_failure(
     below: float | None = None,
     rtol: float = 1e-12,
 ) -> tuple[float, float]:
-    """Bracket the first change from true to false along a grid.
-
-    Args:
-        holds: the property. A failure narrower than the grid may be missed.
-        grid: ascending positive values to test.
-        below: value below the grid at which the property is known to hold; None if there is none.
-        rtol: width of the result, relative to its upper end.
-
-    Returns:
-        (low, high), the property true at low and false at high: (0, first of grid) if it fails
-        there and below is None, (last of grid, inf) if it never fails.
-    """
+    """Bracket the first change from true to false along a grid."""
     low = below
     for x in grid:
         if not holds(x):

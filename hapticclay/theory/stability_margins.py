@@ -134,17 +134,7 @@ class Nyquist:
 
 @of_loop("K", "b", "operator")
 def open_loop(loop: Loop, *, at: str = "force") -> tuple[Polynomial, Polynomial]:
-    """The loop's transfer function as (numerator, denominator), common factors s removed.
-
-    Args:
-        loop: the loop with its K; or axis, K, b, operator, and other parts by name.
-        at: where the loop is opened: at the net "force", L = (G C + Sh)(Te + Th) (Eq. 8), or at the
-            "compensator", G C (Te + Th)/(1 + Sh (Te + Th)) (Eq. 12), whose gain margin is that of
-            K.
-
-    Raises:
-        ParameterError: a value is out of its bounds.
-    """
+    """The loop's transfer function as (numerator, denominator), common factors s removed."""
     return _opened(loop, at)
 
 
@@ -195,14 +185,6 @@ def encirclements(n: Polynomial, d: Polynomial) -> tuple[int, int]:
     half a turn along the axis for each root of n + d on the left and of d on the right, by minus
     half a turn for each of n + d on the right and of d on the left. The turns are counted exactly,
     in rational arithmetic, so curves pass -1, and resonances are as sharp, as they will.
-
-    Args:
-        n: numerator, of no higher degree than d, of floats or rational.
-        d: denominator.
-
-    Returns:
-        (N, clockwise encirclements of -1; P, roots of d right of the axis; those on it within
-        rounding do not count).
     """
     n, d = exact_roots.exact(n), exact_roots.exact(d)
     P = exact_roots.count_right(d)

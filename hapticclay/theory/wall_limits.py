@@ -95,15 +95,6 @@ def wall_differences(wall: VirtualWall) -> np.ndarray:
     x holds position and velocity, then, if the wall needs them: the displacements between the last
     `window` samples, the filtered velocity and the measured velocity of the previous sample, and
     the delayed forces, newest first. A fraction of a sample in the delay splits the hold in two.
-
-    Args:
-        wall: the wall with its K.
-
-    Returns:
-        D, shape (n, n), without the loss of digits of a difference.
-
-    Raises:
-        ParameterError: window and delay together exceed 600 samples.
     """
     change, soon, late, whole, part = _motion(wall)
     Ts, moves = wall.Ts, wall.B != 0.0 or wall.M != 0.0
@@ -159,13 +150,7 @@ def _split_delay(wall: VirtualWall) -> tuple[int, float]:
 
 
 def _motion(wall: VirtualWall) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, float]:
-    """Change of (position, velocity) of device and hand over a sample.
-
-    Returns:
-        The change per previous state, shape (2, 2); per force that starts `part` of a sample after
-        the sample, shape (2,); per force that acts until then, shape (2,); whole samples of the
-        delay; part.
-    """
+    """Change of (position, velocity) of device and hand over a sample."""
     d, hand = wall.device, wall.hand
     whole, part = _split_delay(wall)
     mass = d.mass + hand.mass
@@ -340,12 +325,6 @@ def passive_damping_limit(wall: VirtualWall) -> float:
     """Largest B at which a wall of damping alone is passive [N.s/m], by `passivity_index`.
 
     The damper that it needs is proportional to B.
-
-    Args:
-        wall: device and timing; K, B, M, hand, friction and quantum are ignored.
-
-    Returns:
-        B; 0 without a damper, and where B acts on an exact velocity.
     """
     unit = replace(wall, K=0.0, B=1.0, M=0.0)
 
@@ -396,16 +375,6 @@ def worst_middle(wall: VirtualWall, turn: float) -> complex | None:
 
     For samples cos(k turn) the position is Re{middle exp(j k turn)}, the one with the least excess
     damping.
-
-    Args:
-        wall: the wall with its K, of a device with a damper.
-        turn: omega Ts, 0 to pi.
-
-    Returns:
-        The middle; None if the force changes at the samples.
-
-    Raises:
-        ParameterError: the device has no damper, so there is no worst hand.
     """
     b = number("device.damper", wall.device.damper, 0.0, above=True, unit="N.s/m")
     whole, part = _split_delay(wall)

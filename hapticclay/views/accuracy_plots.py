@@ -36,9 +36,6 @@ def accuracy_plot(ladder: Ladder) -> Figure:
 
     Rings mark the cheapest setting for an error. In the grey band the error of the reference hides
     that of a setting.
-
-    Args:
-        ladder: from `accuracy_ladder`.
     """
     units = ladder.units()
     with figure_style():

@@ -19,11 +19,7 @@ MOST_TITLED = 8  # that a title lists
 
 
 def in_math(text: str) -> str:
-    """Typesets a text on clay with letters and units as formulas; K is the consistency here.
-
-    Args:
-        text: such as "Fy = 2 N".
-    """
+    """Typesets a text on clay with letters and units as formulas; K is the consistency here."""
     for plain, formula in _FORMULAS.items():
         text = text.replace(plain, formula)
     return text
@@ -40,11 +36,7 @@ _FORMULAS = {
 
 
 def scenario_parts(s: Scenario) -> list[str]:
-    """Phrases that describe a scenario in a title.
-
-    Args:
-        s: the scenario.
-    """
+    """Phrases that describe a scenario in a title."""
 
     def pair(x: tuple[float, float]) -> str:
         return f"({x[0]:.3g}, {x[1]:.3g})"
@@ -62,12 +54,6 @@ def scenario_parts(s: Scenario) -> list[str]:
 
 
 def finish(figure: Figure, panels: list[Axes], record: Record) -> None:
-    """Adds the legend, and the title of a run.
-
-    Args:
-        figure: of the panels.
-        panels: the first gets the title.
-        record: the run.
-    """
+    """Adds the legend, and the title of a run."""
     add_legend(figure, panels[0])
     set_title(panels[0], *scenario_parts(record.scenario))

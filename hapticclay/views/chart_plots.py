@@ -29,9 +29,6 @@ def chart_plot(chart: Chart) -> Figure:
 
     Curves of the kind "line" cycle through the colours of the style. Marks have the colour of the
     preceding line, as runs match their theory, and are black without one.
-
-    Args:
-        chart: the chart.
     """
     with figure_style():
         figure = Figure(figsize=figure_size(1, 4.4))
@@ -63,20 +60,12 @@ def chart_plot(chart: Chart) -> Figure:
 
 
 def lab_plot(found: Lab) -> Figure:
-    """Plots the first chart of a lab.
-
-    Args:
-        found: from `lab`.
-    """
+    """Plots the first chart of a lab."""
     return chart_plot(found.charts[0])
 
 
 def staircase_plot(found: StaircaseRun) -> Figure:
-    """Plots the levels of a staircase over its trials, the turns marked.
-
-    Args:
-        found: from `run_staircase`.
-    """
+    """Plots the levels of a staircase over its trials, the turns marked."""
     trials, at = np.arange(len(found.levels)), found.turns[found.staircase.skipped :]
     ends, mean = trials[[0, -1]], [found.estimate] * 2
     curves = (

@@ -24,11 +24,7 @@ class Clock:
     """
 
     def __init__(self, span: float = FRAME_TIME):
-        """Begins with the first slice.
-
-        Args:
-            span: nominal real time between two slices [s].
-        """
+        """Begins with the first slice."""
         self._span = span
         self.frames, self.late, self.slow = 0, np.zeros(len(LATE_EDGES) - 1, dtype=int), False
         self.real = self.simulated = 0.0  # [s] in all
@@ -37,11 +33,7 @@ class Clock:
         self._owed = 0.0
 
     def due(self, now: float) -> float:
-        """Returns the simulated time to advance now [s], at most LONGEST_SLICE.
-
-        Args:
-            now: real time [s].
-        """
+        """Returns the simulated time to advance now [s], at most LONGEST_SLICE."""
         passed = self._span if self._then is None else now - self._then
         self._then = now
         self._owed += passed

@@ -36,11 +36,7 @@ BAND = 2.0 * math.pi * np.geomspace(0.1, 100.0, 400)  # [rad/s]
 
 
 def compare_figures(found: Comparison) -> dict[str, tuple[str, shown.Figure]]:
-    """Returns the figures of a comparison by name, each with a title.
-
-    Args:
-        found: from `compare_files`, all of one kind.
-    """
+    """Returns the figures of a comparison by name, each with a title."""
     if isinstance(found[0].subject, VirtualWall):
         plots: dict[str, tuple[str, Callable[[Comparison], Figure]]] = {
             "zwidth": ("Walls that are stable, by runs and exact", wall_region_plot),
@@ -64,11 +60,7 @@ def compare_figures(found: Comparison) -> dict[str, tuple[str, shown.Figure]]:
 
 
 def main_overlay(found: Comparison) -> Figure:
-    """Plots the main difference between the files: stable walls, or velocity over position.
-
-    Args:
-        found: from `compare_files`.
-    """
+    """Plots the main difference between the files: stable walls, or velocity over position."""
     walls = isinstance(found[0].subject, VirtualWall)
     return wall_region_plot(found) if walls else velocity_overlay(found)
 
@@ -101,22 +93,14 @@ def _zero(figure: Figure) -> Figure:
 
 
 def velocity_overlay(found: Comparison) -> Figure:
-    """Plots velocity over position of each run.
-
-    Args:
-        found: scenarios.
-    """
+    """Plots velocity over position of each run."""
     i = AXES.index(found[0].loop.axis if found[0].loop else "x")
     labels = dict(xlabel=f"position {AXES[i]} [cm]", ylabel=f"velocity v$_{AXES[i]}$ [m/s]")
     return _overlay(found, lambda x: (100.0 * x.record.p[:, i], x.record.v[:, i]), **labels)
 
 
 def gain_overlay(found: Comparison) -> Figure:
-    """Plots the gain limit over b, with the sampling of each file, and marks its b and K.
-
-    Args:
-        found: scenarios.
-    """
+    """Plots the gain limit over b, with the sampling of each file, and marks its b and K."""
 
     def limits(x: Compared) -> tuple[np.ndarray, np.ndarray]:
         assert x.loop is not None
@@ -141,11 +125,7 @@ def _shown_band(x: Compared) -> np.ndarray:
 
 
 def spare_plot(found: Comparison) -> Figure:
-    """Plots the excess damping: passivity index of a sampled wall, Re Z of an arm.
-
-    Args:
-        found: all of one kind.
-    """
+    """Plots the excess damping: passivity index of a sampled wall, Re Z of an arm."""
 
     def spare(x: Compared) -> tuple[np.ndarray, np.ndarray]:
         if isinstance(x.subject, VirtualWall):
@@ -160,11 +140,7 @@ def spare_plot(found: Comparison) -> Figure:
 
 
 def impedance_overlay(found: Comparison) -> Figure:
-    """Plots the magnitude of the impedance fh/v over frequency.
-
-    Args:
-        found: all of one kind.
-    """
+    """Plots the magnitude of the impedance fh/v over frequency."""
 
     def size(x: Compared) -> tuple[np.ndarray, np.ndarray]:
         omega = _shown_band(x)
@@ -175,11 +151,7 @@ def impedance_overlay(found: Comparison) -> Figure:
 
 
 def parts_overlay(found: Comparison) -> Figure:
-    """Plots effective stiffness, damping and mass over frequency; empty panels are omitted.
-
-    Args:
-        found: all of one kind.
-    """
+    """Plots effective stiffness, damping and mass over frequency; empty panels are omitted."""
     panels = {"stiffness": "[N/m]", "damping": "[N.s/m]", "mass": "[kg]"}
     curves = [(look, _shown_band(x), x) for x, look in _looks(found)]
     known = [(look, omega, x.impedance(omega), x.name) for look, omega, x in curves]
@@ -204,11 +176,7 @@ def parts_overlay(found: Comparison) -> Figure:
 
 
 def transparency_overlay(found: Comparison) -> Figure:
-    """Plots |fe/fh| over frequency, in continuous time.
-
-    Args:
-        found: scenarios.
-    """
+    """Plots |fe/fh| over frequency, in continuous time."""
 
     def share(x: Compared) -> tuple[np.ndarray, np.ndarray]:
         assert x.loop is not None
@@ -222,20 +190,12 @@ def transparency_overlay(found: Comparison) -> Figure:
 
 
 def wall_region_plot(found: Comparison) -> Figure:
-    """Plots the walls that each device renders stably, by runs and by theory, and its own wall.
-
-    Args:
-        found: walls.
-    """
+    """Plots the walls that each device renders stably, by runs and by theory, and its own wall."""
     walls = [x.subject for x in found if isinstance(x.subject, VirtualWall)]
     return regions_plot([replace(x.region, name=x.name) for x in found if x.region], walls)
 
 
 def push_plot(found: Comparison) -> Figure:
-    """Plots position over time after a push.
-
-    Args:
-        found: walls.
-    """
+    """Plots position over time after a push."""
     labels = dict(xlabel="time [s]", ylabel="position x [mm]")
     return _zero(_overlay(found, lambda x: (x.record.t, 1e3 * x.record.p[:, 0]), **labels))

@@ -49,29 +49,14 @@ class ServedSession(Session):
         every: int = 1,
         largest_force: float = LARGEST_FORCE,
     ):
-        """Begins at the start of a scenario.
-
-        Args:
-            scenario: clay, arm and hardware.
-            stiffness: as in `Session`.
-            tool: tool at the handle.
-            every: keep every `every`-th sample.
-            largest_force: limit on the magnitude of forces [N], > 0, at most 1e3.
-
-        Raises:
-            ParameterError: a value is out of its bounds, or the scenario is accurate.
-        """
+        """Begins at the start of a scenario."""
         self._largest_force = largest_force
         self._seen: deque[tuple[float, int]] = deque()
         self.partner = _Pace()
         super().__init__(scenario, stiffness, tool, every)
 
     def prepared(self, scenario: Scenario) -> Scenario:
-        """The scenario with motors commanded by programs.
-
-        Args:
-            scenario: as it was given.
-        """
+        """The scenario with motors commanded by programs."""
         refuse_other(scenario, integrator="fast")
         driven, _ = device_scenario(played(scenario, self.stiffness), None, clay=True)
         self.undriven = played(driven, 1.0)
@@ -123,11 +108,7 @@ class LiveDevice:
     paced = True
 
     def __init__(self, session: ServedSession):
-        """The arm of a session.
-
-        Args:
-            session: the session; it may restart.
-        """
+        """The arm of a session."""
         self._session = session
 
     @property
@@ -161,22 +142,11 @@ class LiveDevice:
         return self._session.undriven
 
     def drive(self, drive: Drive) -> tuple[float, float]:
-        """Changes the drive of the motors from the next control sample on.
-
-        Args:
-            drive: in the plane of the arm.
-
-        Returns:
-            The force that will act [N].
-        """
+        """Changes the drive of the motors from the next control sample on."""
         return self._session.arm.drive(drive)
 
     def advance(self, samples: int | None = None) -> None:
-        """Does nothing, because the player advances the arm.
-
-        Args:
-            samples: ignored.
-        """
+        """Does nothing, because the player advances the arm."""
 
 
 class DeviceSession(Session):
@@ -189,26 +159,12 @@ class DeviceSession(Session):
     frame_time = FRAME_TIME
 
     def __init__(self, scenario: Scenario, hand: DeviceHand, tool: Tool = TOOL, every: int = 1):
-        """Begins at the start of a scenario.
-
-        Args:
-            scenario: clay, gain and arm.
-            hand: the device.
-            tool: tool at the handle.
-            every: keep every `every`-th sample.
-
-        Raises:
-            ParameterError: a value is out of its bounds, or the scenario is sampled or accurate.
-        """
+        """Begins at the start of a scenario."""
         self.hand, self.partner = hand, DevicePartner(hand)
         super().__init__(scenario, 1.0, tool, every)
 
     def prepared(self, scenario: Scenario) -> Scenario:
-        """The scenario with the coupling to the device as its operator.
-
-        Args:
-            scenario: as it was given.
-        """
+        """The scenario with the coupling to the device as its operator."""
         return replace(super().prepared(scenario), operator=self.hand.coupling.operator)
 
     def record(self) -> Record:
@@ -224,11 +180,7 @@ class DevicePartner:
     """
 
     def __init__(self, hand: DeviceHand):
-        """Connects a device to a session.
-
-        Args:
-            hand: the device.
-        """
+        """Connects a device to a session."""
         self.hand, self.span = hand, hand.client.limits.Ts
         self._handle: Any = None  # position and velocity of the simulated handle; None at rest
 
@@ -241,20 +193,12 @@ class DevicePartner:
             self.hand.exchange(*handle)
 
     def lead(self, play: Session) -> None:
-        """Pulls the handle to the position of the device; releases it if the position is unknown.
-
-        Args:
-            play: the session.
-        """
+        """Pulls the handle to the position of the device; releases it if the position is unknown."""
         hand, held = self.hand, self.hand.held
         play.pull(hand.place if held else None)
         B = hand.coupling.B
         play.run.pull.carried = (B * hand.rate[0], B * hand.rate[1]) if held else (0.0, 0.0)
 
     def follow(self, play: Session) -> None:
-        """Stores the new position of the handle.
-
-        Args:
-            play: the session.
-        """
+        """Stores the new position of the handle."""
         self._handle = play.handle()

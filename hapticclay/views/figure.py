@@ -147,11 +147,7 @@ def _encoded(figure: matplotlib.figure.Figure, kind: str, dpi: float) -> bytes:
 
 
 def curves_drawn(figure: matplotlib.figure.Figure) -> dict[str, Table]:
-    """Returns the curves of a figure, one table per panel: columns curve, and x and y as labelled.
-
-    Args:
-        figure: figure with curves as lines; other artists are ignored.
-    """
+    """Returns the curves of a figure, one table per panel: columns curve, and x and y as labelled."""
     out: dict[str, Table] = {}
     axes: Any = figure.axes
     for ax in axes:
@@ -176,14 +172,7 @@ def curves_drawn(figure: matplotlib.figure.Figure) -> dict[str, Table]:
 
 
 def csv_text(table: Table) -> str:
-    """Returns a table as CSV; numbers read back bit-identically.
-
-    Args:
-        table: columns by name and unit.
-
-    Raises:
-        ParameterError: the columns are of different lengths.
-    """
+    """Returns a table as CSV; numbers read back bit-identically."""
     lengths = {name: len(column) for name, column in table.items()}
     if len(set(lengths.values())) > 1:
         raise ParameterError("table", lengths, "must have columns of equal length")

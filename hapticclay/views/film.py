@@ -61,18 +61,7 @@ class Lens:
     """Renders a stage without a display."""
 
     def __init__(self, stage: Stage, width: int, height: int, camera: str, smooth: bool = False):
-        """Opens an OpenGL context.
-
-        Args:
-            stage: what to render.
-            width: of the picture [pixels].
-            height: of the picture [pixels].
-            camera: of the room.
-            smooth: whether edges and shadows are softened, which doubles the time.
-
-        Raises:
-            ParameterError: OpenGL is missing.
-        """
+        """Opens an OpenGL context."""
         self.stage = stage
         model = stage.model
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
@@ -95,14 +84,7 @@ class Lens:
         self._pixels = np.zeros((height, width, 3), dtype=np.uint8)
 
     def photograph(self, title: str = "") -> np.ndarray:
-        """Renders the stage.
-
-        Args:
-            title: over the picture.
-
-        Returns:
-            The picture, shape (height, width, 3) of bytes; the next call overwrites it.
-        """
+        """Renders the stage."""
         stage = self.stage
         if stage.relief():
             mujoco.mjr_uploadHField(stage.model, self._context, stage.field)
@@ -155,18 +137,7 @@ def _opened(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, mujoco
 
 
 def ready(out: Path, options: FilmOptions = FILM_OPTIONS) -> tuple[str, FilmOptions]:
-    """Checks that a film can be made on this machine; call it before a long run.
-
-    Args:
-        out: the file.
-        options: of the film.
-
-    Returns:
-        The kind of file, and the options as they will be used.
-
-    Raises:
-        ParameterError: a value is out of its bounds, or OpenGL or a codec is missing.
-    """
+    """Checks that a film can be made on this machine; call it before a long run."""
     kind = choice("out", out.suffix.lower(), tuple(FRAME_RATES))
     speed = number("speed", options.speed, 1e-3, 1e3, above=True)
     width, height = (
@@ -206,16 +177,7 @@ def _check_codec(kind: str) -> None:
 def frames(
     record: Record, options: FilmOptions = FILM_OPTIONS, rate: int = 30
 ) -> Iterator[np.ndarray]:
-    """Yields the frames of a film, shape (height, width, 3) of bytes; each overwrites the last.
-
-    Args:
-        record: the run.
-        options: of the film.
-        rate: frames a second.
-
-    Raises:
-        ParameterError: an unknown camera, or OpenGL is missing.
-    """
+    """Yields the frames of a film, shape (height, width, 3) of bytes; each overwrites the last."""
     width, height = options.size
     beside, running = 0, None
     if options.plots:
@@ -253,16 +215,7 @@ def frames(
 
 
 def samples_shown(record: Record, speed: float, rate: int) -> np.ndarray:
-    """Counts the samples up to each frame of a film.
-
-    Args:
-        record: the run.
-        speed: of the film; 1 is real time.
-        rate: frames a second.
-
-    Returns:
-        Number of samples, shape (frames,).
-    """
+    """Counts the samples up to each frame of a film."""
     end = float(record.t[-1]) if len(record.t) else 0.0
     at = np.append(np.arange(0.0, end, speed / rate), end)
     return np.searchsorted(record.t, at, "right").clip(1)
@@ -279,21 +232,7 @@ def film(
     options: FilmOptions = FILM_OPTIONS,
     progress: Callable[[Iterator[np.ndarray], int], Iterator] | None = None,
 ) -> Path:
-    """Writes a film of a run.
-
-    Args:
-        record: the run.
-        out: the file: .mp4, .webp or .gif.
-        options: of the film.
-        progress: wraps the iterator over the frames, given their number.
-
-    Returns:
-        The file.
-
-    Raises:
-        ParameterError: a value is out of its bounds, the file cannot be written, or OpenGL or a
-            codec is missing.
-    """
+    """Writes a film of a run."""
     kind, options = ready(out, options)
     if not len(record.t):
         raise ParameterError("record", record.scenario.name, "must hold samples")
@@ -310,13 +249,7 @@ def film(
 
 
 def write_images(path: Path, images: Iterator[np.ndarray], rate: int) -> None:
-    """Writes a film of images.
-
-    Args:
-        path: the file: .mp4, .webp or .gif.
-        images: shape (height, width, 3) of bytes each; each may overwrite the last.
-        rate: frames a second.
-    """
+    """Writes a film of images."""
     import imageio.v2 as imageio
 
     if path.suffix != ".mp4":

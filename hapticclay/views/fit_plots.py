@@ -31,11 +31,7 @@ DOTS: Any = dict(mew=0.0, color=BLUE, alpha=0.45, zorder=2.2, rasterized=True)
 
 
 def fit_plot(fitted: Fitted) -> Figure:
-    """Plots force against velocity with the law, and residuals over velocity, time and lag.
-
-    Args:
-        fitted: from `fit_flow`.
-    """
+    """Plots force against velocity with the law, and residuals over velocity, time and lag."""
     shown = np.unique(np.linspace(0, len(fitted.v) - 1, DOTS_SHOWN).astype(int))
     t, v, f, left = (x[shown] for x in (fitted.t, fitted.v, fitted.f, fitted.residuals))
     with figure_style():

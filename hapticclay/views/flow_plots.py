@@ -42,9 +42,6 @@ def force_velocity_plot(record: Record) -> Figure:
     where the handle moves back. Otherwise each axis with a yield force has a panel; rotated clay
     uses its own axes. The term b v is omitted from forces and laws where b is not constant in a
     region.
-
-    Args:
-        record: the run, in clay that yields somewhere.
     """
     clay, main = record.scenario.clay, AXES.index(main_axis(record.scenario))
     assert clay is not None
@@ -89,16 +86,7 @@ def force_velocity_plot(record: Record) -> Figure:
 
 
 def flows_met(record: Record, i: int, whole: bool = True) -> dict[Flow, np.ndarray]:
-    """Samples in each flow of a yielding axis, ordered by decreasing number of samples.
-
-    Args:
-        record: the run, in clay.
-        i: axis, 0 for x, 1 for y.
-        whole: whether flows that differ only in b are distinguished.
-
-    Returns:
-        Indices by flow.
-    """
+    """Samples in each flow of a yielding axis, ordered by decreasing number of samples."""
     clay = record.scenario.clay
     assert clay is not None
     b = record.b[:, i] if whole else np.zeros(len(record.t))
@@ -132,14 +120,7 @@ def _forces_over_velocity(
 
 
 def law_curve(flow: Flow, low: float, high: float, back: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Velocities [m/s] and forces [N] of a law, including the range of holding force at rest.
-
-    Args:
-        flow: the law.
-        low: least velocity [m/s].
-        high: largest velocity [m/s].
-        back: whether it held the handle against a push in either direction.
-    """
+    """Velocities [m/s] and forces [N] of a law, including the range of holding force at rest."""
     share = np.linspace(0.0, 1.0, 200)[1:] ** 3  # dense where |v|^n is curved
     up = share * high if high > 0.0 else np.zeros(0)
     down = share[::-1] * low if low < 0.0 else np.zeros(0)

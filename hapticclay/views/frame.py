@@ -9,11 +9,7 @@ class Listener(Protocol):
     """Receives each slice of a session or a replay, as a `UdpStream` does."""
 
     def send(self, play: Any) -> None:
-        """Receives a slice.
-
-        Args:
-            play: the session or replay that played it.
-        """
+        """Receives a slice."""
 
 
 class Partner(Protocol):
@@ -29,18 +25,10 @@ class Partner(Protocol):
         """Talks to the device, may wait for it; other threads may use the session meanwhile."""
 
     def lead(self, play: Any) -> None:
-        """Passes the state of the device to the session before a slice.
-
-        Args:
-            play: the session.
-        """
+        """Passes the state of the device to the session before a slice."""
 
     def follow(self, play: Any) -> None:
-        """Stores the state for the device after a slice.
-
-        Args:
-            play: the session.
-        """
+        """Stores the state for the device after a slice."""
 
 
 class Frame(NamedTuple):

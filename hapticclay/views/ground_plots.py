@@ -25,11 +25,7 @@ from .style import (
 
 
 def ground_plot(record: Record) -> Figure:
-    """Plots the remaining clay after a run, and the path of the tool.
-
-    Args:
-        record: the run, in a groove.
-    """
+    """Plots the remaining clay after a run, and the path of the tool."""
     from matplotlib.colors import LinearSegmentedColormap
 
     ground, p, block = record.ground, 100.0 * record.p, ground_of(record)
@@ -63,11 +59,7 @@ def ground_plot(record: Record) -> Figure:
 
 
 def ground_of(record: Record) -> Any:
-    """The cells cut in a run: see `Clay.ground`.
-
-    Args:
-        record: the run.
-    """
+    """The cells cut in a run: see `Clay.ground`."""
     clay = record.scenario.clay
     assert clay is not None
     return clay.ground

@@ -65,10 +65,6 @@ def identification_plot(results: Sequence[Identified], paper: bool | None = None
     """Plots magnitude, phase and coherence of one block.
 
     The response is left out where its coherence is below 0.5.
-
-    Args:
-        results: of one block, on one axis or both; a column each.
-        paper: whether to draw the printed equation; None for the simulated arm alone.
     """
     rows, columns = panel_grid(len(results))
     with figure_style():
@@ -95,11 +91,7 @@ def identification_plot(results: Sequence[Identified], paper: bool | None = None
 
 
 def identified_plot(result: Identified) -> Figure:
-    """As `identification_plot` of one axis.
-
-    Args:
-        result: from `identify` or `identify_data`.
-    """
+    """As `identification_plot` of one axis."""
     return identification_plot([result])
 
 

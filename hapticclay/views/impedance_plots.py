@@ -42,9 +42,6 @@ def impedance_plot(found: MeasuredImpedance) -> Figure:
     """Plots effective stiffness, damping and mass over frequency, measured and computed.
 
     Thin lines are the rendered values. Empty panels are omitted.
-
-    Args:
-        found: from `measure_impedance`.
     """
     m = found.measured
     fine = np.geomspace(m.frequency[0], m.frequency[-1], FINE)
@@ -76,11 +73,7 @@ def impedance_plot(found: MeasuredImpedance) -> Figure:
 
 
 def transparency_bode_plot(found: MeasuredImpedance) -> Figure:
-    """Plots fe/fh and the impedance ratio Z/Ze over frequency, measured and computed.
-
-    Args:
-        found: from `measure_impedance`.
-    """
+    """Plots fe/fh and the impedance ratio Z/Ze over frequency, measured and computed."""
     m = found.measured
     fine = np.geomspace(m.frequency[0], m.frequency[-1], FINE)
     line = found.over(fine)
@@ -113,11 +106,7 @@ def transparency_bode_plot(found: MeasuredImpedance) -> Figure:
 
 
 def mbk_plot(found: DeviceMBK) -> Figure:
-    """Plots where virtual mass, damper and spring are stable over three planes, with runs.
-
-    Args:
-        found: from `device_mbk`.
-    """
+    """Plots where virtual mass, damper and spring are stable over three planes, with runs."""
     with figure_style():
         rows, columns = (3, 1) if narrow() else (1, 3)
         figure = Figure(figsize=figure_size(2, 10.2 if narrow() else 3.6))
@@ -149,11 +138,7 @@ def mbk_plot(found: DeviceMBK) -> Figure:
 
 
 def dynamic_range_plot(found: DeviceMBK) -> Figure:
-    """Plots |Z| of the free device and of its stiffest stable wall over frequency.
-
-    Args:
-        found: from `device_mbk`.
-    """
+    """Plots |Z| of the free device and of its stiffest stable wall over frequency."""
     r = found.range
     f = r.omega / (2.0 * math.pi)
     with figure_style():
@@ -177,11 +162,7 @@ def dynamic_range_plot(found: DeviceMBK) -> Figure:
 
 
 def least_mass_plot(found: ArmMBK) -> Figure:
-    """Plots the least virtual mass that the arm renders over its damper, with runs.
-
-    Args:
-        found: from `arm_mbk`.
-    """
+    """Plots the least virtual mass that the arm renders over its damper, with runs."""
     loop = found.loop
     timed = loop.Ts is not None or loop.delay > 0.0
     every = "worst hand tried of the box" if timed else "every hand of the box, exact"
@@ -214,12 +195,7 @@ def least_mass_plot(found: ArmMBK) -> Figure:
 
 
 def rendered_part(subject: Subject, part: str) -> float | None:
-    """Rendered value of a part of a wall or clay, for comparison with the effective one; or None.
-
-    Args:
-        subject: a wall or a loop.
-        part: "stiffness", "damping" or "mass".
-    """
+    """Rendered value of a part of a wall or clay, for comparison with the effective one; or None."""
     letters = {"stiffness": "K", "damping": "B", "mass": "M"}
     if not isinstance(subject, VirtualWall):
         letters = {"stiffness": "k", "damping": "b"}

@@ -35,46 +35,25 @@ class Pull:
     """
 
     def __init__(self, spring: tuple[float, float], p: tuple[float, float]):
-        """Places the point at the handle.
-
-        Args:
-            spring: k of x and y [N/m].
-            p: position of the handle [m].
-        """
+        """Places the point at the handle."""
         self.spring, self.force = np.array(spring), (0.0, 0.0)
         self.carried = 0.0, 0.0
         self.knots = [(0.0, *p)]
         self._from, self._rate, self._since = np.array(p), np.zeros(2), 0.0
 
     def lead(self, t: float, to: tuple[float, float], span: float) -> None:
-        """Moves the point to a place at constant speed.
-
-        Args:
-            t: start time [s].
-            to: the place [m].
-            span: duration of the motion [s].
-        """
+        """Moves the point to a place at constant speed."""
         now = self.at(t)
         self._from, self._rate, self._since = now, (np.array(to) - now) / span, t
         self.knots += [(t, *now), (t + span, *to)]
 
     def jump(self, t: float, p: tuple[float, float], v: tuple[float, float]) -> None:
-        """Releases the handle: the point moves with it.
-
-        Args:
-            t: start time [s].
-            p: position of the handle [m].
-            v: velocity of the handle [m/s].
-        """
+        """Releases the handle: the point moves with it."""
         self._from, self._rate, self._since = np.array(p), np.array(v), t
         self.knots.append((t, *p))
 
     def at(self, t: Any) -> np.ndarray:
-        """Returns the position of the point [m], shape (2,) or (n, 2).
-
-        Args:
-            t: time [s], a number or shape (n,).
-        """
+        """Returns the position of the point [m], shape (2,) or (n, 2)."""
         return self._from + (np.asarray(t) - self._since)[..., None] * self._rate
 
     def steady(self) -> tuple[float, ...]:
@@ -84,12 +63,7 @@ class Pull:
         return float(self._since), fx + cx + px, fy + cy + py, *(self.spring * self._rate).tolist()
 
     def mean(self, t: Any, h: Any) -> np.ndarray:
-        """Returns the mean force over [t - h, t + h] [N], as `Signal.mean`.
-
-        Args:
-            t: centre of the interval [s].
-            h: half its length [s]; ignored, because the force changes linearly.
-        """
+        """Returns the mean force over [t - h, t + h] [N], as `Signal.mean`."""
         return np.array(self.force) + np.array(self.carried) + self.spring * self.at(t)
 
 
@@ -116,11 +90,7 @@ class LiveRun(Run):
         self.gains = [(0, scenario.gain)]
 
     def slice(self, steps: int) -> None:
-        """Makes the given number of steps, unless the run ends.
-
-        Args:
-            steps: number of steps.
-        """
+        """Makes the given number of steps, unless the run ends."""
         self.pause = min(self.i + steps, self.row.m.last)
         self.push_evenly(self.pull.steady())
         self.go(None)
@@ -128,11 +98,7 @@ class LiveRun(Run):
             self.flush()
 
     def change(self, scenario: Scenario) -> None:
-        """Continues with another gain, or with other damping between the same borders.
-
-        Args:
-            scenario: with the new gain and clay.
-        """
+        """Continues with another gain, or with other damping between the same borders."""
         if scenario.gain != self.scenario.gain:
             self.gains.append((self.i, scenario.gain))
         super().change(scenario)
@@ -145,11 +111,7 @@ class LiveRun(Run):
         return bool(x.stuck), bool(y.stuck)
 
     def judge(self, made: np.ndarray) -> int:
-        """As Run.judge; discards the samples while recording is off.
-
-        Args:
-            made: as in Run.judge.
-        """
+        """As Run.judge; discards the samples while recording is off."""
         before = len(self.kept)
         good = super().judge(made)
         if not self.keeping:
@@ -164,12 +126,7 @@ class LiveRun(Run):
 
 
 def played(scenario: Scenario, stiffness: float = 1.0) -> Scenario:
-    """Returns the scenario of a session: a person as the muscle, and no end of the path.
-
-    Args:
-        scenario: clay, gain and arm.
-        stiffness: factor on the spring of Th; its damper has the square root as factor.
-    """
+    """Returns the scenario of a session: a person as the muscle, and no end of the path."""
     stiffness = number("stiffness", stiffness, 1e-3, 1e4)
     x, y = (
         Operator(th.mass, th.damper * math.sqrt(stiffness), th.spring * stiffness)

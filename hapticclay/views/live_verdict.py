@@ -14,23 +14,12 @@ CALM_TIME = 1.0  # [s] without growing oscillation after which an unstable arm c
 
 
 def is_viscous(scenario: Scenario, p: tuple[float, float]) -> bool:
-    """Whether the clay at a place is viscous; otherwise the linear gain limit does not apply.
-
-    Args:
-        scenario: of the run.
-        p: the place [m].
-    """
+    """Whether the clay at a place is viscous; otherwise the linear gain limit does not apply."""
     return scenario.clay is None or scenario.clay.viscous_at(p)
 
 
 def clay_here(scenario: Scenario, p: tuple[float, float], b: tuple[float, float]) -> str:
-    """Text of the clay's resistance at a place, for the window.
-
-    Args:
-        scenario: of the run.
-        p: the place [m].
-        b: damping there [N.s/m].
-    """
+    """Text of the clay's resistance at a place, for the window."""
     told = scenario.clay.here(p, b) if scenario.clay else ()
     return f"{', '.join(x.text() for x in told) or 'none'} here"
 
@@ -54,14 +43,7 @@ def live_verdict(
     onset: Outcome | None,
     swings: bool,
 ) -> LiveVerdict:
-    """Combines the finding of the stability monitor with the gain's distance to its limit.
-
-    Args:
-        gain: K [1/kg].
-        limit: of K in the clay at the handle; None if unknown.
-        onset: instability found by the monitor; None for none.
-        swings: whether the arm still oscillates.
-    """
+    """Combines the finding of the stability monitor with the gain's distance to its limit."""
     far = limit or (math.inf, math.inf)
     above = [
         f"K{a} {k:.3g} > {most:.3g}" for a, k, most in zip(AXES, gain, far, strict=True) if k > most
@@ -97,10 +79,5 @@ def live_gain_limits(
     """Returns the gain limit of the linear loop on each axis [1/kg], inf for none.
 
     It applies to continuous time with the handle where it is.
-
-    Args:
-        limits: of the run.
-        p: position of the handle [m].
-        b: damping of the clay there [N.s/m].
     """
     return limits.at(0, p, b), limits.at(1, p, b)

@@ -26,11 +26,7 @@ INSIDE_ALPHA = 0.22
 
 
 def loop_plot(report: LoopReport) -> Figure:
-    """Plots the stable walls for a client's period, delay and hand, and the wall it rendered.
-
-    Args:
-        report: from `loop_report`.
-    """
+    """Plots the stable walls for a client's period, delay and hand, and the wall it rendered."""
     with figure_style():
         figure = Figure(figsize=figure_size(1, 5.0))
         ax = figure.add_subplot()

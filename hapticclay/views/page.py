@@ -70,16 +70,7 @@ class Page:
     """
 
     def __init__(self, session: Session, host: str = "127.0.0.1", port: int = 8080):
-        """Begins to serve the page.
-
-        Args:
-            session: to be played.
-            host: address to listen on; a token guards any address but this machine's own.
-            port: to listen on; 0 for any.
-
-        Raises:
-            ParameterError: viser is missing, or the address cannot be listened on.
-        """
+        """Begins to serve the page."""
         try:
             import rich
             import viser
@@ -107,11 +98,7 @@ class Page:
         self._controls(viser.uplot)
 
     def serve(self, until: Callable[[], bool] | None = None) -> None:
-        """Plays in real time until interrupted.
-
-        Args:
-            until: ends the page when it returns True.
-        """
+        """Plays in real time until interrupted."""
         self.player.start()
         try:
             while (until is None or not until()) and self.player.error is None:
@@ -401,12 +388,7 @@ class PageGuard(Guard):
     """
 
     def refusal(self, connection: Any, request: Any) -> Any:
-        """As Guard.refusal; a token in the address is answered with the cookie.
-
-        Args:
-            connection: of websockets.
-            request: of websockets.
-        """
+        """As Guard.refusal; a token in the address is answered with the cookie."""
         why = self.reason(request)
         if why == REFUSED or not self.token:
             return super().refusal(connection, request)

@@ -34,11 +34,7 @@ REGION_MARKS = ("o", "s", "^", "D", "v")
 
 
 def index_plot(found: IndexOverFrequency) -> Figure:
-    """Plots the excess damping over frequency, theory as lines and runs as marks.
-
-    Args:
-        found: from `wall_index` or `arm_index`.
-    """
+    """Plots the excess damping over frequency, theory as lines and runs as marks."""
     with figure_style():
         figure = Figure(figsize=figure_size(1, 4.2))
         ax = figure.add_subplot()
@@ -97,11 +93,7 @@ def _shade_active(ax: Axes) -> None:
 
 
 def port_energy_plot(found: EnergyOverTime) -> Figure:
-    """Plots the energy absorbed by rendered clay, and the velocity, of both runs.
-
-    Args:
-        found: from `energy_over_time`.
-    """
+    """Plots the energy absorbed by rendered clay, and the velocity, of both runs."""
     looks = ((VERMILION, "-", "without controller"), (BLUE, "--", "with controller"))
     records = (found.without, found.controlled)
     with figure_style():
@@ -128,11 +120,7 @@ def port_energy_plot(found: EnergyOverTime) -> Figure:
 
 
 def region_plot(found: PassiveRegion) -> Figure:
-    """Plots the largest passive stiffness over the control sample, one line per delay, with runs.
-
-    Args:
-        found: from `passive_region`.
-    """
+    """Plots the largest passive stiffness over the control sample, one line per delay, with runs."""
     with figure_style():
         figure = Figure(figsize=figure_size(1, 4.2))
         ax = figure.add_subplot()

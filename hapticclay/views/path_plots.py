@@ -32,11 +32,7 @@ PICTURE_SIZE = 400  # pixels of a picture of other clay, along x and along y
 
 
 def path_plot(record: Record) -> Figure:
-    """Plots the path of the handle over a map of the clay (Figs. 7, 9).
-
-    Args:
-        record: the run.
-    """
+    """Plots the path of the handle over a map of the clay (Figs. 7, 9)."""
     p = 100.0 * record.p
     low, high = p.min(axis=0), p.max(axis=0)
     margin = 0.08 * max(float((high - low).max()), 0.1)

@@ -60,14 +60,7 @@ class PlanPicture:
             self._axes = self._figure.subplots(1, 2)
 
     def draw(self, plan: Plan) -> np.ndarray | None:
-        """Draws.
-
-        Args:
-            plan: content of the picture.
-
-        Returns:
-            Pixels, shape (height, width, 3), uint8; None where a window shows them.
-        """
+        """Draws."""
         with style.styled("screen"):
             for ax, closer in zip(self._axes, (False, True), strict=True):
                 ax.clear()

@@ -21,11 +21,7 @@ class Player(threading.Thread):
     """
 
     def __init__(self, play: Session | Replay):
-        """Prepares the thread; call `start` to play.
-
-        Args:
-            play: what to play.
-        """
+        """Prepares the thread; call `start` to play."""
         super().__init__(name="player", daemon=True)
         self.play = play
         self.lock = threading.RLock()  # a change of the page's controls calls back immediately

@@ -56,14 +56,7 @@ class RecordPlots:
         return {name: _with_picture(figure) for name, figure in figures.items()}
 
     def velocity(self, axis: str | None = None) -> Figure:
-        """Velocity over position, with the expected steady speeds (Fig. 8, top; Fig. 10).
-
-        Args:
-            axis: "x", "y", or "xy" for a panel each; None for those along which the clay changes.
-
-        Raises:
-            ParameterError: there is no such axis, or the record has no samples.
-        """
+        """Velocity over position, with the expected steady speeds (Fig. 8, top; Fig. 10)."""
         record = self._sampled()
         axis = (
             choice("axis", axis, AXIS_CHOICES) if axis else run_figures.shown_axes(record.scenario)
@@ -75,13 +68,6 @@ class RecordPlots:
 
         In a maneuver, in clay that is not viscous, and if `over` is given, it shows the forces
         (Fig. 11).
-
-        Args:
-            axis: "x" or "y"; None for the one along which the operator pushes.
-            over: "time" or "position"; None for the ratio where it is more informative.
-
-        Raises:
-            ParameterError: there is no such axis, or the record has no samples.
         """
         record = self._sampled()
         s = record.scenario
@@ -92,20 +78,13 @@ class RecordPlots:
         return _with_picture(run_plots.force_ratio_plot(record, axis))
 
     def path(self) -> Figure:
-        """The path of the handle over a map of the clay (Figs. 7, 9).
-
-        Raises:
-            ParameterError: the record has no samples.
-        """
+        """The path of the handle over a map of the clay (Figs. 7, 9)."""
         return _with_picture(path_plots.path_plot(self._sampled()))
 
     def energy(self) -> Figure:
         """Energy over time: supplied by hand and motors, absorbed by the clay, and kinetic.
 
         See `energy_plot`.
-
-        Raises:
-            ParameterError: the record has no samples.
         """
         return _with_picture(energy_plot(self._sampled()))
 
@@ -120,13 +99,6 @@ def energies(record: Record) -> dict[str, np.ndarray]:
 
     Integrals are trapezoidal: they miss changes between samples that are far apart, and while a
     session did not record.
-
-    Args:
-        record: of a run.
-
-    Returns:
-        [J], shape (n,) each: put in at the handle by the "hand" (the integral of fh v), by the
-        "motors" (tau qd); taken by the "clay" (fe v); "kinetic", of the arm.
     """
 
     def work(power: np.ndarray) -> np.ndarray:
@@ -147,9 +119,6 @@ def energy_plot(record: Record) -> Figure:
     """Plots `energies` over time, and as dots the run's own energy balance.
 
     Energy is conserved: without friction, hand + motors = clay + kinetic energy gained.
-
-    Args:
-        record: of a run.
     """
     looks = {
         "hand": (GREEN, "-", "put in by the hand"),

@@ -32,12 +32,7 @@ class Replay:
     partner: Partner | None = None
 
     def __init__(self, record: Record, tool: Tool = TOOL):
-        """Begins at the first sample.
-
-        Args:
-            record: to be played.
-            tool: at the handle, if the record names none.
-        """
+        """Begins at the first sample."""
         self.source, self.scenario = record, record.scenario
         self._held = record.held()
         self.tool = Tool(**record.notes["tool"]) if "tool" in record.notes else tool
@@ -55,14 +50,7 @@ class Replay:
         return self.source.status if self.n >= len(self.source.t) - 1 else ""
 
     def advance(self, seconds: float) -> np.ndarray:
-        """Advances, unless paused.
-
-        Args:
-            seconds: simulated time to play [s].
-
-        Returns:
-            Positions of the handle [m], shape (n, 2).
-        """
+        """Advances, unless paused."""
         if self.paused or self.ended:
             return np.empty((0, 2))
         self.t += seconds

@@ -13,11 +13,7 @@ DESIGN_OMEGA = np.geomspace(0.1, 1000.0, 500)  # [rad/s]
 
 
 def effective_parts_plot(found: Impedance) -> Figure:
-    """Plots effective stiffness, damping and mass over frequency.
-
-    Args:
-        found: a computed or measured impedance.
-    """
+    """Plots effective stiffness, damping and mass over frequency."""
     panels = [
         (label, y)
         for label, y in (
@@ -40,11 +36,7 @@ def effective_parts_plot(found: Impedance) -> Figure:
 
 
 def design_plot(design: Design) -> Figure:
-    """Plots magnitude and phase of the compensator K C.
-
-    Args:
-        design: from `design_gain` or `compare`.
-    """
+    """Plots magnitude and phase of the compensator K C."""
     s, c = 1j * DESIGN_OMEGA, design.compensator
     response = design.K * np.polyval(c.num, s) / np.polyval(c.den, s)
     with figure_style():

@@ -55,11 +55,7 @@ PARAMETER_NAMES = {
 
 
 def band_plot(band: Band) -> Figure:
-    """Plots a limit as a band over hands: 5 to 95 %, the median, and the least.
-
-    Args:
-        band: of `gain_band` or `wall_band`.
-    """
+    """Plots a limit as a band over hands: 5 to 95 %, the median, and the least."""
     with figure_style():
         figure = Figure(figsize=figure_size(1, 4.0))
         ax = figure.subplots()
@@ -92,11 +88,7 @@ def band_plot(band: Band) -> Figure:
 
 
 def instability_plot(result: Instability) -> Figure:
-    """Plots the probability of instability over the grid, or over each varying parameter.
-
-    Args:
-        result: of `monte_carlo`.
-    """
+    """Plots the probability of instability over the grid, or over each varying parameter."""
     grid = list(result.trials.grid.values())
     if len(grid) == 2:
         return _risk_plane(result)

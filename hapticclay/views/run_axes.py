@@ -31,23 +31,12 @@ MOST_DOTS = 20_000  # of a kind in a plot
 
 
 def spread(where: np.ndarray, most: int) -> np.ndarray:
-    """Evenly spaced selection of indices, at most a given number.
-
-    Args:
-        where: the indices.
-        most: largest number of indices.
-    """
+    """Evenly spaced selection of indices, at most a given number."""
     return where[:: -(-len(where) // most) or 1]
 
 
 def expected_speeds(ax: Axes, record: Record, axis: str) -> None:
-    """Draws the expected steady speed over each stretch of the path.
-
-    Args:
-        ax: axes over the position [cm].
-        record: the run.
-        axis: "x" or "y".
-    """
+    """Draws the expected steady speed over each stretch of the path."""
     i, label = AXES.index(axis), "expected, steady"
     pieces = record.stretches(axis)
     for piece in pieces if len(pieces) <= MOST_BORDERS else pieces[:3]:
@@ -59,14 +48,7 @@ def expected_speeds(ax: Axes, record: Record, axis: str) -> None:
 
 
 def mark_held(ax: Axes, record: Record, i: int, y: np.ndarray) -> None:
-    """Marks where clay held the handle, on a curve over the position.
-
-    Args:
-        ax: axes over the position [cm].
-        record: the run.
-        i: axis, 0 for x, 1 for y.
-        y: the curve, shape (n,).
-    """
+    """Marks where clay held the handle, on a curve over the position."""
     some = spread(np.flatnonzero(record.held()[:, i]), MOST_DOTS)
     if len(some):
         look: Any = dict(color=ORANGE, ms=stroke(5), mew=0, zorder=4, label="held still")
@@ -74,32 +56,19 @@ def mark_held(ax: Axes, record: Record, i: int, y: np.ndarray) -> None:
 
 
 def held_spans(record: Record, axis: str) -> list[tuple[float, float]]:
-    """Times at which clay held an axis, (begin, end) [s].
-
-    Args:
-        record: the run.
-        axis: "x" or "y".
-    """
+    """Times at which clay held an axis, (begin, end) [s]."""
     end = float(record.t[-1])
     stops = [x for x in record.stops if axis in x.axis]
     return [(x.start, end if x.end is None else x.end) for x in stops]
 
 
 def is_viscous(s: Scenario) -> bool:
-    """Whether the clay of a scene is viscous; true without clay.
-
-    Args:
-        s: the scenario.
-    """
+    """Whether the clay of a scene is viscous; true without clay."""
     return s.clay is None or s.clay.viscous
 
 
 def main_axis(s: Scenario) -> str:
-    """The axis along which the operator pushes most.
-
-    Args:
-        s: the scenario.
-    """
+    """The axis along which the operator pushes most."""
     size = s.force
     if isinstance(s.muscle, Multisine):
         size = s.muscle.rms
@@ -110,12 +79,7 @@ def main_axis(s: Scenario) -> str:
 
 
 def position_axes(record: Record, axes: str) -> tuple[Figure, list[Axes]]:
-    """A panel over the position along each axis, the clay shaded.
-
-    Args:
-        record: the run.
-        axes: "x", "y" or "xy".
-    """
+    """A panel over the position along each axis, the clay shaded."""
     rows, columns = panel_grid(len(axes))
     figure = Figure(figsize=figure_size(columns, 3.6 * rows))
     panels = list(figure.subplots(rows, columns, squeeze=False).ravel())
@@ -129,12 +93,7 @@ def position_axes(record: Record, axes: str) -> tuple[Figure, list[Axes]]:
 
 
 def shades(record: Record, axis: str) -> tuple[list[float], list[float]]:
-    """Borders [m] and force of a slow cut [N] along an axis; for a grid, along the path.
-
-    Args:
-        record: the run.
-        axis: "x" or "y".
-    """
+    """Borders [m] and force of a slow cut [N] along an axis; for a grid, along the path."""
     clay, i = record.scenario.clay, AXES.index(axis)
     if clay is None:
         return [], []
@@ -155,15 +114,7 @@ def shades(record: Record, axis: str) -> tuple[list[float], list[float]]:
 
 
 def steps_of_law(ax: Axes, record: Record, i: int, law: Any, **look: Any) -> None:
-    """Draws law(b) over each stretch of the path with constant b.
-
-    Args:
-        ax: axes over the position [cm].
-        record: the run.
-        i: axis, 0 for x, 1 for y.
-        law: function to draw, of the damping [N.s/m].
-        **look: of the lines.
-    """
+    """Draws law(b) over each stretch of the path with constant b."""
     pieces = record.stretches(AXES[i])
     if len(pieces) > MOST_BORDERS:  # an unstable run that chatters over a border
         pieces = pieces[:3]

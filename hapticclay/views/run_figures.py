@@ -27,11 +27,7 @@ def _clay_along_both_axes(s: Scenario) -> bool:
 
 
 def shown_axes(s: Scenario) -> str:
-    """The axes whose velocity is drawn: "xy" where the clay changes along both, or the main one.
-
-    Args:
-        s: the scenario.
-    """
+    """The axes whose velocity is drawn: "xy" where the clay changes along both, or the main one."""
     return "xy" if _clay_along_both_axes(s) else main_axis(s)
 
 
@@ -124,11 +120,7 @@ COLUMN_UNITS = {"p": "m", "v": "m/s", "fh": "N", "fe": "N", "b": "N.s/m"}
 
 
 def record_figures(record: Record) -> dict[str, shown.Figure]:
-    """Returns every figure of FIGURES, for any style; some may not apply to the run.
-
-    Args:
-        record: the run.
-    """
+    """Returns every figure of FIGURES, for any style; some may not apply to the run."""
     return {
         name: shown.Figure(
             functools.partial(kind.draw, record), functools.partial(run_tables, record, name)
@@ -138,12 +130,7 @@ def record_figures(record: Record) -> dict[str, shown.Figure]:
 
 
 def run_tables(record: Record, name: str) -> dict[str, dict[str, Any]]:
-    """Returns the numbers that a figure of FIGURES shows.
-
-    Args:
-        record: the run.
-        name: of the figure.
-    """
+    """Returns the numbers that a figure of FIGURES shows."""
     samples: dict[str, Any] = {"time [s]": record.t}
     for part in FIGURES[name].columns:
         for i, axis in enumerate(AXES):
@@ -153,23 +140,12 @@ def run_tables(record: Record, name: str) -> dict[str, dict[str, Any]]:
 
 
 def figure_files(folder: Path) -> set[Path]:
-    """Lists the files of the FIGURES, in any format, and of their numbers in a folder.
-
-    Args:
-        folder: of a record.
-    """
+    """Lists the files of the FIGURES, in any format, and of their numbers in a folder."""
     ends = [f".{kind}" for kind in (*shown.FORMATS, "csv")] + ["-*.csv"]
     return {path for name in FIGURES for end in ends for path in folder.glob(name + end)}
 
 
 def figures(record: Record) -> dict[str, Figure]:
-    """Draws the figures of FIGURES that apply to a run.
-
-    Args:
-        record: the run.
-
-    Returns:
-        Figures by file name.
-    """
+    """Draws the figures of FIGURES that apply to a run."""
     drawn = {name: kind.draw(record) for name, kind in FIGURES.items()}
     return {name: figure for name, figure in drawn.items() if figure is not None}

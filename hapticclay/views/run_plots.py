@@ -31,12 +31,7 @@ from .style import (
 
 
 def velocity_plot(record: Record, axis: str = "x") -> Figure:
-    """Plots velocity over position, and the expected steady speeds (Fig. 8, top; Fig. 10).
-
-    Args:
-        record: the run.
-        axis: "x" or "y"; "xy" for a panel each.
-    """
+    """Plots velocity over position, and the expected steady speeds (Fig. 8, top; Fig. 10)."""
     s = record.scenario
     with figure_style():
         figure, panels = position_axes(record, axis)
@@ -69,10 +64,6 @@ def force_ratio_plot(record: Record, axis: str = "x") -> Figure:
 
     In steady motion the printed compensator acts as a damper of 10/K, any other as a damper of 1/(K
     c), c the limit of s C G/K as s goes to 0. Without an integrator this line is omitted.
-
-    Args:
-        record: the run.
-        axis: "x" or "y".
     """
     i, s = AXES.index(axis), record.scenario
     with figure_style():
@@ -109,11 +100,6 @@ def maneuver_plot(records: Sequence[Record], axis: str = "x", over: str = "time"
 
     In clay it also shows the force of the clay, and the times at which yielding clay held the
     handle. In clay that resists along the motion the forces are those along the motion.
-
-    Args:
-        records: the runs.
-        axis: "x" or "y".
-        over: "time" or "position".
     """
     i = AXES.index(axis)
     with figure_style():
@@ -155,12 +141,7 @@ def _along(record: Record, i: int, turned: bool, force: np.ndarray) -> np.ndarra
 
 
 def readings_plot(records: dict[str, Record], axis: str = "x") -> Figure:
-    """Plots velocity over position of several runs along one path.
-
-    Args:
-        records: the runs by name, four at most.
-        axis: "x" or "y".
-    """
+    """Plots velocity over position of several runs along one path."""
     i = AXES.index(axis)
     looks = ((BLACK, "-"), (GREEN, "--"), (BLUE, "-"), (VERMILION, "-."))
     with figure_style():

@@ -51,12 +51,7 @@ class Panel(NamedTuple):
 
 
 def plots_fit(width: int, height: int) -> bool:
-    """Whether running plots fit into a picture of this size.
-
-    Args:
-        width: of the picture [pixels].
-        height: of the picture [pixels].
-    """
+    """Whether running plots fit into a picture of this size."""
     return width >= LEAST_PANEL[0] and height >= LEAST_PANEL[1]
 
 
@@ -67,13 +62,7 @@ class RunningPlots:
     """
 
     def __init__(self, record: Record, width: int, height: int):
-        """Draws the axes.
-
-        Args:
-            record: the run.
-            width: of the image [pixels].
-            height: of the image [pixels]; the panels that fit are shown, three at most.
-        """
+        """Draws the axes."""
         figure, curves = running_figure(record, width, height)
         self._canvas: Any = figure.canvas
         self._axes = self._canvas.copy_from_bbox(figure.bbox)
@@ -85,14 +74,7 @@ class RunningPlots:
             self._curves.append((line, known, x[known], y[known]))
 
     def draw(self, n: int) -> np.ndarray:
-        """Draws the first samples of the run.
-
-        Args:
-            n: number of samples.
-
-        Returns:
-            The image, shape (height, width, 3) of bytes; the next call overwrites it.
-        """
+        """Draws the first samples of the run."""
         self._canvas.restore_region(self._axes)
         for line, known, x, y in self._curves:
             end = int(np.searchsorted(known, n))
@@ -105,16 +87,7 @@ class RunningPlots:
 def running_figure(
     record: Record, width: int, height: int
 ) -> tuple[Figure, list[tuple[Axes, np.ndarray, np.ndarray, str]]]:
-    """Draws the axes of the running plots.
-
-    Args:
-        record: the run.
-        width: of the picture [pixels].
-        height: of the picture [pixels].
-
-    Returns:
-        The figure, and (axes, x, y, colour) of each curve to be drawn on it.
-    """
+    """Draws the axes of the running plots."""
     count = max(1, min(3, height // LEAST_PANEL[1]))
     roomy = width >= ROOMY_PANEL[0] and height >= ROOMY_PANEL[1] * count
     i = int(np.ptp(record.p[:, 1]) > 1.2 * np.ptp(record.p[:, 0]))

@@ -53,27 +53,13 @@ class Session:
     def __init__(
         self, scenario: Scenario, stiffness: float = 1.0, tool: Tool = TOOL, every: int = 1
     ):
-        """Begins at the start of a scenario; its force, length and t_max are ignored.
-
-        Args:
-            scenario: clay, gain and arm.
-            stiffness: factor on the spring of Th; its damper has the square root as factor.
-            tool: at the handle.
-            every: keep every `every`-th sample.
-
-        Raises:
-            ParameterError: a value is out of its bounds, or the scenario is sampled or accurate.
-        """
+        """Begins at the start of a scenario; its force, length and t_max are ignored."""
         self.tool, self.stiffness = tool, stiffness
         self.every = integer("every", every, 1, 1_000_000)
         self.start(scenario)
 
     def start(self, scenario: Scenario) -> None:
-        """Starts a scenario with uncut clay and an empty record.
-
-        Args:
-            scenario: clay, gain and arm.
-        """
+        """Starts a scenario with uncut clay and an empty record."""
         self.scenario = self.prepared(scenario)
         self.given = scenario
         self.run = LiveRun(self.scenario, self.every)
@@ -88,14 +74,7 @@ class Session:
         self._look()
 
     def prepared(self, scenario: Scenario) -> Scenario:
-        """The scenario as it is run.
-
-        Args:
-            scenario: as it was given.
-
-        Raises:
-            ParameterError: it is sampled, or accurate.
-        """
+        """The scenario as it is run."""
         refuse_other(scenario, control="continuous", integrator="fast")
         return played(scenario, self.stiffness)
 
@@ -141,29 +120,15 @@ class Session:
         return live_verdict(self.gain, limit, onset, self.t - self._swung < CALM_TIME)
 
     def pull(self, point: tuple[float, float] | None) -> None:
-        """Makes the hand pull to a point, within reach of the arm.
-
-        Args:
-            point: target point [m]; None releases the handle.
-        """
+        """Makes the hand pull to a point, within reach of the arm."""
         self.point = None if point is None else self._within_reach(point)
 
     def push(self, force: tuple[float, float]) -> None:
-        """Makes the hand press with a constant force, in addition to any pull.
-
-        Args:
-            force: along x and y [N].
-        """
+        """Makes the hand press with a constant force, in addition to any pull."""
         self.run.pull.force = tuple(number("force", f, -1e3, 1e3, unit="N") for f in force)
 
     def change(self, gain: tuple[float, float] | None = None, b: float | None = None) -> None:
-        """Changes the gain or the damping.
-
-        Args:
-            gain: K [1/kg]; None keeps it.
-            b: damping, yield force and consistency of all clay as a multiple of the given
-                scenario's; None keeps them.
-        """
+        """Changes the gain or the damping."""
         scenario = self.scenario
         if gain is not None:
             scenario = replace(scenario, gain=gain)
@@ -180,14 +145,7 @@ class Session:
         return self._damping
 
     def advance(self, seconds: float) -> np.ndarray:
-        """Advances by a slice of simulated time, unless paused.
-
-        Args:
-            seconds: length of the slice [s].
-
-        Returns:
-            Positions of the handle before and after [m], shape (2, 2), or (0, 2) without a step.
-        """
+        """Advances by a slice of simulated time, unless paused."""
         run, dt = self.run, self.scenario.dt
         if self.paused or run.outcome:
             return np.empty((0, 2))
@@ -206,11 +164,7 @@ class Session:
         return np.array([before, run.position()])
 
     def record(self) -> Record:
-        """Ends the run and returns its record, with removed volume, hand's point and gain.
-
-        Raises:
-            ParameterError: nothing was recorded.
-        """
+        """Ends the run and returns its record, with removed volume, hand's point and gain."""
         run = self.run
         if run.outcome is None and run.i:
             run.end()
@@ -291,15 +245,7 @@ class Session:
 
 
 def refuse_other(scenario: Scenario, **fields: str) -> None:
-    """Refuses a scenario that a session cannot run.
-
-    Args:
-        scenario: to be played.
-        **fields: fields with the only permitted value of each.
-
-    Raises:
-        ParameterError: a field has another value.
-    """
+    """Refuses a scenario that a session cannot run."""
     for field, value in fields.items():
         if getattr(scenario, field) != value:
             raise ParameterError(field, getattr(scenario, field), f"must be {value!r} in a session")

@@ -48,9 +48,6 @@ def stability_map_plot(chart: StabilityMap) -> Figure:
     Lines are analytic boundaries, and dots are boundaries found by runs. A mark in each cell shows
     the outcome of its run, ringed where it contradicts the analysis. Hatching marks where the
     linear loop of these runs is unstable.
-
-    Args:
-        chart: from `stability_map`.
     """
     factor, unit, shown = X_SCALES.get(chart.kind, (1.0, "", ""))
     with figure_style():

@@ -31,29 +31,17 @@ ARROW_WIDTH = 0.006  # [m]
 
 
 def plotted_axes(scenario: Scenario) -> tuple[int, ...]:
-    """Returns the axes of live plots: those along which the clay changes, x without clay.
-
-    Args:
-        scenario: that runs.
-    """
+    """Returns the axes of live plots: those along which the clay changes, x without clay."""
     return tuple(map(AXES.index, scenario.clay.along)) if scenario.clay else (0,)
 
 
 def hardest(scenario: Scenario) -> float:
-    """Returns the largest damping of the clay, growth aside [N.s/m]; 0 without clay.
-
-    Args:
-        scenario: that holds the clay.
-    """
+    """Returns the largest damping of the clay, growth aside [N.s/m]; 0 without clay."""
     return scenario.clay.largest if scenario.clay else 0.0
 
 
 def held_words(held: Sequence[bool]) -> str:
-    """Text if yielding clay holds the handle: "held", "held along x", or nothing.
-
-    Args:
-        held: whether the clay holds the handle, along x and along y.
-    """
+    """Text if yielding clay holds the handle: "held", "held along x", or nothing."""
     names = [f" along {a}" for a, still in zip(AXES, held, strict=True) if still]
     return f"held{names[0] if len(names) == 1 else ''}" if names else ""
 
@@ -93,12 +81,7 @@ class Stage:
     """
 
     def __init__(self, scenario: Scenario, tool: Tool = TOOL):
-        """Compiles the model.
-
-        Args:
-            scenario: what to show.
-            tool: at the handle; a block of clay may have its own.
-        """
+        """Compiles the model."""
         blocks = scenario.clay.blocks if scenario.clay else ()
         tool = next((block.tool for block in blocks if block.tool), tool)
         self.scenario, self.tool = scenario, tool
@@ -121,12 +104,7 @@ class Stage:
         self._target = self.model.body("target").mocapid[0]
 
     def pose(self, q: Any, target: tuple[float, float] | None = None) -> None:
-        """Poses the arm and the target of the hand.
-
-        Args:
-            q: joint angles [rad], (2,).
-            target: point that the hand pulls to [m]; None hides it.
-        """
+        """Poses the arm and the target of the hand."""
         self.data.qpos[:] = q
         at = HIDDEN if target is None else (*np.add(target, self.scenario.origin), 0.0)
         self.data.mocap_pos[self._target] = at
@@ -134,12 +112,7 @@ class Stage:
         mujoco.mj_camlight(self.model, self.data)
 
     def push(self, fe: Any, held: bool) -> None:
-        """Points the arrow along the force of yielding clay; call it after `pose`.
-
-        Args:
-            fe: resisting force of the clay [N], (2,).
-            held: whether it holds the handle.
-        """
+        """Points the arrow along the force of yielding clay; call it after `pose`."""
         self.arrow = None
         size = float(np.hypot(*fe))
         if not self._breaking or not size > 1e-3 * self._breaking:
@@ -149,11 +122,7 @@ class Stage:
         self.arrow = Arrow(begin, begin - length / size * np.append(fe, 0.0), held)
 
     def draw_arrow(self, scene: mujoco.MjvScene) -> None:
-        """Adds the arrow, if there is one, to what a renderer draws.
-
-        Args:
-            scene: of the renderer.
-        """
+        """Adds the arrow, if there is one, to what a renderer draws."""
         if self.arrow is None or scene.ngeom >= scene.maxgeom:
             return
         begin, end, _ = self.arrow
@@ -164,14 +133,7 @@ class Stage:
         scene.ngeom += 1
 
     def carve(self, points: Any) -> float:
-        """Moves the tool through points, from its present position.
-
-        Args:
-            points: positions of the handle [m], shape (n, 2).
-
-        Returns:
-            The removed volume [m^3].
-        """
+        """Moves the tool through points, from its present position."""
         gained = 0.0
         if self.field < 0:
             return gained
@@ -231,11 +193,6 @@ def picture(arm: Arm, clay: Block | None, tool: tuple[float, float]) -> mujoco.M
 
     Its joints are those of `build`. The target of the hand is the mocap body "target", the tip of
     the tool the body "tool".
-
-    Args:
-        arm: that is drawn.
-        clay: the block, as a heightfield; None for none.
-        tool: width of the tool, and depth of its tip under the surface [m].
     """
     with warnings_caught() as caught:
         model = picture_spec(arm, clay, tool).compile()
@@ -245,14 +202,7 @@ def picture(arm: Arm, clay: Block | None, tool: tuple[float, float]) -> mujoco.M
 def picture_spec(
     arm: Arm, clay: Block | None, tool: tuple[float, float], more: tuple[str, ...] = ()
 ) -> mujoco.MjSpec:
-    """The specification of a `picture`.
-
-    Args:
-        arm: as for `picture`.
-        clay: as for `picture`.
-        tool: as for `picture`.
-        more: further files of mjcf/.
-    """
+    """The specification of a `picture`."""
     spec = compose_spec(["arm.xml", "room.xml", *more], arm)
     _enlarge_room(spec, room_scale(arm))
     for name, color in PART_COLORS.items():
@@ -274,11 +224,7 @@ def picture_spec(
 
 
 def room_scale(arm: Arm) -> float:
-    """Scale of the room relative to that of the paper's arm; at least 1.
-
-    Args:
-        arm: in the room.
-    """
+    """Scale of the room relative to that of the paper's arm; at least 1."""
     return max(1.0, arm.reach[1] / PAPER.reach[1])
 
 
@@ -294,14 +240,7 @@ def _enlarge_room(spec: mujoco.MjSpec, scale: float) -> None:
 
 
 def arm_skin(arm: Arm) -> Any:
-    """Visible geometry of an arm, by link.
-
-    Args:
-        arm: the arm.
-
-    Returns:
-        Rows of body ("" for the world), shape, from, to [m], radius [m], material.
-    """
+    """Visible geometry of an arm, by link."""
     joint, elbow, handle = (0.0, 0.0, 0.0), (arm.l1, 0.0, 0.0), (arm.l2, 0.0, 0.0)
     return (
         ("", "cylinder", (0.0, 0.0, GROUND), (0.0, 0.0, -0.03), 0.060, "dark"),

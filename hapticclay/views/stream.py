@@ -51,11 +51,7 @@ class UdpStream:
         self._frames: list[Frame] = []
 
     def send(self, play: Session | Replay) -> None:
-        """Sends the last frame if it is new; drops it if the system would block.
-
-        Args:
-            play: the session, or the replay of a record.
-        """
+        """Sends the last frame if it is new; drops it if the system would block."""
         frame = play.frames[-1]
         if play.frames is not self._frames:  # it started or restarted
             self._frames, self._before = play.frames, self._before + self._last + FRAME_TIME

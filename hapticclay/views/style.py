@@ -119,14 +119,7 @@ _STYLE: ContextVar[str] = ContextVar("style", default="screen")
 
 @contextlib.contextmanager
 def styled(style: str) -> Iterator[Look]:
-    """Context in which figures are drawn and saved in a style.
-
-    Args:
-        style: "screen", "print" for one column of 8.5 cm, or "print-wide" for two, 17.5 cm.
-
-    Raises:
-        ParameterError: there is no such style.
-    """
+    """Context in which figures are drawn and saved in a style."""
     before = _STYLE.set(choice("style", style, tuple(STYLES)))
     try:
         with figure_style():
@@ -146,67 +139,35 @@ def narrow() -> bool:
 
 
 def figure_size(columns: int, height: float, width: float | None = None) -> tuple[float, float]:
-    """Returns the size of a figure in the current style, for `figsize` [inch].
-
-    Args:
-        columns: 1 for a usual figure, 2 for one with panels side by side.
-        height: on a screen [inch]; print scales it by `Look.scale`, as it does the fonts.
-        width: on a screen where it is not that of SCREEN_WIDTHS [inch].
-    """
+    """Returns the size of a figure in the current style, for `figsize` [inch]."""
     now = look()
     return now.width or width or SCREEN_WIDTHS[columns], now.scale * height
 
 
 def map_size(across: float, least: float, ratio: float) -> tuple[float, float]:
-    """Returns the size of a figure of a map to scale, in the current style [inch].
-
-    Args:
-        across: width of its axes on a screen [inch].
-        least: their least height on a screen [inch].
-        ratio: height over width of what is shown.
-    """
+    """Returns the size of a figure of a map to scale, in the current style [inch]."""
     width, scale = figure_size(1, 1.0)
     across *= width / SCREEN_WIDTHS[1]
     return width, min(max(across * ratio, scale * least) + 1.3 * scale, width)
 
 
 def panel_grid(count: int) -> tuple[int, int]:
-    """Returns rows and columns of some panels: side by side, or in one printed column stacked.
-
-    Args:
-        count: of the panels.
-    """
+    """Returns rows and columns of some panels: side by side, or in one printed column stacked."""
     return (count, 1) if narrow() else (1, count)
 
 
 def points(size: float) -> float:
-    """Returns a size of text in the current style [points].
-
-    Args:
-        size: on a screen [points].
-    """
+    """Returns a size of text in the current style [points]."""
     return size if _STYLE.get() == "screen" else max(LEAST_TEXT, look().scale * size)
 
 
 def stroke(size: float) -> float:
-    """Returns a line width or marker size in the current style [points].
-
-    Args:
-        size: on a screen [points].
-    """
+    """Returns a line width or marker size in the current style [points]."""
     return look().scale * size
 
 
 def map_edges(values: np.ndarray, log: bool) -> np.ndarray:
-    """Borders of the cells of a map around values: half way between them.
-
-    Args:
-        values: ascending, two at least, shape (n,).
-        log: whether the scale is logarithmic.
-
-    Returns:
-        Shape (n + 1,).
-    """
+    """Borders of the cells of a map around values: half way between them."""
     v = np.log(values) if log else values
     middle = 0.5 * (v[1:] + v[:-1])
     edges = np.concatenate(([2.0 * v[0] - middle[0]], middle, [2.0 * v[-1] - middle[-1]]))
@@ -214,34 +175,19 @@ def map_edges(values: np.ndarray, log: bool) -> np.ndarray:
 
 
 def rgb(color: str) -> tuple[float, float, float]:
-    """Converts a hex colour to three numbers from 0 to 1.
-
-    Args:
-        color: such as "#0072B2".
-    """
+    """Converts a hex colour to three numbers from 0 to 1."""
     r, g, b = rgb_bytes(color)
     return r / 255.0, g / 255.0, b / 255.0
 
 
 def rgb_bytes(color: str) -> tuple[int, int, int]:
-    """Converts a hex colour to three bytes.
-
-    Args:
-        color: such as "#0072B2".
-    """
+    """Converts a hex colour to three bytes."""
     r, g, b = bytes.fromhex(color.removeprefix("#"))
     return r, g, b
 
 
 def clay_color(share: Any) -> np.ndarray:
-    """Colour of clay by cutting force.
-
-    Args:
-        share: as `clay_share`, 0 to 1, any shape.
-
-    Returns:
-        Red, green and blue from 0 to 1, shape (..., 3).
-    """
+    """Colour of clay by cutting force."""
     pale, deep = np.array(rgb(CLAY_PALE)), np.array(rgb(CLAY_DEEP))
     return pale + np.asarray(share)[..., None] ** 2 * (deep - pale)
 
@@ -250,14 +196,6 @@ def along_motion(v: np.ndarray, fe: np.ndarray, main: int) -> tuple[np.ndarray, 
     """Speed and force along the motion; at rest, 0 and all of the force.
 
     Both are negative where the motion, or at rest the force, is against the main axis.
-
-    Args:
-        v: velocity of the handle [m/s], shape (n, 2).
-        fe: force of the clay [N], shape (n, 2).
-        main: axis that tells forth from back, 0 or 1.
-
-    Returns:
-        Speed [m/s] and force [N], shape (n,) each.
     """
     speed, size = np.hypot(*v.T), np.hypot(*fe.T)
     still = speed == 0.0
@@ -270,14 +208,6 @@ def clay_share(clay: Clay, x: Any, y: Any) -> np.ndarray:
     """Cutting force of clay at given places relative to the hardest of the scene, growth aside.
 
     It is the force along the harder axis, at the same speed and indentation for all clay.
-
-    Args:
-        clay: of the scene.
-        x: coordinates [m].
-        y: the same along y.
-
-    Returns:
-        0 to 1, of the shape of x and y together.
     """
     x, y = np.asarray(x), np.asarray(y)
     here = [law.forces_at(clay.kinds, x, y, *SHADED) for law in clay.laws]
@@ -286,22 +216,13 @@ def clay_share(clay: Clay, x: Any, y: Any) -> np.ndarray:
 
 
 def cutting_force(clay: Clay) -> float:
-    """Force on a tool that moves slowly through the hardest clay, growth aside [N].
-
-    Args:
-        clay: of the scene.
-    """
+    """Force on a tool that moves slowly through the hardest clay, growth aside [N]."""
     laws = [float(law.forces(clay.kinds, *SHADED).max()) for law in clay.laws]
     return max(*laws, *(block.at_speed(SHADED[0]) for block in clay.blocks))
 
 
 def verdict_color(text: str, unstable: bool) -> str:
-    """Returns the colour behind a verdict on the loop.
-
-    Args:
-        text: the verdict.
-        unstable: whether the arm oscillates with growing amplitude.
-    """
+    """Returns the colour behind a verdict on the loop."""
     kind = "unstable" if unstable else "stable" if text.startswith("stable") else "other"
     return VERDICT_COLORS[kind]
 
@@ -311,9 +232,6 @@ def figure_style(**more: Any) -> Any:
 
     Settings of the user (matplotlibrc, a style sheet) do not change them: the same run gives the
     same files on every machine.
-
-    Args:
-        more: rcParams of matplotlib that override the style's, dots written as underscores.
     """
     from matplotlib import style
 
@@ -325,13 +243,6 @@ def set_title(ax: Axes, *parts: str, panel: bool = False, **more: Any) -> None:
     """Puts a title over the axes, in as many lines as keep it within the figure.
 
     In print only titles that distinguish panels are drawn; the caption has the rest.
-
-    Args:
-        ax: the axes.
-        parts: phrases, joined by commas; lines break between them, and between words only where a
-            phrase alone is too long.
-        panel: whether it distinguishes this panel from others of the figure.
-        more: further arguments of `Axes.set_title`.
     """
     from matplotlib import rcParams
 
@@ -371,14 +282,7 @@ def _width(text: str, size: float, families: tuple[str, ...]) -> float:
 
 
 def add_legend(figure: Figure, ax: Axes | None, ncols: int = 5, **more: Any) -> None:
-    """Puts the legend of one of the axes above the figure, in as many columns as fit into it.
-
-    Args:
-        figure: the figure.
-        ax: the axes whose labels it lists; None where `more` has handles.
-        ncols: columns, at most.
-        more: further arguments of `Figure.legend`.
-    """
+    """Puts the legend of one of the axes above the figure, in as many columns as fit into it."""
     if ax is not None:
         more["handles"], more["labels"] = ax.get_legend_handles_labels()
     count = len(more["handles"])
@@ -396,9 +300,6 @@ def plain_ticks(axis: Any) -> None:
 
     The numbers are powers of ten; powers of ten times 1, 2 and 5 if the axis spans less than two
     decades; or evenly spaced numbers if it holds fewer than two of these.
-
-    Args:
-        axis: of matplotlib, its limits set.
     """
     from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
 
@@ -413,33 +314,19 @@ def plain_ticks(axis: Any) -> None:
 
 
 def hand_name(operator: Operator | None | tuple[Operator | None, Operator | None]) -> str:
-    """Names the hand in a title.
-
-    Args:
-        operator: the hand, or one for each axis; None for no hand.
-    """
+    """Names the hand in a title."""
     if operator is None or operator == (None, None):
         return "no hand"
     return "nominal hand" if operator == Operator() else "given hand"
 
 
 def unit_text(text: str) -> str:
-    """Typesets units: N.s/m with a centred dot, s^2 with an exponent.
-
-    Args:
-        text: that holds the units.
-    """
+    """Typesets units: N.s/m with a centred dot, s^2 with an exponent."""
     return text.replace("N.", "N$\\cdot$").replace("^2", "$^2$")
 
 
 def shade_clay(ax: Axes, edges: Sequence[float], forces: Sequence[float]) -> None:
-    """Shades the intervals of the x axis with clay, darker where it is harder to cut.
-
-    Args:
-        ax: axes over the position [cm].
-        edges: between the intervals [m], ascending, shape (n,).
-        forces: of a tool that cuts slowly in each interval [N], shape (n + 1,); empty for no clay.
-    """
+    """Shades the intervals of the x axis with clay, darker where it is harder to cut."""
     label, edges = "clay", (-1.0, *edges, 1.0)
     for low, high, force in zip(edges, edges[1:], forces, strict=False):
         if force > 0.0:
@@ -449,12 +336,7 @@ def shade_clay(ax: Axes, edges: Sequence[float], forces: Sequence[float]) -> Non
 
 
 def shade_held(ax: Axes, spans: Any) -> None:
-    """Shades the times at which yielding clay held the handle.
-
-    Args:
-        ax: axes over the time [s].
-        spans: (begin, end) of each [s].
-    """
+    """Shades the times at which yielding clay held the handle."""
     bars = [(begin, end - begin) for begin, end in spans]
     if bars:
         across: Any = ax.get_xaxis_transform()

@@ -60,11 +60,7 @@ MISSING = {  # why a run has no value: style of its cell and of its point
 
 
 def swept_parameters(table: Any) -> list[str]:
-    """Lists the parameters of a sweep: the columns between the number of the run and its status.
-
-    Args:
-        table: from `read_sweep`.
-    """
+    """Lists the parameters of a sweep: the columns between the number of the run and its status."""
     names = table.column_names
     return names[1 : names.index("status")]
 
@@ -74,10 +70,6 @@ def missing_reasons(table: Any, value: str) -> list[str]:
 
     fe/v and the speed are properties of clay: runs that reached no clay are left out of their maps
     if any other run did.
-
-    Args:
-        table: from `read_sweep`.
-        value: name of the column.
     """
     status, figures = table["status"].to_pylist(), table[value].to_pylist()
     if value == "status":
@@ -100,17 +92,7 @@ def missing_reasons(table: Any, value: str) -> list[str]:
 def sweep_plot(
     table: Any, value: str = "status", x: str | None = None, y: str | None = None
 ) -> Figure:
-    """Maps one column over two parameters: its mean over all others, or the worst status.
-
-    Args:
-        table: from `read_sweep`.
-        value: column to show, of numbers or "status".
-        x: parameter along x; None for the first that varies.
-        y: parameter along y; None for the next.
-
-    Raises:
-        ParameterError: an unknown column, or fewer than two parameters.
-    """
+    """Maps one column over two parameters: its mean over all others, or the worst status."""
     names = swept_parameters(table)
     if len(names) < 2:
         raise ParameterError("map", ", ".join(names), "needs two parameters that vary")
@@ -157,14 +139,7 @@ def sweep_plot(
 def sweep_tables(
     table: Any, value: str = "status", x: str | None = None, y: str | None = None
 ) -> dict[str, dict[str, list]]:
-    """Returns the numbers of a map of a sweep: its runs with both parameters and the column.
-
-    Args:
-        table: from `read_sweep`.
-        value: column shown.
-        x: as in `sweep_plot`.
-        y: as in `sweep_plot`.
-    """
+    """Returns the numbers of a map of a sweep: its runs with both parameters and the column."""
     names = swept_parameters(table)
     x = x or names[0]
     y = y or next(n for n in names if n != x)
@@ -216,13 +191,6 @@ def unstable_runs(table: Any, value: str = "status") -> dict[str, np.ndarray]:
     """Whether the linear loop of an axis is unstable in each run: gain limit over K below 1.
 
     A column of one axis, such as speed_x, is told about that axis alone; others about both.
-
-    Args:
-        table: from `read_sweep`.
-        value: column that is shown.
-
-    Returns:
-        Shape (runs,) of each axis that is unstable in some run, by its name.
     """
     out = {}
     for axis in [a for a in AXES if value.endswith(f"_{a}")] or AXES:

@@ -41,13 +41,7 @@ OMEGA_LABEL = "angular frequency [rad/s]"
 def bode_plot(
     loop: Loop, *, at: str = "compensator", omega: tuple[float, float] = (0.1, 1000.0)
 ) -> Figure:
-    """Plots magnitude and phase of the loop and marks its gain and phase margins.
-
-    Args:
-        loop: the loop with its K; or axis, K, b, and operator and other parts by name.
-        at: where the loop is opened, "compensator" or "force".
-        omega: range shown [rad/s].
-    """
+    """Plots magnitude and phase of the loop and marks its gain and phase margins."""
     m = stability_margins.margins(loop, at=at)
     w = np.geomspace(*omega, 2000)
     L = _response(*stability_margins.open_loop(loop, at=at), w)
@@ -85,13 +79,7 @@ def bode_plot(
 def nyquist_plot(
     loop: Loop, gains: tuple[float, ...] = (1.0,), *, at: str = "compensator"
 ) -> Figure:
-    """Plots Nyquist curves with the unit circle, the point -1 and the margins of each.
-
-    Args:
-        loop: the loop, its K ignored; or axis, b, gains, and operator and other parts by name.
-        gains: K of each curve [1/kg], five at most.
-        at: where the loop is opened, "compensator" or "force".
-    """
+    """Plots Nyquist curves with the unit circle, the point -1 and the margins of each."""
     with figure_style():
         height = (4.5 if narrow() else 5.7) + 0.2 * len(gains)  # for the legend
         figure = Figure(figsize=figure_size(1, height, 5.6))
@@ -127,12 +115,7 @@ def nyquist_plot(
 
 @of_loop("K", "b")
 def small_gain_plot(loop: Loop, *, omega: tuple[float, float] = (0.1, 1000.0)) -> Figure:
-    """Plots both sides of inequality (13) and shades the frequencies at which it fails.
-
-    Args:
-        loop: the loop with its K; or axis, K, b, and operator and other parts by name.
-        omega: range shown [rad/s].
-    """
+    """Plots both sides of inequality (13) and shades the frequencies at which it fails."""
     verdict = stability_margins.small_gain(loop)
     stable = stability_margins.coupled_stability(loop)
     w = np.geomspace(*omega, 2000)
@@ -164,15 +147,7 @@ def transparency_plot(
     omega: tuple[float, float] = (0.1, 300.0),
     band: tuple[float, float] = DESIGN_BAND,
 ) -> Figure:
-    """Plots the clay's share of the hand's force, |fe/fh| (Eq. 7), for some compensators.
-
-    Args:
-        loop: the loop, its compensator, K and hand ignored; or axis, b, designs, and other parts by
-            name.
-        designs: (label, K, shape) of each compensator, five at most.
-        omega: range shown [rad/s].
-        band: frequencies that `transparency_error` averages over [rad/s].
-    """
+    """Plots the clay's share of the hand's force, |fe/fh| (Eq. 7), for some compensators."""
     w = np.geomspace(*omega, 1000)
     with figure_style():
         figure = Figure(figsize=figure_size(1, 3.8))

@@ -96,12 +96,7 @@ class Pane:
     """
 
     def __init__(self, scenario: Scenario, tool: Tool):
-        """Prepares the picture.
-
-        Args:
-            scenario: what to show.
-            tool: at the handle.
-        """
+        """Prepares the picture."""
         self.stage = Stage(scenario, tool)
         self.plots = _plots(plotted_axes(scenario), scenario.clay)
         self.frames: list[Frame] = []
@@ -110,11 +105,7 @@ class Pane:
         self.keys: Rows = ()
 
     def take(self, sight: Sight) -> None:
-        """Updates the content; texts and plots change when there are new texts.
-
-        Args:
-            sight: answer of the session.
-        """
+        """Updates the content; texts and plots change when there are new texts."""
         if sight.anew:
             self.stage.restore()
             self.frames = []
@@ -136,13 +127,7 @@ class Pane:
                 plot.extend(self.frames)
 
     def show(self, keys: Callable[[], list[int]], viewer: Any, ask: Callable[[Any], Sight]) -> None:
-        """Shows answers until the process ends.
-
-        Args:
-            keys: returns the keys pressed since the last call.
-            viewer: MuJoCo's.
-            ask: sends keys and hand to the session and returns its answer.
-        """
+        """Shows answers until the process ends."""
         body = self.stage.model.body("tool").id
         with viewer.lock():
             viewer.cam.lookat[:] = (0.33, 0.19, -0.03)  # the plots cover the right
@@ -401,11 +386,7 @@ class LivePlot:
         self.figure.linepnt[:] = 0
 
     def extend(self, frames: list[Frame]) -> None:
-        """Adds the new frames.
-
-        Args:
-            frames: all frames of the session so far.
-        """
+        """Adds the new frames."""
         new = (frames[k] for k in range(self.seen, len(frames)) if k % self.stride == 0)
         self.points += [[curve.point(frame) for curve in self.curves] for frame in new]
         self.seen = len(frames)

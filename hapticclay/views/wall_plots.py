@@ -58,9 +58,6 @@ def zwidth_plot(chart: ZWidth) -> Figure:
 
     Markers are runs and lines are theory. Each region of a family has its runs, the exact line of
     its linear loop and, where there is room, its name.
-
-    Args:
-        chart: from `zwidth`.
     """
     with figure_style():
         figure = Figure(figsize=figure_size(1, 5.4))
@@ -78,12 +75,7 @@ def zwidth_plot(chart: ZWidth) -> Figure:
 
 
 def regions_plot(regions: Sequence[ZRegion], walls: Sequence[VirtualWall]) -> Figure:
-    """Plots the regions of several devices superimposed, and one wall of each.
-
-    Args:
-        regions: from `zwidth`, with names.
-        walls: the wall of each, a large ring; a triangle at the foot where it is softer than shown.
-    """
+    """Plots the regions of several devices superimposed, and one wall of each."""
     with figure_style():
         figure = Figure(figsize=figure_size(1, 5.0))
         ax = figure.add_subplot()

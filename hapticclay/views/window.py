@@ -62,11 +62,7 @@ class Window:
     """
 
     def __init__(self, play: Session | Replay):
-        """Prepares the window; call `show` to open it.
-
-        Args:
-            play: what to show.
-        """
+        """Prepares the window; call `show` to open it."""
         self.play, self.help, self.other = play, True, False
         self.held: tuple[float, float] | None = None
         self._anew()
@@ -75,14 +71,7 @@ class Window:
         self.shown, self.written = 0, -math.inf
 
     def show(self, until: Callable[[], bool] | None = None) -> None:
-        """Shows the window until it is closed; raises the error that ended the player, if any.
-
-        Args:
-            until: closes the window when it returns True.
-
-        Raises:
-            ParameterError: there is no display, or no OpenGL.
-        """
+        """Shows the window until it is closed; raises the error that ended the player, if any."""
         screens = (os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
         if sys.platform.startswith("linux") and not any(screens):
             raise ParameterError("display", "", f"no display: {INSTEAD}")
@@ -124,12 +113,7 @@ class Window:
                     player.stop()
 
     def look(self, keys: list[int], hand: tuple[float, float] | None) -> Sight:
-        """Handles keys and mouse and returns the content; the caller holds the player's lock.
-
-        Args:
-            keys: pressed since the last call, by GLFW's numbers.
-            hand: displacement of the mouse since it grabbed the handle [m]; None if it does not.
-        """
+        """Handles keys and mouse and returns the content; the caller holds the player's lock."""
         for key in keys:
             self._key(key)
         play, target = self.play, None

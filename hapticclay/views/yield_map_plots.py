@@ -36,9 +36,6 @@ def yield_map_plot(chart: YieldMap) -> Figure:
     """Plots the outcome of a push over yield force and gain.
 
     Colours show the speed of the limit cycle, by theory and, in the dots, by runs.
-
-    Args:
-        chart: from `yield_map`.
     """
     push, low, high = chart.loop.push, *(f(c.Fy for c in chart.cells) for f in (min, max))
     bottom, top = 0.9 * min(c.K for c in chart.cells), chart.K[-1]

@@ -18,13 +18,6 @@ CLASSICS = (  # one module of this folder each, by year
 
 
 def classic(name: str) -> Classic:
-    """Returns a classic by name; imports its module on demand.
-
-    Args:
-        name: as in CLASSICS.
-
-    Raises:
-        ParameterError: there is no such classic.
-    """
+    """Returns a classic by name; imports its module on demand."""
     choice("classic", name, CLASSICS)
     return importlib.import_module(f"{__name__}.{name}").CLASSIC

@@ -25,11 +25,7 @@ def _wall(quantum: float, K: float = 0.0) -> VirtualWall:
 
 
 def bound(quantum: float) -> float:
-    """K = min(2 b/Ts, 2 fc/Delta) [N/m].
-
-    Args:
-        quantum: Delta, distance per encoder count [m].
-    """
+    """K = min(2 b/Ts, 2 fc/Delta) [N/m]."""
     return min(2.0 * DAMPER / TS, 2.0 * FRICTION / quantum)
 
 
@@ -77,12 +73,7 @@ def _modes(tell: Tell) -> list[Row]:
 
 
 def make(quick: bool, tell: Tell) -> Found:
-    """Makes the runs.
-
-    Args:
-        quick: two encoders instead of four.
-        tell: called with the name of each step.
-    """
+    """Makes the runs."""
     rows, found = [], []
     for quantum in QUICK_QUANTA if quick else QUANTA:
         tell(f"largest passive K: Delta = {1e6 * quantum:g} um")

@@ -182,12 +182,7 @@ def _chart(cutoffs: Cutoffs, smooth: list[float], rough: dict[float, list[float]
 
 
 def make(quick: bool, tell: Tell) -> Found:
-    """Makes the runs.
-
-    Args:
-        quick: three cut-offs and one encoder.
-        tell: called with the name of each step.
-    """
+    """Makes the runs."""
     cutoffs, quanta = (QUICK_CUTOFFS, (MIDDLE,)) if quick else (CUTOFFS, QUANTA)
     lag, smooth = _lag(cutoffs, tell)
     noise, rough = _noise(cutoffs, quanta, tell)

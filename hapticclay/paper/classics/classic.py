@@ -52,12 +52,5 @@ class Classic:
 
 
 def holds(cells: str, ours: bool, status: str, reason: str) -> Row:
-    """A row for a claim that holds or not; 1 is expected.
-
-    Args:
-        cells: "claim | place | as printed".
-        ours: whether the runs confirm it.
-        status: as in CLASSIC_STATUSES.
-        reason: the numbers behind it.
-    """
+    """A row for a claim that holds or not; 1 is expected."""
     return row(f"{cells} | 1", (1.0, float(ours), 0.0), status, reason)

@@ -24,11 +24,7 @@ STEPS = 8  # engine steps per sample; the zigzag's energy is exact to one part i
 
 
 def bound(wall: VirtualWall) -> float:
-    """K of b = K Ts/2 + |B| [N/m]; 0 where no K is passive.
-
-    Args:
-        wall: all fields but K.
-    """
+    """K of b = K Ts/2 + |B| [N/m]; 0 where no K is passive."""
     return max(0.0, 2.0 * (wall.device.damper - abs(wall.B)) / wall.Ts)
 
 
@@ -102,12 +98,7 @@ def _plane(found: list[tuple[str, VirtualWall, float]]) -> Chart:
 
 
 def make(quick: bool, tell: Tell) -> Found:
-    """Makes the runs.
-
-    Args:
-        quick: only three limits by runs, and no hand.
-        tell: called with the name of each step.
-    """
+    """Makes the runs."""
     found = list(_limits(quick, tell))
     rows = [
         row(

@@ -27,11 +27,7 @@ BUZZ = 2.0  # [N.s/m] virtual damping at which ROUGH buzzes by more than 1 um
 
 
 def damping_needed(wall: VirtualWall) -> float:
-    """Physical damping at which the linear wall is marginally stable [N.s/m].
-
-    Args:
-        wall: wall with its K; friction is ignored.
-    """
+    """Physical damping at which the linear wall is marginally stable [N.s/m]."""
 
     def unstable(b: float) -> bool:
         return not wall_limits.stable_wall(replace(wall, device=Device(wall.device.mass, b)))
@@ -44,20 +40,13 @@ def threshold(wall: VirtualWall) -> float:
 
     For a sine of speed V, Coulomb friction acts as a damper 4 fc/(pi V). The oscillation persists
     if this equals the missing damping of the device.
-
-    Args:
-        wall: wall with its K and friction.
     """
     d = wall.device
     return 4.0 * d.friction / (math.pi * (damping_needed(wall) - d.damper))
 
 
 def held_speed(wall: VirtualWall) -> float:
-    """Largest initial speed from which a wall comes to rest, from runs [m/s].
-
-    Args:
-        wall: wall with its K and friction; the search starts around the scale 2 fc/(K Ts).
-    """
+    """Largest initial speed from which a wall comes to rest, from runs [m/s]."""
     around = 2.0 * wall.device.friction / (wall.K * wall.Ts)
     low, high = around / SPAN, around * SPAN
     while high > BRACKET * low:
@@ -141,12 +130,7 @@ def _quantum(tell: Tell) -> Row:
 
 
 def make(quick: bool, tell: Tell) -> Found:
-    """Makes the runs.
-
-    Args:
-        quick: one stiffness, and no encoder.
-        tell: called with the name of each step.
-    """
+    """Makes the runs."""
     rows, chart = _thresholds(quick, tell)
     if not quick:
         rows += [_stable_but_active(tell), _quantum(tell)]

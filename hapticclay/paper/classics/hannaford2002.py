@@ -32,20 +32,7 @@ OBSERVED = 1e-3  # share: the hand's spring over a sample is evaluated at the me
 
 
 def observed_wall(t, q, qd, fh, state, params):
-    """Control law of a delayed one-sided wall with a passivity observer and controller.
-
-    Args:
-        t: time [s].
-        q: joint angles [rad].
-        qd: joint rates [rad/s].
-        fh: hand force [N]; not used.
-        state: energy that the wall has taken [J], position [m] and force [N] of the last sample,
-            1.0 if there was one, then the delayed forces.
-        params: K [N/m], lever [m], Ts [s], index of the damper, mobility of the handle [1/kg].
-
-    Returns:
-        Torques; the next state.
-    """
+    """Control law of a delayed one-sided wall with a passivity observer and controller."""
     K, lever, Ts, damper, W = params
     x, v = lever * (UPRIGHT - q[0]), -lever * qd[0]
     energy = state[0] + state[2] * (x - state[1]) * state[3]
@@ -86,13 +73,7 @@ class Contact:
 
 
 def contact(K: float, damper: float, delay: int = 0) -> Contact:
-    """Runs a device and a hand that press against a wall.
-
-    Args:
-        K: stiffness [N/m].
-        damper: index of the passivity controller.
-        delay: delay of the wall's force, before observer and controller [samples].
-    """
+    """Runs a device and a hand that press against a wall."""
     wall = VirtualWall(device=Device(MASS, DAMPER), Ts=TS, operator=HAND, velocity="exact")
     push = Constant((PRESS, 0.0))
     scenario = wall.scenario(T_MAX, push=SPEED, start=START, steps=STEPS, muscle=push)
@@ -172,12 +153,7 @@ def _observer(plain: Contact) -> Row:
 
 
 def make(quick: bool, tell: Tell) -> Found:
-    """Makes the runs.
-
-    Args:
-        quick: only one wall, without delay.
-        tell: called with the name of each step.
-    """
+    """Makes the runs."""
     rows, shown = _claims(quick, tell)
     plain, damped = shown["without"], shown["with"]
     rows.append(_observer(plain))

@@ -26,13 +26,7 @@ def _wall(b: float, delay: float, hand: Operator | None = None) -> VirtualWall:
 
 
 def rule(b: float, B: float, delay: float) -> float:
-    """K = (b + B)/(Ts/2 + delay) [N/m].
-
-    Args:
-        b: physical damping of device and hand [N.s/m].
-        B: virtual damping [N.s/m].
-        delay: in samples.
-    """
+    """K = (b + B)/(Ts/2 + delay) [N/m]."""
     return (b + B) / (TS * (0.5 + delay))
 
 
@@ -114,12 +108,7 @@ def _boundary(quick: bool, tell: Tell) -> tuple[list[Row], Chart]:
 
 
 def make(quick: bool, tell: Tell) -> Found:
-    """Makes the runs.
-
-    Args:
-        quick: fewer delays and dampings, no hand.
-        tell: called with the name of each step.
-    """
+    """Makes the runs."""
     rows = _rows_of_the_rule(quick, tell)
     if not quick:
         rows.append(_row_of_the_hand(tell))
