@@ -195,7 +195,7 @@ def least_mass_plot(found: ArmMBK) -> Figure:
 
 
 def rendered_part(subject: Subject, part: str) -> float | None:
-    """Rendered value of a part of a wall or clay, for comparison with the effective one; or None."""
+    """Rendered value of a part of a wall or clay, beside the effective one; None if unknown."""
     letters = {"stiffness": "K", "damping": "B", "mass": "M"}
     if not isinstance(subject, VirtualWall):
         letters = {"stiffness": "k", "damping": "b"}
