@@ -17,11 +17,11 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..errors import ParameterError, choice, integer, number_in
+from ..fields import join_names
 from ..files import MOST_SETTINGS, parse_toml, read_text, versions
 from ..scene.changes import named_values
 from ..scene.earlier_names import with_present_names
 from ..scene.experiments import EXPERIMENTS, parameter_unit
-from ..scene.field_kinds import join_names
 from ..scene.files import read_settings
 from ..scene.scenario import Scenario
 
@@ -125,7 +125,7 @@ class Sweep:
     """Runs of one experiment, or of a scenario file, over a space of its numbers.
 
     A number is a parameter of the experiment, as on the command line, or any field of the scenario
-    by dotted name (`scene/fields.py`): "servo.x.G.damping", "gain.x", "compensator.den.1". A pair
+    by dotted name : "servo.x.G.damping", "gain.x", "compensator.den.1". A pair
     without axis gets the value on both axes. "operator.mass" adds an arm at the handle.
 
     Attributes:
