@@ -61,7 +61,7 @@ def comparison_page(found: Comparison) -> str:
 
 
 def number_rows(found: Comparison) -> dict[str, list[str]]:
-    """Key numbers as text, one row per number, one cell per file; omits numbers that no file has."""
+    """Key numbers as text, a row per number, a cell per file; omits numbers that no file has."""
     names = [n for n in found[0].numbers if not all(math.isnan(x.numbers[n]) for x in found)]
     rows = {name: [_number_text(x.numbers[name]) for x in found] for name in names}
     return rows | {"outcome of its run": [x.record.status for x in found]}

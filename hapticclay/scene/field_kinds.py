@@ -20,7 +20,7 @@ ENTIRE = None  # key of the value of a whole field, besides those of its entries
 
 
 def terms_field(kind: type) -> str:
-    """The field of a class that only needs a tuple of parts, such as a sum; "" for other classes."""
+    """The field of a class that only needs a tuple of parts, such as a sum; "" for others."""
     hints = {name: hint for name, (hint, _) in field_types(kind).items()}
     name, hint = next(iter(hints.items()), ("", None))
     row = get_origin(hint) is tuple and get_args(hint)[1:] == (...,) and part_classes(hint)
