@@ -285,7 +285,7 @@ def test_a_wall_is_saved_and_loaded(tmp_path, ending):
     ],
 )
 def test_a_family_is_named_by_symbol_and_unit(vary, values, names):
-    assert [name for name, _ in study._family_walls(BARE, vary, values)] == names
+    assert [name for name, _ in study._family_walls(as_wall(BARE), vary, values)] == names
 
 
 def test_tables_hold_what_the_figure_shows():
@@ -314,20 +314,18 @@ def test_the_passive_line_has_points_enough_to_be_drawn_smoothly():
 
 
 def test_studies_take_a_third_kind_of_wall(monkeypatch):
-    """One that is neither device nor arm: a wall whose K is given in N/mm."""
-
-    class Millimetres(DeviceWall):
-        plane = "soft", "B"
-
-        def at(self, K, B):
-            return type(self)(replace(self.subject, K=K, B=B))
-
-    class Soft(hc.VirtualWall):
+    class Third(hc.VirtualWall):
         pass
 
-    monkeypatch.setitem(KINDS, Soft, Millimetres)
-    own = Soft(device=BARE.device, B=1.0)
-    assert type(as_wall(own)) is Millimetres
-    assert stiffest([own], [1.0], 1.0, Press(), lambda share: None) == stiffest(
-        [replace(BARE, B=1.0)], [1.0], 1.0, Press(), lambda share: None
-    )
+    class ThirdWall(DeviceWall):
+        @property
+        def damping(self):
+            return 1.0
+
+    monkeypatch.setitem(KINDS, Third, ThirdWall)
+    assert type(as_wall(Third())) is ThirdWall and type(as_wall(BARE)) is DeviceWall
+    found = [
+        stiffest([wall], [1.0], 1.0, Press(), lambda share: None)
+        for wall in (Third(device=BARE.device), replace(BARE, B=1.0))
+    ]
+    assert found[0] == found[1]
