@@ -143,7 +143,7 @@ def _is_within(x: float, low: float, high: float, above: bool) -> bool:
     )
 
 
-def integer(field: str, value: object, low: int, high: int) -> int:
+def integer(field: str, value: object, low: float, high: float) -> int:
     """Returns value as an int within [low, high]."""
     if type(value) is int and low <= value <= high:
         return value
@@ -286,11 +286,6 @@ class Bound:
     above: bool = False
     names: tuple[str, ...] = ("x", "y")
 
-    def limits(self, owner: Any = None) -> dict[str, Any]:
-        """Arguments of `number`; owner: what has the field that low names."""
-        low = getattr(owner, self.low) if isinstance(self.low, str) else self.low
-        return {"low": low, "high": self.high, "above": self.above, "unit": self.unit}
-
     def number_words(self) -> str:
         """What a number within these bounds is."""
         low, high = self.low, self.high
@@ -301,7 +296,8 @@ class Bound:
 
     def integer_words(self) -> str:
         """What a whole number within these bounds is."""
-        return f"a whole number from {self.low} to {self.high}"
+        some = self.high < math.inf
+        return f"a whole number from {self.low} to {self.high}" if some else "a whole number"
 
 
 def _spelled(low: float | str) -> str:

@@ -88,7 +88,7 @@ class Node:
             return value.tolist()
         if isinstance(value, tuple | list):
             return [self.write(x, old, join_names(path, i), units) for i, x in enumerate(value)]
-        if callable(value) and (name := function_name(value)):
+        if self.hint is Any and callable(value) and (name := function_name(value)):
             return name
         raise ParameterError(path, value, "cannot be written to a file")
 
@@ -136,20 +136,28 @@ class Field(NamedTuple):
         return self.node.bound.unit
 
 
+def limits(bound: Bound, owner: Any) -> dict[str, Any]:
+    """Arguments of `number`; owner has the field that the bound names."""
+    low = getattr(owner, bound.low) if isinstance(bound.low, str) else bound.low
+    return {"low": low, "high": bound.high, "above": bound.above, "unit": bound.unit}
+
+
 class Number(Node):
     """A finite float."""
 
     takes_numbers = True
 
     def __init__(self, bound: Bound):
-        self.bound = bound
-        self.limits = None if isinstance(bound.low, str) else bound.limits()
+        self.bound, self.high = bound, bound.high
+        self.low = math.inf if isinstance(bound.low, str) else bound.low
 
     def wants(self) -> str:
         return self.bound.number_words()
 
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
-        return number(field, value, **(self.limits or self.bound.limits(owner)))
+        if type(value) is float and self.low < value < self.high:
+            return value
+        return number(field, value, **limits(self.bound, owner))
 
     def _read(self, value: Any, path: str, old: Any) -> Any:
         if isinstance(value, str):
@@ -165,8 +173,8 @@ class Whole(Number):
         return self.bound.integer_words()
 
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
-        limits = self.limits or self.bound.limits(owner)
-        return integer(field, value, limits["low"], limits["high"])
+        low = limits(self.bound, owner)["low"]
+        return integer(field, value, low, self.high)
 
     def _read(self, value: Any, path: str, old: Any) -> Any:
         x = super()._read(value, path, old)
@@ -249,14 +257,14 @@ class Numbers(Node):
         )
 
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
-        limits, names = self.bound.limits(owner), self.bound.names
+        bounds, names = limits(self.bound, owner), self.bound.names
         if self.rows:
-            return table_of(field, value, **limits)
+            return table_of(field, value, **bounds)
         if self.any_length:
             if not is_series(value) or not hasattr(value, "__len__"):
                 raise ParameterError(field, value, f"must be {self.wants()}")
             names = place_names(len(value))
-        return numbers_of(field, value, names, **limits)
+        return numbers_of(field, value, names, **bounds)
 
     def fits(self, value: Any, old: Any = UNSET) -> bool:
         return is_series(value)

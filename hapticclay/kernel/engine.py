@@ -117,7 +117,7 @@ def checked_model(model: mujoco.MjModel, caught: list[str]) -> mujoco.MjModel:
 
 
 def arm_at(q: tuple[float, float], arm: Arm = PAPER) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Kinematics and inertia of the arm by the engine, independent of the formulas of `model.arm`."""
+    """Kinematics and inertia of the arm by the engine, independent of `model.arm`."""
     with warnings_caught() as caught:
         model = checked_model(compose_spec(["arm.xml"], arm).compile(), caught)
     data = mujoco.MjData(model)

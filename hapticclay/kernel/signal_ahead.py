@@ -135,7 +135,7 @@ class Drive:
         self._pieces = made
 
     def breaks(self, begin: float, end: float) -> np.ndarray:
-        """Times in the part made ready at which a step must end: jumps, and kinks off the samples."""
+        """Times in the part made ready where a step must end: jumps, and kinks off the samples."""
         t = self.signal.breaks(begin, end)
         t = t[(t > begin) & (t < end)]
         if not len(t):
@@ -161,7 +161,7 @@ class Drive:
         return self.mean(t, 0.0)
 
     def around(self, t: np.ndarray, h: float) -> np.ndarray:
-        """Value at times, of pieces the mean over h before and after, or over less next to t = 0."""
+        """Value at times, of pieces the mean over h before and after, or less next to t = 0."""
         out = self.signal.mean_of_multisines(t, 0.0)
         if len(self._pieces):
             out = out + pieces.pieces_mean(self._pieces, t, np.minimum(h, t))

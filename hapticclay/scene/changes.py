@@ -64,7 +64,7 @@ def _check_hand(given: Any, old: Any, path: str) -> None:
 
 
 def nested(changes: Mapping[str, Any]) -> dict[Any, Any]:
-    """Converts values by dotted name to plain data; the key None holds the value of a whole field."""
+    """Converts values by dotted name to plain data; the key None holds a whole field's value."""
     out: dict[Any, Any] = {}
     for name, value in changes.items():
         try:

@@ -232,7 +232,7 @@ class Identified(Result):
 
 
 def response_tables(results: Sequence[Identified], paper: bool = True) -> dict[str, dict[str, Any]]:
-    """Returns the numbers of the figure of one block: the response on each axis, and its equations."""
+    """Returns the numbers of one block's figure: the response on each axis, and its equations."""
     unit = {"G": "m/m", "S": "m/N", "Th": "N/m"}[results[0].what]
     out: dict[str, dict[str, Any]] = {}
     for r in results:
@@ -422,7 +422,7 @@ def _signals(
 
 
 def format_coefficient(c: Coefficient) -> str:
-    """Fitted value and half its interval, rounded to two digits of the latter: "41.793 +- 0.012"."""
+    """Fitted value and half its interval, to two digits of the latter: "41.793 +- 0.012"."""
     half = 0.5 * (c.high - c.low)
     digits = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 6
     return f"{c.value:.{digits}f} \u00b1 {half:.{digits}f}"

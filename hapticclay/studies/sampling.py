@@ -302,7 +302,7 @@ def _split_words(field: str, text: str, how: str) -> dict[str, str]:
 
 
 def load_sweep(path: Path) -> dict[str, Any]:
-    """Reads a sweep from TOML: experiment or scenario, design, runs, seed, chunk; [vary], [fixed]."""
+    """Reads a sweep from TOML: experiment or scenario, design, runs, seed, chunk, vary, fixed."""
     try:
         data = parse_toml(read_text(path, MOST_SETTINGS))
     except (OSError, ValueError) as error:
