@@ -98,16 +98,22 @@ def _plant(tree: dict[Any, Any], names: Sequence[Any], value: Any) -> None:
         tree[name] = value
 
 
-def named_values(field: str, words: Iterable[str]) -> dict[str, Any]:
-    """Reads the words "arm.l1=0.3", "gain=1,0.5", "inertia_shaping=true", "dt=0.1ms"."""
-    out: dict[str, Any] = {}
+def split_words(field: str, words: Iterable[str], how: str) -> dict[str, str]:
+    """Splits words name=value; `how` describes them in the error."""
+    out: dict[str, str] = {}
     for word in words:
         name, equals, value = word.partition("=")
         name = name.strip()
         if not equals or not name or name in out:
-            raise ParameterError(field, word, "must be name=value, each name once")
-        out[name] = _value_of(value.strip())
+            raise ParameterError(field, word, how)
+        out[name] = value.strip()
     return out
+
+
+def named_values(field: str, words: Iterable[str]) -> dict[str, Any]:
+    """Reads the words "arm.l1=0.3", "gain=1,0.5", "inertia_shaping=true", "dt=0.1ms"."""
+    texts = split_words(field, words, "must be name=value, each name once")
+    return {name: _value_of(text) for name, text in texts.items()}
 
 
 def _value_of(text: str) -> Any:
