@@ -20,13 +20,11 @@ from ..arguments import checked, named
 from ..display import brief
 from ..errors import ParameterError, choice, integer
 from ..results import Result
-from ..scene.virtual_wall import VirtualWall
-from ..theory import wall_limits
-from . import boundary, store, store_runs
-from .boundary import PushedLoop
+from . import store, store_runs
 from .probability import LEVEL, Probability, clopper_pearson
 from .trials import Trials
 from .verdicts import NOT_RUN
+from .wall import as_wall
 
 PROBED = 200  # runs used to estimate the cost
 CURVE_POINTS = 61  # of a boundary
@@ -185,7 +183,8 @@ class Instability(Result):
         log = grid.min() > 0.0 and grid.max() > 30.0 * grid.min()
         x = (np.geomspace if log else np.linspace)(grid.min(), grid.max(), CURVE_POINTS)
         middle = {k: v for k, v in self.trials.middle().items() if k != "K"}
-        return x, np.array([_exact_limit(self.trials.loop({**middle, other[0]: v})) for v in x])
+        subjects = (self.trials.loop({**middle, other[0]: v}) for v in x)
+        return x, np.array([as_wall(subject).trial_limit() for subject in subjects])
 
     def tables(self) -> dict[str, dict[str, Sequence]]:
         """The numbers of the figure, by table name: columns by name."""
@@ -211,14 +210,6 @@ class Instability(Result):
             }  # fmt: skip
             out["cells"] = cells
         return out
-
-
-def _exact_limit(loop: PushedLoop | VirtualWall) -> float:
-    """Largest stable K of the linear loop."""
-    if isinstance(loop, VirtualWall):
-        return wall_limits.stiffness_band(loop)[1]
-    placed = loop.pose != (0.0, 0.0) and not loop.inertia_shaping
-    return boundary.pose_limit(loop) if placed else boundary.nominal_limit(loop)
 
 
 # ---- making the runs -----------------------------------------------------------------------------

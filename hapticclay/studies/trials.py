@@ -16,19 +16,15 @@ from ..arguments import checked
 from ..errors import ParameterError, integer, number
 from ..scene.changes import nested, with_fields
 from ..scene.scenario import Scenario
-from ..scene.virtual_wall import VirtualWall
-from . import wall_runs
-from .boundary import PushedLoop
 from .distribution import Distribution
 from .population import HAND, Hands, hands_of, open_uniform
 from .sampling import MOST_RUNS, Range
 from .store import Plan
 from .sweep_rows import RESULT_COLUMNS, Notes
 from .verdicts import Case, judge
+from .wall import Subject, as_wall
 
 SCHEMA = "hapticclay-trials-2"
-TRIAL_PUSH = 1e-6  # [m/s] so small that the arm stays linear to 1e-6
-SAMPLE_PUSH = 1e-7  # [m] per sample, for a wall: far above rounding and far below the arm's length
 
 
 @checked
@@ -62,7 +58,7 @@ class Trials(Plan):
         "longer": ("", "whether a longer run was made to decide"),
     }
 
-    base: PushedLoop | VirtualWall
+    base: Subject
     vary: dict[str, Distribution] = field(default_factory=dict)
     hands: str | Hands | None = None
     grid: dict[str, Range] = field(default_factory=dict)
@@ -139,7 +135,7 @@ class Trials(Plan):
             | {name: law.median for name, law in self.vary.items()}
         )
 
-    def loop(self, values: Mapping[str, float]) -> PushedLoop | VirtualWall:
+    def loop(self, values: Mapping[str, float]) -> Subject:
         """The base with some of its parameters changed.
 
         Args:
@@ -171,22 +167,11 @@ class Trials(Plan):
             ParameterError: as there.
         """
         own, others = self._split(values)
-        if isinstance(self.base, PushedLoop):
-            own["push"] = self.push or TRIAL_PUSH
-        base = with_fields(self.base, own)
-        if isinstance(base, PushedLoop):
-            scenario = base.scenario(t_max, stop_when_unstable=False)
-        else:
-            push = self.push or min(SAMPLE_PUSH / base.Ts, 1.0)
-            scenario = base.scenario(t_max, push=push, steps=wall_runs.growth_steps(base))
+        wall = as_wall(with_fields(self.base, own))
+        scenario = wall.trial(t_max, self.push)
         made = with_fields(scenario, others) if others else scenario
-        if isinstance(base, VirtualWall):
-            hardware = made.hardware
-            rough = hardware and (hardware.encoder or any(hardware.friction))
-            if base.unilateral or rough:
-                bound = "must be a wall without surface, friction and encoder; see hc.walls.zwidth"
-                raise ParameterError("base", base, bound)
-        return Case(base, made, self.axis)
+        wall.check_trial(made)
+        return Case(wall, made)
 
     def _split(self, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
         """Parameters of the base, and of the scenario."""
@@ -197,7 +182,7 @@ class Trials(Plan):
     @property
     def axis(self) -> str:
         """Axis of the motion."""
-        return self.base.axis if isinstance(self.base, PushedLoop) else "x"
+        return as_wall(self.base).axis
 
     def described(self) -> dict[str, Any]:
         """The trials as plain data."""

@@ -75,6 +75,13 @@ class Box:
         return [Operator(*row) for row in (low + x * (high - low)).tolist()]
 
 
+def lattice(box: Box) -> list[Operator]:
+    """The hands at ends and middles of a box, up to 27."""
+    sides = box.mass, box.damper, box.spring
+    places = (sorted({low, 0.5 * (low + high), high}) for low, high in sides)
+    return [Operator(*hand) for hand in itertools.product(*places)]
+
+
 @named
 @dataclass(frozen=True)
 class WorstCase:
