@@ -96,13 +96,19 @@ def _plant(tree: dict[Any, Any], names: Sequence[Any], value: Any) -> None:
         tree[name] = value
 
 
-def named_values(field: str, words: Iterable[str]) -> dict[str, Any]:
-    """Reads the words "arm.l1=0.3", "gain=1,0.5", "inertia_shaping=true", "dt=0.1ms"."""
-    out: dict[str, Any] = {}
+def split_words(field: str, words: Iterable[str], how: str) -> dict[str, str]:
+    """Splits words name=value; `how` describes them in the error."""
+    out: dict[str, str] = {}
     for word in words:
         name, equals, value = word.partition("=")
         name = name.strip()
         if not equals or not name or name in out:
-            raise ParameterError(field, word, "must be name=value, each name once")
-        out[name] = value_of_text(value.strip())
+            raise ParameterError(field, word, how)
+        out[name] = value.strip()
     return out
+
+
+def named_values(field: str, words: Iterable[str]) -> dict[str, Any]:
+    """Reads the words "arm.l1=0.3", "gain=1,0.5", "inertia_shaping=true", "dt=0.1ms"."""
+    texts = split_words(field, words, "must be name=value, each name once")
+    return {name: value_of_text(text) for name, text in texts.items()}
