@@ -18,13 +18,14 @@ from typing import (
     ParamSpec,
     TypeVar,
     Union,
+    dataclass_transform,
     get_args,
     get_origin,
     get_type_hints,
 )
 
 from .errors import Bound, ParameterError, nearest
-from .fields import CLASS_WORDS, Node, class_of, field_descriptions, node_of
+from .fields import CLASS_WORDS, Node, check_fields, class_of, field_descriptions, node_of
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -64,6 +65,27 @@ def named(made: F) -> F:
         made.__signature__ = SignatureInWords()  # type: ignore[attr-defined]
         return made  # type: ignore[return-value]
     return guarded  # type: ignore[return-value]
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))
+def part(prefix: str = "", **options: Any) -> Callable[[type[T]], type[T]]:
+    """Makes a frozen dataclass, `named`, whose fields are checked by their annotations.
+
+    Its own `__post_init__` follows the check. prefix stands before the fields in errors.
+    """
+
+    def decorate(kind: type[T]) -> type[T]:
+        own = vars(kind).get("__post_init__")
+
+        def __post_init__(self: Any) -> None:
+            check_fields(self, prefix)
+            if own is not None:
+                own(self)
+
+        kind.__post_init__ = __post_init__  # type: ignore[attr-defined]
+        return named(dataclasses.dataclass(frozen=True, **options)(kind))
+
+    return decorate
 
 
 class SignatureInWords:

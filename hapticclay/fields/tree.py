@@ -343,7 +343,7 @@ def _family(kind: type) -> Iterator[type]:
         yield from _family(sub)
 
 
-def _as_tuple(value: Sequence[Any], items: Iterable[Any]) -> tuple[Any, ...]:
+def _as_tuple(value: Any, items: Iterable[Any]) -> tuple[Any, ...]:
     """The items of a sequence as a tuple; the sequence itself if it is that tuple."""
     made = tuple(items)
     same = isinstance(value, tuple) and all(map(operator.is_, made, value))
