@@ -44,7 +44,7 @@ def recorded_arrays(record: Recorded) -> dict[str, np.ndarray]:
 
 
 def parts_of(name: str) -> tuple[str, ...]:
-    """Names of the columns of an array: axes or joints; empty for an array of one number a sample."""
+    """Names of the columns of an array, axes or joints; empty for one number a sample."""
     return () if name in SCALAR else JOINTS if name in OF_JOINTS else AXES
 
 
