@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import choice
 from ..simulation.engines import ENGINES
 from .draws import fixed_by
-from .episodes import Episode
+from .episodes import Episodes, One
 from .inputs import action_of, options_of, seed_of, task_of
 from .quantities import box_of
 from .task import DT, Task
@@ -51,7 +51,7 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             choice("render_mode", render_mode, MODES)
         self.render_mode = render_mode
         self.task = task_of(self.task_type, ranges, options, self)
-        self._episode = Episode(self.task, choice("engine", engine, ENGINES))
+        self._episodes = Episodes(self.task, One, choice("engine", engine, ENGINES))
         self.action_space = box_of(self.task.actions)
         self.observation_space = box_of(self.task.observations)
         self._shape = (len(self.task.actions),)
@@ -75,12 +75,12 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         fixed = fixed_by(self.task.ranges, options_of(options))
         super().reset(seed=seed_of("seed", seed))
         self._live = False
-        self._episode.reset(self.np_random, fixed)
+        self._episodes.reset([0], [self.np_random], [fixed])
         self._live = True
         if self.render_mode is not None:
             self._shown_by().begin()
             self._show()
-        return self._episode.observe(), dict(self._episode.truth)
+        return self._episodes.observe(), dict(self._episodes.truth)
 
     def step(
         self, action: NDArray[np.float32]
@@ -97,10 +97,10 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if not self._live:
             raise RuntimeError("reset the environment before its first step")
         numbers = action_of("action", action, self._shape)
-        observation, reward, ended, info = self._episode.step(numbers.tolist())
+        observation, reward, ended, info = self._episodes.step(numbers.tolist())
         if self.render_mode is not None:
             self._show()
-        return observation, reward, ended, False, self._episode.truth | info
+        return observation, reward, ended, False, self._episodes.truth | info
 
     def render(self) -> Any:
         """A picture of the scene from above, shape (h, w, 3), in mode "rgb_array"."""
@@ -116,7 +116,7 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return self.__dict__ | {"_picture": None}
 
     def _drawn(self) -> Any:
-        now = self._episode
+        now = self._episodes
         return self._shown_by().drawn(now.truth, now.memory, now.handle)
 
     def _shown_by(self) -> Picture:
@@ -135,7 +135,7 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _show(self) -> None:
         picture = self._shown_by()
-        picture.note(self._episode.handle.p)
+        picture.note(self._episodes.handle.p)
         if self.render_mode == "human" and not picture.unseen:
             self._drawn()
 
@@ -144,7 +144,7 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._picture is not None:
             self._picture.close()
             self._picture = None
-        self._episode.close()
+        self._episodes.close()
         self._live = False
 
 

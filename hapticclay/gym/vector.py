@@ -15,7 +15,7 @@ from ..errors import ParameterError, choice, integer
 from ..simulation.engines import ENGINES
 from .draws import Truth, fixed_by
 from .environment import FPS, MODES
-from .episodes import Episodes
+from .episodes import Episodes, Many, Period
 from .inputs import action_of, options_of, seeds_of, task_of
 from .quantities import box_of
 from .task import Memory, Task
@@ -67,7 +67,7 @@ class TaskVectorEnv(VectorEnv):
         self.single_observation_space = box_of(self.task.observations)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self._episodes = Episodes(self.task, self.num_envs, choice("engine", engine, ENGINES))
+        self._episodes = Episodes(self.task, Many, choice("engine", engine, ENGINES))
         self._generators: list[np.random.Generator] = []
         self._seeds: list[int] = []
         self._count = np.zeros(self.num_envs, np.int64)
@@ -178,44 +178,31 @@ class TaskVectorEnv(VectorEnv):
             raise RuntimeError("reset the environments before their first step")
         if self.autoreset_mode is AutoresetMode.DISABLED and not live.all():
             raise RuntimeError("an episode is over: reset its copy before the next step")
-        found = self._episodes.step(numbers, live)
+        found = self._episodes.step(numbers.T, live)
         self._count += live
         ended = found.ended & live
         cut_off = (self._count >= self._most) & live
-        rewards = np.where(live, found.reward, 0.0)
-        if not live.all():  # with NEXT_STEP: the episode ended before this step
-            self._begin(~live)
         self._over = ended | cut_off
-        infos = self._infos(found.info, live)
-        observations = found.observation if live.all() else self._episodes.observe()
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
-            observations = self._next_episodes(found.observation, infos)
-        return observations, rewards, ended, cut_off, infos
-
-    def _infos(self, info: Memory, live: np.ndarray) -> dict[str, Any]:
+        again, final = ~live, {}  # with NEXT_STEP: the episode ended before this step
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            again = self._over.copy()
+            final = self._final(found, again) if again.any() else {}
+        observations = found.observation
+        if again.any():
+            self._begin(again)
+            observations = self._episodes.observe()
         everywhere = np.ones(self.num_envs, bool)
-        return _masked(self._episodes.truth, everywhere) | _masked(info, live)
+        infos = _masked(self._episodes.truth, everywhere) | _masked(found.info, live & ~again)
+        return observations, np.where(live, found.reward, 0.0), ended, cut_off, infos | final
 
-    def _next_episodes(self, last: np.ndarray, infos: dict[str, Any]) -> np.ndarray:
-        """Starts the next episode where one is over; its final values go into infos."""
-        over = self._over.copy()
-        final = np.full(self.num_envs, None, object)
+    def _final(self, found: Period, over: np.ndarray) -> dict[str, Any]:
+        """Observations and infos of the episodes that are over, as Gymnasium hands them out."""
+        last = np.full(self.num_envs, None, object)
         for i in np.flatnonzero(over).tolist():
-            final[i] = last[i].copy()
-        final_info = {
-            name: np.where(over, x, np.zeros_like(x))
-            for name, x in infos.items()
-            if not name.startswith("_")
-        }
-        final_info |= {f"_{name}": over.copy() for name in list(final_info)}
-        infos |= {"final_obs": final, "_final_obs": over, "final_info": final_info}
-        infos["_final_info"] = over.copy()
-        for name in [x for x in infos if not x.startswith("_") and x not in self.task.ranges]:
-            if not name.startswith("final"):
-                infos[f"_{name}"] = infos[f"_{name}"] & ~over
-        self._begin(over)
-        infos |= {name: x.copy() for name, x in self._episodes.truth.items()}
-        return self._episodes.observe()
+            last[i] = found.observation[i].copy()
+        info = _masked(self._episodes.truth | found.info, over)
+        final = {"final_obs": last, "final_info": info}
+        return final | {f"_{name}": over.copy() for name in final}
 
     def render(self) -> tuple[Any, ...] | None:
         """A picture of each copy from above, in mode "rgb_array"."""
