@@ -14,8 +14,8 @@ import numpy as np
 
 from ..arguments import checked
 from ..errors import integer
+from ..fields import plain_data
 from ..model.constants import AXES
-from ..scene.plain_data import plain_data
 from ..scene.scenario import Scenario
 from ..simulation.column_batch import Columns, simulate_columns
 from .store import Plan

@@ -10,7 +10,8 @@ from typing import Literal, get_args
 import numpy as np
 
 from ..arguments import named
-from ..errors import ParameterError, check_fields, choice, number_in
+from ..errors import ParameterError, choice, number_in
+from ..fields import check_fields
 from ..scene.changes import split_words
 
 LawName = Literal["normal", "log-normal", "uniform", "log-uniform"]

@@ -15,10 +15,10 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..errors import ParameterError, choice, integer
+from ..fields import join_names
 from ..files import MOST_SETTINGS, parse_toml, read_text
 from ..scene.earlier_names import with_present_names
 from ..scene.experiments import EXPERIMENTS, parameter_unit
-from ..scene.field_kinds import join_names
 from ..scene.files import read_settings
 from ..scene.scenario import Scenario
 from ..simulation.simulate import simulate

@@ -11,7 +11,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import Bound, check_fields
+from ..errors import Bound
+from ..fields import check_fields
 from ..model.spring import STIFFNESS_MAX
 from ..scene.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch
