@@ -9,7 +9,7 @@ import numpy as np
 
 from ..simulation.simulation_batch import SimulationBatch
 from ..simulation.stepwise import COLUMNS, Simulation
-from .columns import Value, bounded, columns_of, replaced, shown, value_of
+from .columns import Value, clipped, columns_of, observed, replaced, value_of
 from .draws import Truth, draw
 from .task import Command, Handle, Memory, Task
 
@@ -52,15 +52,15 @@ class One:
             self.gain = command.gain
         self.run.advance(n, force=command.force)
 
-    def measured(self, n: int, held: int) -> tuple[Any, Any, Any]:
-        """The sample, the torques reached in n steps, and whether the run has ended."""
+    def measured(self, n: int, k: int) -> tuple[Any, Any, Any]:
+        """The sample, torques reached in k of n samples, and whether the run has ended."""
         run = self.run
-        return run.numbers(), run.torque_reached(n, held), run.outcome is not None
+        return run.numbers(), run.torque_reached(n, k), run.outcome is not None
 
     def observation(self, values: Iterable[Value], ends: Ends) -> np.ndarray:
         """Values, clipped to their ends, as float32."""
         found = [
-            x if low <= x <= high else shown(x, low, high)  # most need no call
+            x if low <= x <= high else observed(x, low, high)  # most need no call
             for x, (low, high) in zip(values, ends, strict=True)
         ]
         return np.array(found, np.float32)
@@ -88,23 +88,21 @@ class Many:
                 self.run.set(live, gain=np.stack(command.gain, axis=1)[live])
             self.run.advance(n, force=np.stack(command.force, axis=1), mask=live)
 
-    def measured(self, n: int, held: int) -> tuple[Any, Any, Any]:
+    def measured(self, n: int, k: int) -> tuple[Any, Any, Any]:
         """As `One.measured`."""
         run = self.run
-        return run.numbers().T, run.torque_reached(n, held).T, run.ended
+        return run.numbers().T, run.torque_reached(n, k).T, run.ended
 
     def observation(self, values: Iterable[Value], ends: Ends) -> np.ndarray:
         """As `One.observation`."""
         low, high = np.array(ends).T
-        return shown(np.stack(tuple(values), axis=1), low, high).astype(np.float32)
+        return observed(np.stack(tuple(values), axis=1), low, high).astype(np.float32)
 
     @staticmethod
     def merged(kept: Memory, which: Sequence[int], rows: Sequence[Memory]) -> Memory:
         """As `One.merged`."""
-        columns = {name: [x[name] for x in rows] for name in rows[0]}
-        if not kept:
-            return {name: columns_of(x) for name, x in columns.items()}
-        return {name: replaced(kept[name], which, x) for name, x in columns.items()}
+        new = {name: columns_of([x[name] for x in rows]) for name in rows[0]}
+        return {name: replaced(kept[name], which, x) for name, x in new.items()} if kept else new
 
 
 class Episodes:
@@ -154,8 +152,8 @@ class Episodes:
         self.handle = self._handle(self._runs)
 
     def _handle(self, runs: One | Many) -> Handle:
-        x, held, over = runs.measured(self.task.steps, self.task.held)
-        return self.task.handle([(x[i], x[i + 1]) for i in PLACES], held, over)
+        x, torques, over = runs.measured(self.task.steps, self.task.strained_samples)
+        return self.task.handle([(x[i], x[i + 1]) for i in PLACES], torques, over)
 
     def observe(self) -> np.ndarray:
         """Present observations, clipped to their bounds, float32."""
@@ -166,15 +164,15 @@ class Episodes:
         """Advances the live copies by one control period."""
         runs, task = self._runs, self.task
         assert runs is not None
-        clipped = tuple([bounded(x, -1.0, 1.0) for x in action])
-        runs.advance(task.steps, task.command(self.memory, clipped), live)
+        inside = tuple([clipped(x, -1.0, 1.0) for x in action])
+        runs.advance(task.steps, task.command(self.memory, inside), live)
         self.handle = self._handle(runs)
-        reward, ended, info = task.judge(self.memory, self.handle, clipped)
+        reward, ended, info = task.judge(self.memory, self.handle, inside)
         return Period(self.observe(), reward, ended, info)
 
     def copy(self, i: int) -> tuple[Truth, Memory, Handle]:
         """Numbers drawn, memory and handle of one of many copies."""
-        memory = {name: value_of(x, i) for name, x in self.memory.items() if name != "at"}
+        memory = {name: value_of(x, i) for name, x in self.memory.items()}
         return self.truth_of(i), memory, Handle(*value_of(tuple(self.handle), i))
 
     def truth_of(self, i: int) -> Truth:
