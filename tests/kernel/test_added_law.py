@@ -9,11 +9,8 @@ from tests.oracles import hardening_law
 STEPPED = Path(hardening_law.__file__).read_text()
 NUMBERS = "(DAMPING, WAY) if scenario.clay else None"
 OWN = "(scenario.clay.hardening, WAY) if scenario.clay and scenario.clay.hardening else None"
-FIELD = """    hardening: Annotated[float, Bound(0.0, 1e4, "N.s/m")] = 0.0
-
-    def __post_init__(self):
-        check_fields(self, "clay.")
-"""
+GROOVE = "    groove: Groove | None = None\n"
+FIELD = f'{GROOVE}    hardening: Annotated[float, Bound(0.0, 1e4, "N.s/m")] = 0.0\n'
 MODEL = '''"""Clay that hardens with the way that the handle has gone."""
 
 from .traits import LEFT_OUT, Law, Refusal, told_pair, told_values
@@ -32,7 +29,7 @@ EDITS = {  # a damper that hardens: by file, what stands, and what then; two fil
     "model/NAME.py": MODEL,
     "kernel/NAME.py": STEPPED.replace(NUMBERS, OWN),
     "model/clay.py": [
-        ('    def __post_init__(self):\n        check_fields(self, "clay.")\n', FIELD),
+        (GROOVE, FIELD),
         ("from . import flow, groove, spring\n", "from . import NAME, flow, groove, spring\n"),
         ("*flow.TRAITS, *TRAITS,", "*flow.TRAITS, *NAME.TRAITS, *TRAITS,"),
     ],
