@@ -51,7 +51,7 @@ TOGETHER = {  # files that share a dear fixture, or the processor's time for a s
     "system/test_window.py": "screen",
 }
 # folders with long files have the first turns, lest one be the last
-LONG = ("system", "views", "kernel", "studies")
+LONG = ("system", "views", "live", "kernel", "studies")
 
 
 def folder_turn(item):

@@ -13,11 +13,11 @@ from ..errors import ParameterError
 from . import console
 
 if TYPE_CHECKING:
+    from ..live.session import Session
     from ..ports.exchanges import Exchanges
     from ..ports.report import LoopReport
     from ..scene.scenario import Scenario
     from ..studies.removal import Tool
-    from ..views.session import Session
 
 
 @dataclass(frozen=True)
@@ -63,18 +63,18 @@ class DeviceOptions:
         """The session, beside its device if there is one."""
         if self.device:
             with self._hand(scenario) as hand:
-                from ..views.device_sessions import DeviceSession
+                from ..live.device_sessions import DeviceSession
 
                 yield DeviceSession(scenario, hand, tool, every)
         elif self.device_server:
-            from ..views.device_sessions import ServedSession
+            from ..live.device_sessions import ServedSession
 
             force = {} if self.device_force is None else {"largest_force": self.device_force}
             session = ServedSession(scenario, stiffness, tool, every, **force)
             with self._server(session):
                 yield session
         else:
-            from ..views.session import Session
+            from ..live.session import Session
 
             yield Session(scenario, stiffness, tool, every)
 
@@ -100,10 +100,10 @@ class DeviceOptions:
 
     @contextlib.contextmanager
     def _server(self, session: Any) -> Iterator[None]:
+        from ..live.device_sessions import LiveDevice
         from ..ports.server import DeviceServer
         from ..ports.service import Service
         from ..ports.sessions import Inverse3
-        from ..views.device_sessions import LiveDevice
 
         logging.basicConfig(format="hapticclay: %(message)s", level=logging.WARNING)
         shown = Inverse3(plane=self.device_plane)

@@ -19,10 +19,10 @@ from .run import deliver
 from .unused import FIGURE_WORDS, Unused, undrawn
 
 if TYPE_CHECKING:
+    from ..live.replay import Replay
+    from ..live.session import Session
     from ..simulation.record import Record
     from ..studies.removal import Tool
-    from ..views.replay import Replay
-    from ..views.session import Session
 
 
 def tool_size(name: str) -> Callable[[], float]:
@@ -142,7 +142,7 @@ def streaming(play: Session | Replay, address: str | None) -> Iterator[None]:
     if address is None:
         yield
         return
-    from ..views.stream import UdpStream
+    from ..live.stream import UdpStream
 
     play.stream = UdpStream(address)
     try:
@@ -155,7 +155,7 @@ def replay(record: Record, tool: Tool, stream: str | None = None) -> None:
     """Shows a record in a window, in real time, until it is closed."""
     if not len(record.t):
         raise ParameterError("record", record.scenario.name, "holds no samples")
-    from ..views.replay import Replay
+    from ..live.replay import Replay
     from ..views.window import Window
 
     play = Replay(record, tool)

@@ -117,7 +117,7 @@ def checked_model(model: mujoco.MjModel, caught: list[str]) -> mujoco.MjModel:
 
 
 def arm_at(q: tuple[float, float], arm: Arm = PAPER) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Place of the handle, Jacobian and inertia, by the engine and not by `model.arm`."""
+    """Kinematics and inertia of the arm by the engine, independent of `model.arm`."""
     with warnings_caught() as caught:
         model = checked_model(compose_spec(["arm.xml"], arm).compile(), caught)
     data = mujoco.MjData(model)
@@ -133,8 +133,8 @@ def arm_at(q: tuple[float, float], arm: Arm = PAPER) -> tuple[np.ndarray, np.nda
 def timestep_view(model: mujoco.MjModel) -> np.ndarray:
     """A view of model.opt.timestep, shape (1,).
 
-    The engine shows its gravity as an array, which lies in the same record of options, after the
-    timestep. Two values written to the timestep find where it lies.
+    The engine shows its gravity as an array, which stands in the same record of options, behind the
+    timestep; where, is found by two values that are written there.
     """
     start = model.opt.gravity.ctypes.data - 8 * OPTIONS
     memory: Any = (ctypes.c_double * OPTIONS).from_address(start)

@@ -128,7 +128,7 @@ def steady(r: Record, axis: str, k: int, name: str) -> float:
 
 
 def rightmost(axis: str, K: float, b: float, th: Operator | None) -> complex:
-    """Rightmost pole of the loop at the nominal pose [1/s]; of a pair, the one above the real axis."""
+    """Rightmost pole of the loop at the nominal pose [1/s]; of a pair, the upper one."""
     poles = loops.closed_loop_poles(axis, K, b, th)
     return complex(max((p for p in poles if p.imag >= 0.0), key=lambda p: p.real))
 

@@ -98,7 +98,7 @@ class Service:
             return [] if session is None else self.protocol.due(self, session)
 
     def apply(self, session: Session, command: Command) -> None:
-        """Applies a client's command; with the clock "tick", that of the first advances the device."""
+        """Applies a client's command; with the clock "tick", the first client's advances it."""
         device = self.device
         session.command, session.heard = command, time.monotonic()
         force = command.force or NOTHING

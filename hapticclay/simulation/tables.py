@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import needing
+from ..fields import plain_data
 from ..model.constants import AXES
 from ..model.hardware import JOINTS
-from ..scene.plain_data import plain_data
 from .columns import ARRAYS, EXTRA, SCALAR, Recorded
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def recorded_arrays(record: Recorded) -> dict[str, np.ndarray]:
 
 
 def parts_of(name: str) -> tuple[str, ...]:
-    """Names of the columns of an array, axes or joints; empty for one number a sample."""
+    """Names of an array's columns: axes or joints; empty for one number a sample."""
     return () if name in SCALAR else JOINTS if name in OF_JOINTS else AXES
 
 

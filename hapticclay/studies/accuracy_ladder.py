@@ -97,7 +97,7 @@ class Ladder:
         return error if error and error >= CLEAR * (left or 0.0) else None
 
     def cheapest(self, unit: str) -> dict[float, Setting]:
-        """The fastest setting by requested error; sampled control replaces no continuous setting."""
+        """The fastest setting by requested error; sampled control replaces no continuous one."""
         out = {}
         for asked in ASKED:
             # bound for an error that does not clearly exceed that of the reference

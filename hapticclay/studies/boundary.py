@@ -150,7 +150,7 @@ class PushedLoop(Loop):
 
 
 def of_scenario(subject: Subject | Scenario, axis: str) -> Subject | PushedLoop:
-    """Converts a scenario to the loop of an axis that a study runs; other subjects are unchanged."""
+    """Converts a scenario to the loop of an axis that a study runs; other subjects stay."""
     return PushedLoop.of(subject, axis) if isinstance(subject, Scenario) else subject
 
 
@@ -224,7 +224,7 @@ def crossing_search(guess: float, most: float) -> Generator[float, float, float]
 
 
 def simulated_gain(loop: PushedLoop, guess: float | None = None, most: float = 200.0) -> float:
-    """Gain K above which the oscillation grows in the steps of a run; the loop's own K is ignored."""
+    """Gain K above which the oscillation grows in a run's steps; the loop's own K is ignored."""
     guess = nominal_limit(loop) if guess is None else guess
     guess = min(guess, most) if guess > 0.0 else 1.0
     return _simulated(loop, "K", guess, most)

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import checked, named
+from ..arguments import checked, function_of, named
 from ..errors import ParameterError, choice, flag, integer, number, numbers_of, pair
 from ..files import versions
 from ..formulas import arm as arm_law
@@ -25,7 +25,6 @@ from ..model.constants import AXES, L1, L2, TS, G, S
 from ..model.operator import Operator
 from ..model.signals import Multisine
 from ..results import Result
-from ..scene.fields import function_of
 from ..scene.scenario import Control, Scenario
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
@@ -233,7 +232,7 @@ class Identified(Result):
 
 
 def response_tables(results: Sequence[Identified], paper: bool = True) -> dict[str, dict[str, Any]]:
-    """Returns the numbers of the figure of one block: the response on each axis, and its equations."""
+    """Returns the numbers of one block's figure: the response on each axis, and its equations."""
     unit = {"G": "m/m", "S": "m/N", "Th": "N/m"}[results[0].what]
     out: dict[str, dict[str, Any]] = {}
     for r in results:
@@ -423,7 +422,7 @@ def _signals(
 
 
 def format_coefficient(c: Coefficient) -> str:
-    """Fitted value and half its interval, rounded to two digits of the latter: "41.793 +- 0.012"."""
+    """Fitted value and half its interval, to two digits of the latter: "41.793 +- 0.012"."""
     half = 0.5 * (c.high - c.low)
     digits = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 6
     return f"{c.value:.{digits}f} \u00b1 {half:.{digits}f}"

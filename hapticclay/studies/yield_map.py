@@ -153,7 +153,7 @@ def measured_cycle(record: Record, axis: str) -> MeasuredCycle | None:
 
 
 def classify_push(loop: PushedLoop, flow: Flow) -> tuple[PushClass, float]:
-    """Outcome of a push in a run, and the largest velocity of its limit cycle [m/s], NaN for none."""
+    """Outcome of a push in a run, and its limit cycle's largest velocity [m/s], NaN for none."""
     cycle = None
     for t_max in RUN_SPANS:
         record = simulate(yielding_run(loop, flow, t_max))

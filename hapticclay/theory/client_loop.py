@@ -80,7 +80,7 @@ class Handle:
 
 
 def client_map(handle: Handle, K: float, B: float, Ts: float, delay: float) -> np.ndarray:
-    """State matrix of the sampled loop, x(k+1) = A x(k): position, velocity, then delayed forces."""
+    """State matrix of the sampled loop, x(k+1) = A x(k): position, velocity, delayed forces."""
     whole, part = linear_loop.whole_samples(delay, Ts)
     if whole > LONGEST_QUEUE:
         raise ParameterError("delay", delay, f"must be {LONGEST_QUEUE} samples at most")
@@ -135,7 +135,7 @@ def rendered_stiffness_limit(handle: Handle, B: float, Ts: float, delay: float =
 def rendered_stiffness_limits(
     handle: Handle, B: Sequence[float], Ts: float, delay: float = 0.0
 ) -> tuple[float, ...]:
-    """Largest stable stiffness for several dampings of the wall: the Z-width of a program's loop."""
+    """Largest stable stiffness by damping of the wall: the Z-width of a program's loop."""
     dampings = [number("B", b, -1e6, 1e6) for b in B]
     Ts, delay = number("Ts", Ts, 1e-6, 1.0), number("delay", delay, 0.0, 10.0)
     free = client_map(handle, 0.0, 0.0, Ts, delay)  # the loop is linear in K and B

@@ -147,7 +147,7 @@ def _encoded(figure: matplotlib.figure.Figure, kind: str, dpi: float) -> bytes:
 
 
 def curves_drawn(figure: matplotlib.figure.Figure) -> dict[str, Table]:
-    """Returns the curves of a figure, one table per panel: columns curve, and x and y as labelled."""
+    """One table per panel: curve, and x and y under the labels of their axes."""
     out: dict[str, Table] = {}
     axes: Any = figure.axes
     for ax in axes:

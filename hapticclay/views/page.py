@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError
+from ..live.frame import Frame
+from ..live.player import Player
+from ..live.session import Session
+from ..live.verdict import clay_here
 from ..model.constants import AXES
 from ..ports.guard import LOCAL, REFUSED, Guard, listening, url_host
-from .frame import Frame
-from .live_verdict import clay_here
-from .player import Player
-from .session import Session
 from .stage import (
     ARROW_WIDTH,
     GROUND,

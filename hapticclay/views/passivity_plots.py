@@ -120,7 +120,7 @@ def port_energy_plot(found: EnergyOverTime) -> Figure:
 
 
 def region_plot(found: PassiveRegion) -> Figure:
-    """Plots the largest passive stiffness over the control sample, one line per delay, with runs."""
+    """Plots the largest passive stiffness over the control sample, a line per delay, with runs."""
     with figure_style():
         figure = Figure(figsize=figure_size(1, 4.2))
         ax = figure.add_subplot()

@@ -23,12 +23,12 @@ from typing import Any
 import numpy as np
 
 from ..kernel.engine import mujoco
+from ..live.clock import FRAME_TIME
+from ..live.frame import Frame
 from ..model.clay import Clay
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
 from ..studies.removal import Tool
-from .clock import FRAME_TIME
-from .frame import Frame
 from .stage import Stage, plotted_axes
 from .style import (
     BLACK,

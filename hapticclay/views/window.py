@@ -16,11 +16,11 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from ..errors import ParameterError
+from ..live.player import Player
+from ..live.replay import Replay
+from ..live.session import Session
+from ..live.verdict import clay_here
 from ..scene.experiments import SCENARIOS
-from .live_verdict import clay_here
-from .player import Player
-from .replay import Replay
-from .session import Session
 from .stage import held_words
 from .viewer import Rows, Sight, Writing
 

@@ -35,7 +35,7 @@ MOBILITY_POINTS = 81  # along the y side of the map on which the contours of W a
 
 
 def workspace_plot(drift: Drift) -> Figure:
-    """Plots the gain of Sh over the workspace: fitted (cells), mobility of the bare arm (contours)."""
+    """Plots the gain of Sh over the workspace: fitted in cells, bare mobility as contours."""
     with figure_style(axes_grid=False):
         figure = Figure(figsize=figure_size(2, 9.6 if narrow() else 5.6, 9.4))
         shape = (4, 1) if narrow() else (2, 2)

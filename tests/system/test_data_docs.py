@@ -10,9 +10,9 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.cli import app
+from hapticclay.live.session import Session
+from hapticclay.live.stream import UdpStream
 from hapticclay.simulation import export
-from hapticclay.views.session import Session
-from hapticclay.views.stream import UdpStream
 from tests.snippets import printed_by
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
+from hapticclay.live.session import Session
 from hapticclay.model import constants
 from hapticclay.views.page import Page
-from hapticclay.views.session import Session
 
 viser = pytest.importorskip("viser", reason="pip install 'hapticclay[web]'")
 CHROMIUM = (

@@ -18,10 +18,10 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
+from hapticclay.live.clock import FRAME_TIME
+from hapticclay.live.replay import Replay
+from hapticclay.live.session import Session
 from hapticclay.views import window
-from hapticclay.views.clock import FRAME_TIME
-from hapticclay.views.replay import Replay
-from hapticclay.views.session import Session
 from hapticclay.views.viewer import Pane
 from tests.hunt import some
 

@@ -10,13 +10,13 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.cli.run import run_table
+from hapticclay.live.verdict import clay_here
 from hapticclay.model import clay as clay_module
 from hapticclay.model.clay import LAWS
 from hapticclay.model.traits import Column, Hold, Law, Told
 from hapticclay.scene.text import clay_text
 from hapticclay.views import run_figures, style
 from hapticclay.views.captions import scenario_parts
-from hapticclay.views.live_verdict import clay_here
 
 PLAIN = hc.Profile((0.02, 0.06), (0.0, 20.0, 0.0))
 WALL = hc.Profile(

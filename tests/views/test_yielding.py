@@ -9,6 +9,10 @@ from scipy.optimize import brentq, fsolve
 
 import hapticclay as hc
 from hapticclay.cli.run import run_table
+from hapticclay.live.clock import FRAME_TIME
+from hapticclay.live.frame import Frame
+from hapticclay.live.replay import Replay
+from hapticclay.live.session import Session
 from hapticclay.theory import linear_loop
 from hapticclay.views import (
     captions,
@@ -19,10 +23,6 @@ from hapticclay.views import (
     running_plots,
     style,
 )
-from hapticclay.views.clock import FRAME_TIME
-from hapticclay.views.frame import Frame
-from hapticclay.views.replay import Replay
-from hapticclay.views.session import Session
 from hapticclay.views.stage import Stage, held_words
 from hapticclay.views.viewer import _law_point
 from hapticclay.views.window import Window

@@ -15,11 +15,11 @@ import pytest
 import hapticclay as hc
 from hapticclay.cli import app, view
 from hapticclay.errors import ParameterError
-from hapticclay.views.clock import FRAME_TIME
-from hapticclay.views.player import Player
-from hapticclay.views.replay import Replay
-from hapticclay.views.session import Session
-from hapticclay.views.stream import UdpStream
+from hapticclay.live.clock import FRAME_TIME
+from hapticclay.live.player import Player
+from hapticclay.live.replay import Replay
+from hapticclay.live.session import Session
+from hapticclay.live.stream import UdpStream
 
 
 @pytest.fixture
@@ -155,9 +155,9 @@ def test_view_refuses_before_it_opens_anything(capsys, tmp_path, monkeypatch):
 def test_nothing_is_loaded_unless_asked():
     code = (
         "import sys; import hapticclay as hc; from hapticclay.cli import view;"
-        "from hapticclay.views.session import Session; s = Session(hc.free());\n"
+        "from hapticclay.live.session import Session; s = Session(hc.free());\n"
         "with view.streaming(s, None): s.advance(0.1)\n"
-        "assert s.stream is None; print('hapticclay.views.stream' in sys.modules)"
+        "assert s.stream is None; print('hapticclay.live.stream' in sys.modules)"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout == "False\n"

@@ -14,15 +14,15 @@ import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.cli.view import ViewCommand
 from hapticclay.errors import ParameterError
+from hapticclay.live.clock import FRAME_TIME
+from hapticclay.live.device_sessions import SERVED_SPAN, DeviceSession, LiveDevice, ServedSession
+from hapticclay.live.player import Player
 from hapticclay.model.constants import NOMINAL
 from hapticclay.ports import Coupled, DeviceClient, Limits, Trajectory, serve
 from hapticclay.ports.coupled import DeviceHand
 from hapticclay.ports.driven_arm import Drive
 from hapticclay.ports.server import DeviceServer
 from hapticclay.ports.service import Service
-from hapticclay.views.clock import FRAME_TIME
-from hapticclay.views.device_sessions import SERVED_SPAN, DeviceSession, LiveDevice, ServedSession
-from hapticclay.views.player import Player
 from hapticclay.views.window import Window
 
 HAND = hc.Scenario(operator=hc.Operator(0.25, 2.0, 300.0), force=(0.0, 0.0))

@@ -11,12 +11,12 @@ import pytest
 import hapticclay as hc
 from hapticclay.kernel import native
 from hapticclay.kernel.row import CHUNK
-from hapticclay.views.clock import FRAME_TIME, LONGEST_SLICE, Clock
-from hapticclay.views.live_run import played
-from hapticclay.views.live_verdict import live_verdict
-from hapticclay.views.player import Player
-from hapticclay.views.replay import Replay
-from hapticclay.views.session import Session
+from hapticclay.live.clock import FRAME_TIME, LONGEST_SLICE, Clock
+from hapticclay.live.player import Player
+from hapticclay.live.replay import Replay
+from hapticclay.live.run import played
+from hapticclay.live.session import Session
+from hapticclay.live.verdict import live_verdict
 from hapticclay.views.stage import Stage
 
 

@@ -9,7 +9,7 @@ from ..studies.removal import TOOL, Tool
 from ..theory.pose_limits import PoseLimits
 from .clock import Clock
 from .frame import Frame, Listener, Partner
-from .live_verdict import LiveVerdict, is_viscous, live_gain_limits, live_verdict
+from .verdict import LiveVerdict, is_viscous, live_gain_limits, live_verdict
 
 
 class Replay:

@@ -22,8 +22,8 @@ from ..studies.removal import TOOL, Tool, removed
 from ..theory.pose_limits import PoseLimits
 from .clock import FRAME_TIME, LATE_EDGES, Clock
 from .frame import Frame, Listener, Partner
-from .live_run import PULL_MARGIN, LiveRun, played
-from .live_verdict import CALM_TIME, LiveVerdict, is_viscous, live_gain_limits, live_verdict
+from .run import PULL_MARGIN, LiveRun, played
+from .verdict import CALM_TIME, LiveVerdict, is_viscous, live_gain_limits, live_verdict
 
 
 class Session:

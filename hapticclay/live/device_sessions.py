@@ -20,9 +20,9 @@ from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from ..studies.removal import TOOL, Tool
 from .clock import FRAME_TIME
-from .live_run import played
-from .live_verdict import LiveVerdict
+from .run import played
 from .session import Session, refuse_other
+from .verdict import LiveVerdict
 
 SERVED_SPAN = 0.002  # [s] between two slices of an arm that programs drive
 WATCHED = 1.0  # [s] over which their rate is averaged
@@ -193,7 +193,7 @@ class DevicePartner:
             self.hand.exchange(*handle)
 
     def lead(self, play: Session) -> None:
-        """Pulls the handle to the position of the device; releases it if the position is unknown."""
+        """Pulls the handle to the device's position; releases it while that is unknown."""
         hand, held = self.hand, self.hand.held
         play.pull(hand.place if held else None)
         B = hand.coupling.B
