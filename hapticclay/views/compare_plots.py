@@ -12,7 +12,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..model.constants import AXES
-from ..scene.virtual_wall import VirtualWall
 from ..studies.comparison import Compared, Comparison
 from ..theory import stability_margins, wall_limits
 from ..theory.gain_limits import gain_limit
@@ -35,7 +34,7 @@ def compare_figures(found: Comparison) -> dict[str, tuple[str, shown.Figure]]:
         "impedance": ("Impedance that the hand feels", impedance_overlay),
         "parts": ("Effective stiffness, damping and mass", parts_overlay),
     }
-    if isinstance(found[0].subject, VirtualWall):
+    if found[0].loop is None:
         first = {"zwidth": ("Walls that are stable, by runs and exact", wall_region_plot)}
         last = {"push": (f"After a push of {1e3 * 0.01:g} mm/s", push_plot)}
     else:
@@ -52,8 +51,7 @@ def compare_figures(found: Comparison) -> dict[str, tuple[str, shown.Figure]]:
 
 def main_overlay(found: Comparison) -> Figure:
     """Plots the main difference between the files: stable walls, or velocity over position."""
-    walls = isinstance(found[0].subject, VirtualWall)
-    return wall_region_plot(found) if walls else velocity_overlay(found)
+    return velocity_overlay(found) if found[0].loop else wall_region_plot(found)
 
 
 @figure_style()
@@ -101,9 +99,7 @@ def gain_overlay(found: Comparison) -> Figure:
 
 def _shown_band(file: Compared) -> np.ndarray:
     """Frequencies [rad/s]; for a wall below half of its sampling frequency."""
-    if isinstance(file.subject, VirtualWall):
-        return BAND[BAND < 0.95 * math.pi / file.subject.Ts]
-    return BAND
+    return BAND[BAND < 0.95 * 2.0 * math.pi * file.top]
 
 
 @figure_style()
@@ -111,10 +107,10 @@ def spare_plot(found: Comparison) -> Figure:
     """Plots the excess damping: passivity index of a sampled wall, Re Z of an arm."""
 
     def spare(file: Compared) -> tuple[np.ndarray, np.ndarray]:
-        if isinstance(file.subject, VirtualWall):
-            edge = math.pi / file.subject.Ts
+        if file.loop is None:
+            edge = math.pi / file.wall.Ts
             omega = np.geomspace(1e-3 * edge, edge * (1.0 - 1e-9), 400)
-            return omega / (2.0 * math.pi), wall_limits.passivity_index(file.subject, omega)
+            return omega / (2.0 * math.pi), wall_limits.passivity_index(file.wall, omega)
         omega = _shown_band(file)
         return omega / (2.0 * math.pi), file.impedance(omega).damping
 
@@ -162,8 +158,8 @@ def transparency_overlay(found: Comparison) -> Figure:
 
 def wall_region_plot(found: Comparison) -> Figure:
     """Plots the walls that each device renders stably, by runs and by theory, and its own wall."""
-    walls = [x.subject for x in found if isinstance(x.subject, VirtualWall)]
-    return regions_plot([replace(x.region, name=x.name) for x in found if x.region], walls)
+    regions = [replace(x.region, name=x.name) for x in found if x.region]
+    return regions_plot(regions, [x.wall for x in found])
 
 
 @figure_style()

@@ -10,12 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..scene.virtual_wall import VirtualWall
-from ..studies.impedance import MeasuredImpedance, Subject
+from ..studies.impedance import MeasuredImpedance
 from ..studies.mbk import ArmMBK, DeviceMBK
+from ..studies.wall import Subject, as_wall
 from ..theory.impedance import Impedance
 from ..theory.mbk import PLANES
-from .captions import hand_name, loop_parts, unit_text
+from .captions import hand_name, loop_parts
 from .palette import BLACK, BLUE, GREEN, PALE_GREY, VERMILION
 from .panels import (
     add_legend,
@@ -50,7 +50,7 @@ def impedance_plot(found: MeasuredImpedance) -> Figure:
     for part, ax in panels.items():
         line, dots = getattr(computed, part), getattr(m, part)
         values = np.concatenate((line, dots))
-        if rendered := rendered_part(found.subject, part):
+        if rendered := as_wall(found.subject).rendered(part):
             look: Any = dict(color=BLACK, lw=stroke(0.8), ls=(0, (5, 3)), label="rendered")
             ax.axhline(rendered, **look)
             values = np.append(values, rendered)
@@ -193,27 +193,9 @@ def least_mass_plot(found: ArmMBK) -> Figure:
     return figure
 
 
-def rendered_part(subject: Subject, part: str) -> float:
-    """Rendered value of a part of a wall or clay, beside the effective one; 0 for none."""
-    letters = {"stiffness": "k", "damping": "b"}
-    if isinstance(subject, VirtualWall):
-        letters = {part: letter for letter, part in LETTERS.items()}
-    return getattr(subject, letters[part]) if part in letters else 0.0
-
-
 def _subject_parts(subject: Subject) -> list[str]:
     """Phrases that describe a wall or a loop in a title."""
-    if not isinstance(subject, VirtualWall):
-        clay = unit_text(f"k = {subject.k:g} N/m") if subject.k else ""
-        render = f"{subject.render} clay" if subject.Ts else ""
-        names = ("axis", "b", "K", "hand", "Ts", "delay")
-        return [*loop_parts(subject, *names), clay, render]
-    units = [(letter, PART_UNITS[part]) for letter, part in LETTERS.items()]
-    wall = [f"{n} = {value:g} {u}" for n, u in units if (value := getattr(subject, n))]
-    device = [f"device {subject.device.mass:g} kg", hand_name(subject.operator)]
-    timing = [f"Ts = {1e3 * subject.Ts:g} ms" if subject.Ts else ""]
-    late = f"delay = {1e3 * subject.delay:g} ms" if subject.delay else ""
-    return [*(wall or ["no wall"]), *device, *timing, late]
+    return as_wall(subject).felt_phrases(hand_name(subject.operator))
 
 
 def _from_zero(ax: Axes, y: np.ndarray) -> None:

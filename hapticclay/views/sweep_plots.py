@@ -14,7 +14,7 @@ from matplotlib.path import Path
 
 from ..errors import ParameterError, choice
 from ..model.constants import AXES
-from ..studies.sweep_rows import column_told
+from ..studies.sweep_rows import column_note
 from .palette import (
     BLACK,
     BLUE,
@@ -248,7 +248,7 @@ def _unstable_look(axis: str) -> dict[str, Any]:
 
 
 def _column_label(name: str) -> str:
-    unit = column_told(name)[0]
+    unit = column_note(name)[0]
     return name.replace("_", " ") + (f" [{unit}]" if unit else "")
 
 

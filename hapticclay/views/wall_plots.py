@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from ..scene.virtual_wall import VirtualWall
+from ..studies.wall import as_wall
 from ..studies.zwidth import BY_GROWTH, ZRegion, ZWidth
 from .captions import hand_name, unit_text
 from .palette import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY_BLUE, VERMILION, WHITE
@@ -89,7 +90,8 @@ def _draw_region(ax: Axes, r: ZRegion) -> None:
     for limit in r.limits:
         look = LIMIT_LOOKS[limit.name.split(" ")[0]]
         if limit.name.startswith("exact"):
-            label = limit.name if r.linear else f"linear loop, {_left_out(r)} left out"
+            left_out = ", ".join(as_wall(r.wall).left_out)
+            label = limit.name if r.linear else f"linear loop, {left_out} left out"
             label = label.partition(",")[0] + " alone" if narrow() and not r.linear else label
         else:  # one column has no room for the kind beside two names
             label = limit.name + ("" if narrow() else KIND_WORDS[limit.kind])
@@ -187,36 +189,10 @@ def _set_axes(ax: Axes, regions: Sequence[ZRegion], walls: Sequence[VirtualWall]
     plain_ticks(ax)
 
 
-def _left_out(r: ZRegion) -> str:
-    """Effects that the linear loop neglects."""
-    assert isinstance(r.wall, VirtualWall)
-    d = r.wall.device
-    parts = [name for name, x in (("friction", d.friction), ("encoder", d.quantum)) if x]
-    return ", ".join(parts + ["surface"] * r.wall.unilateral)
-
-
 def _device_parts(chart: ZWidth) -> list[str]:
     """Phrases for the title: the parts of the device common to all regions."""
-    w = chart.regions[0].wall
-    timing = {"Ts": f"Ts = {1e3 * (w.Ts or 0.0):g} ms"}
-    if w.delay:
-        timing["delay"] = f"delay = {1e3 * w.delay:g} ms"
-    if isinstance(w, VirtualWall):
-        d = w.device
-        phrases = {"mass": f"m = {d.mass:g} kg", "damper": f"b = {d.damper:g} N.s/m", **timing}
-        if d.friction:
-            phrases["friction"] = f"fc = {d.friction:g} N"
-        if d.quantum:
-            phrases["quantum"] = f"Delta = {1e6 * d.quantum:g} um"
-        if w.velocity_window > 1:
-            phrases["velocity_window"] = f"window = {w.velocity_window} samples"
-        if w.velocity_filter:
-            phrases["filter"] = f"filter = {w.velocity_filter:g} Hz"
-        if w.unilateral:
-            phrases["surface"] = "surface"
-    else:
-        phrases = {"axis": f"arm, {w.axis} axis", "gain": f"Kc = {w.K:g} 1/kg", **timing}
-    phrases.pop(chart.vary or "", None)
+    wall = as_wall(chart.regions[0].wall)
+    parts = [text for name, text in wall.phrases().items() if name != chart.vary]
     rest = any(r.verdict != BY_GROWTH for r in chart.regions)
     still = f"rest within {1e6 * chart.press.still:g} um" if rest else ""
-    return [*phrases.values(), hand_name(w.operator), still]
+    return [*parts, hand_name(wall.subject.operator), still]
