@@ -16,7 +16,6 @@ from ..errors import ParameterError, number_in
 from ..scene.changes import named_values, split_words
 from ..scene.experiments import parameter_unit
 
-DESIGNS = ("grid", "lhs", "sobol")
 RANGE_PATTERN = r"(?P<low>[^:]+):(?P<high>[^:]+?)(:(?P<n>\d+))?\s*(?P<log>log)?"
 MOST_RUNS = 10_000_000
 
