@@ -13,9 +13,9 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..errors import ParameterError
+from ..fields import plain_data
 from ..results import Result
 from ..scene.files import read_settings
-from ..scene.plain_data import plain_data
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import WALL_SCHEMA, WALL_SCHEMA_0_2, VirtualWall
 from ..simulation.record import Record

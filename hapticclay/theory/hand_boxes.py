@@ -12,14 +12,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..arguments import named
-from ..errors import (
-    ParameterError,
-    field_types,
-    flag,
-    integer,
-    number,
-    numbers_of,
-)
+from ..errors import ParameterError, flag, integer, number, numbers_of
+from ..fields import nodes_of
 from ..model.operator import Operator
 from . import exact_roots, gain_crossings, linear_loop, roots
 from .exact_roots import axis_parts, rational, value
@@ -48,8 +42,8 @@ class Box:
     rigid: bool = False
 
     def __post_init__(self):
-        for field, (_, bound) in field_types(Operator).items():
-            unit = bound.unit if bound else ""
+        for field, node in nodes_of(Operator).items():
+            unit = node.bound.unit
             given = getattr(self, field)
             low, high = numbers_of(f"box.{field}", given, ("low", "high"), 0.0, unit=unit)
             if high < low:
