@@ -361,7 +361,10 @@ def _each_axis(value: Any) -> tuple[Any, Any]:
 def nodes_of(kind: type) -> dict[str, Node]:
     """The types of the fields of a dataclass by name."""
     hints = get_type_hints(kind, include_extras=True)
-    return {field.name: node_of(hints[field.name]) for field in dataclasses.fields(kind)}
+    return {
+        field.name: Text(empty=True) if field.default == "" else node_of(hints[field.name])
+        for field in dataclasses.fields(kind)
+    }
 
 
 @functools.cache
