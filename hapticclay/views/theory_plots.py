@@ -13,6 +13,7 @@ from numpy.polynomial import Polynomial
 
 from ..model.compensator import Compensator
 from ..theory import linear_loop, stability_margins
+from ..theory.controller_loop import ControllerStability
 from ..theory.design import DESIGN_BAND
 from ..theory.loops import Loop, of_loop
 from .captions import loop_parts
@@ -147,6 +148,24 @@ def transparency_plot(
     ax.set(xlim=omega, ylim=(0.0, None))
     add_legend(figure, 2)
     set_title(ax, *loop_parts(loop, "axis", "b"))
+    return figure
+
+
+@figure_style()
+def growth_plot(found: ControllerStability) -> Figure:
+    """Plots the growth rate of the least damped mode over the gain, with the stable band."""
+    figure, ax = single(3.6)
+    ax.plot(found.gains, found.rates, color=BLUE)
+    level(ax)
+    ends = np.clip((found.low, found.high), found.gains[0], found.gains[-1])
+    ax.axvspan(*ends.tolist(), color=PALE_GREY, lw=0, zorder=0, label="stable")
+    rate = float(np.interp(found.gain, found.gains, found.rates))
+    ax.plot(found.gain, rate, "o", color=VERMILION, ms=stroke(5), label="own gain")
+    ax.set(xscale="log", xlabel="gain", ylabel="growth rate of oscillation [1/s]")
+    if (least := float(found.rates.min())) < 0.0:
+        ax.set_ylim(1.3 * least, -1.3 * least)
+    add_legend(figure, 2)
+    set_title(ax, "controller of one's own", f"Ts = {1e3 * found.Ts:g} ms")
     return figure
 
 
