@@ -18,12 +18,6 @@ def is_viscous(scenario: Scenario, p: tuple[float, float]) -> bool:
     return scenario.clay is None or scenario.clay.viscous_at(p)
 
 
-def clay_here(scenario: Scenario, p: tuple[float, float], b: tuple[float, float]) -> str:
-    """Text of the clay's resistance at a place, for the window."""
-    told = scenario.clay.here(p, b) if scenario.clay else ()
-    return f"{', '.join(x.text() for x in told) or 'none'} here"
-
-
 @dataclass(frozen=True)
 class LiveVerdict:
     """The current verdict on the loop.
