@@ -13,23 +13,10 @@ from .verdict import LiveVerdict, is_viscous, live_gain_limits, live_verdict
 
 
 class Replay:
-    """A record played like a session.
-
-    Attributes:
-        source: the record.
-        scenario: of the record.
-        tool: at the handle, as in the session that was recorded.
-        paused: whether it is paused.
-        clock: of real time.
-        t: current time [s].
-        n: current sample.
-        frames: states shown so far.
-        stream: as of a session.
-        partner: as of a session: None.
-    """
+    """A record played like a session, with the tool that its session had; `n` is the sample."""
 
     stream: Listener | None = None
-    partner: Partner | None = None
+    partner = Partner()
 
     def __init__(self, record: Record, tool: Tool = TOOL):
         """Begins at the first sample."""

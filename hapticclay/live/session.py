@@ -20,7 +20,7 @@ from ..simulation import monitor
 from ..simulation.record import Record
 from ..studies.removal import TOOL, Tool, removed
 from ..theory.pose_limits import PoseLimits
-from .clock import FRAME_TIME, LATE_EDGES, Clock
+from .clock import LATE_EDGES, Clock
 from .frame import Frame, Listener, Partner
 from .run import PULL_MARGIN, LiveRun, played
 from .verdict import CALM_TIME, LiveVerdict, is_viscous, live_gain_limits, live_verdict
@@ -29,31 +29,22 @@ from .verdict import CALM_TIME, LiveVerdict, is_viscous, live_gain_limits, live_
 class Session:
     """A person, the arm and the clay.
 
-    Attributes:
-        tool: at the handle.
-        stiffness: stiffness of the hand's spring, as a multiple of Th's.
-        every: samples per sample kept.
-        given: scenario as it was given.
-        scenario: running scenario, with the present gain and damping.
-        run: the run that steps it.
-        paused: whether simulated time is paused.
-        recording: whether samples are kept.
-        clock: clock of real time.
-        point: target point of the hand [m]; None if it does not pull.
-        frames: end of each slice so far.
-        stream: listener that receives each slice; None for none.
-        partner: device whose samples the slices follow; None for none.
-        frame_time: least simulated time between two frames [s].
+    `given` is the scenario as given, `scenario` the running one with the present gain and damping,
+    `run` steps it. `point` is where the hand pulls to [m], None if it does not pull. `frames` holds
+    the state at the end of each slice, `frame_time` apart at least.
     """
 
     stream: Listener | None = None
-    partner: Partner | None = None
+    partner = Partner()
     frame_time = 0.0
 
     def __init__(
         self, scenario: Scenario, stiffness: float = 1.0, tool: Tool = TOOL, every: int = 1
     ):
-        """Begins at the start of a scenario; its force, length and t_max are ignored."""
+        """Begins at the start of a scenario; its force, length and t_max are ignored.
+
+        The hand's spring is stiffness times that of Th; every every-th sample is kept.
+        """
         self.tool, self.stiffness = tool, stiffness
         self.every = integer("every", every, 1, 1_000_000)
         self.start(scenario)
@@ -64,14 +55,14 @@ class Session:
         self.given = scenario
         self.run = LiveRun(self.scenario, self.every)
         self.paused, self.recording = False, True
-        self.clock = Clock(FRAME_TIME if self.partner is None else self.partner.span)
+        self.clock = Clock(self.partner.span)
         self.point: tuple[float, float] | None = None
         self._damping = 1.0
         self.frames: list[Frame] = []
         self._limits = PoseLimits(self.scenario)
         self._carry = 0.0
         self._swung = -math.inf  # time of the last growing oscillation [s]
-        self._look()
+        self._observe()
 
     def prepared(self, scenario: Scenario) -> Scenario:
         """The scenario as it is run."""
@@ -156,11 +147,11 @@ class Session:
         if self.point is None:
             run.pull.jump(run.t, *self.handle())
         else:
-            run.pull.lead(run.t, self.point, steps * dt)
+            run.pull.glide(run.t, self.point, steps * dt)
         run.keeping = self.recording
         before = run.position()
         run.slice(steps)
-        self._look()
+        self._observe()
         return np.array([before, run.position()])
 
     def record(self) -> Record:
@@ -217,7 +208,7 @@ class Session:
         vx, vy = ((a - b) / self.scenario.dt for a, b in zip(p, behind, strict=True))
         return p, (vx, vy)
 
-    def _look(self) -> None:
+    def _observe(self) -> None:
         watch = self.run.watch
         if watch.onset and max(map(len, watch.swings)) >= monitor.SWINGS:
             self._swung = self.t

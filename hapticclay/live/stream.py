@@ -42,8 +42,8 @@ class UdpStream:
         try:  # once, because a name server may be slow
             found = socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_DGRAM)
         except (OSError, UnicodeError) as error:
-            told = getattr(error, "strerror", None) or error
-            raise ParameterError("stream", address, f"must name a host ({told})") from None
+            reason = getattr(error, "strerror", None) or error
+            raise ParameterError("stream", address, f"must name a host ({reason})") from None
         family, kind, protocol, _, self._to = found[0]
         self._socket = socket.socket(family, kind, protocol)
         self._socket.setblocking(False)

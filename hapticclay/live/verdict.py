@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
@@ -18,14 +18,8 @@ def is_viscous(scenario: Scenario, p: tuple[float, float]) -> bool:
     return scenario.clay is None or scenario.clay.viscous_at(p)
 
 
-@dataclass(frozen=True)
-class LiveVerdict:
-    """The current verdict on the loop.
-
-    Attributes:
-        text: one line.
-        unstable: whether the arm oscillates with growing amplitude.
-    """
+class LiveVerdict(NamedTuple):
+    """The current verdict on the loop, in one line, and whether its oscillation grows."""
 
     text: str
     unstable: bool
@@ -54,11 +48,11 @@ def live_verdict(
     if above:
         text += f"; here {', '.join(above)}"
     elif limit:
-        text += _limits_told(limit, text == "stable")
+        text += _limit_words(limit, text == "stable")
     return LiveVerdict(text, bool(onset and swings))
 
 
-def _limits_told(limit: tuple[float, float], stable: bool) -> str:
+def _limit_words(limit: tuple[float, float], stable: bool) -> str:
     """The limits of K that there are, for the end of a verdict."""
     known = {axis: most for axis, most in zip(AXES, limit, strict=True) if most < math.inf}
     if not known:  # beside an oscillation it would be no comfort
