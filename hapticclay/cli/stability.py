@@ -155,10 +155,10 @@ class StabilityCommand:
 
     def _yield_map(self, loop: PushedLoop) -> YieldMap:
         from ..studies.yield_map import yield_map
-        from ..views import yield_map_plots
+        from ..views import stability_map_plots
 
         chart = yield_map(loop, self.quick, lambda gains: console.progress_bar(gains, desc="map"))
-        self._save(self.map, yield_map_plots.yield_map_plot, chart)
+        self._save(self.map, stability_map_plots.yield_map_plot, chart)
         print(yield_differences(chart))
         return chart
 
