@@ -23,7 +23,7 @@ from ..theory.pose_limits import PoseLimits
 from .clock import LATE_EDGES, Clock
 from .frame import Frame, Listener, Partner
 from .run import PULL_MARGIN, LiveRun, played
-from .verdict import CALM_TIME, LiveVerdict, is_viscous, live_gain_limits, live_verdict
+from .verdict import CALM_TIME, LiveVerdict, live_gain_limits, live_verdict
 
 
 class Session:
@@ -57,7 +57,7 @@ class Session:
         self.paused, self.recording = False, True
         self.clock = Clock(self.partner.span)
         self.point: tuple[float, float] | None = None
-        self._damping = 1.0
+        self.damping = 1.0  # factor on damping, yield force and consistency of all clay
         self.frames: list[Frame] = []
         self._limits = PoseLimits(self.scenario)
         self._carry = 0.0
@@ -71,7 +71,7 @@ class Session:
 
     def restart(self) -> None:
         """Restarts the same scenario with the present gain, damping and recording switch."""
-        gain, b, recording = self.scenario.gain, self._damping, self.recording
+        gain, b, recording = self.scenario.gain, self.damping, self.recording
         self.start(self.given)
         self.change(gain=gain, b=b)
         self.recording = recording
@@ -80,6 +80,11 @@ class Session:
     def t(self) -> float:
         """Simulated time [s]."""
         return self.run.t
+
+    @property
+    def angles(self) -> list[float]:
+        """Angles of the arm [rad]."""
+        return list(self.run.q)
 
     @property
     def ended(self) -> str:
@@ -106,8 +111,7 @@ class Session:
         s, onset = self.scenario, self.run.watch.onset
         if self._limits.scenario is not s:
             self._limits = PoseLimits(s)
-        p = self.frames[-1].p
-        limit = live_gain_limits(self._limits, p, self.b) if is_viscous(s, p) else None
+        limit = live_gain_limits(self._limits, self.frames[-1].p, self.b)
         return live_verdict(self.gain, limit, onset, self.t - self._swung < CALM_TIME)
 
     def pull(self, point: tuple[float, float] | None) -> None:
@@ -124,16 +128,11 @@ class Session:
         if gain is not None:
             scenario = replace(scenario, gain=gain)
         if b is not None:
-            self._damping = number("b", b, 0.0, 1e6)
+            self.damping = number("b", b, 0.0, 1e6)
             clay = self.given.clay
-            scenario = replace(scenario, clay=clay and clay.scaled(self._damping))
+            scenario = replace(scenario, clay=clay and clay.scaled(self.damping))
         self.scenario = scenario
         self.run.change(scenario)
-
-    @property
-    def damping(self) -> float:
-        """Factor on the given damping, yield force and consistency of all clay."""
-        return self._damping
 
     def advance(self, seconds: float) -> np.ndarray:
         """Advances by a slice of simulated time, unless paused."""
@@ -163,16 +162,14 @@ class Session:
             raise ParameterError("record", self.scenario.name, "nothing was recorded")
         out = Record.of(run, max(self.clock.real, 1e-9))
         volume, rate = self._removed(out)
-        knots = np.array(run.pull.knots)
-        index = np.rint(out.t / self.scenario.dt)
-        which = np.searchsorted([i for i, _ in run.gains], index, "right") - 1
+        t, *point = np.array(run.pull.knots).T
+        first, gains = zip(*run.gains, strict=True)
+        which = np.searchsorted(first, np.rint(out.t / self.scenario.dt), "right") - 1
         extra = {
             "removed": volume,
             "removal_rate": rate,
-            "target": np.column_stack(
-                [np.interp(out.t, knots[:, 0], knots[:, 1 + i]) for i in (0, 1)]
-            ),
-            "gain": np.array([gain for _, gain in run.gains])[which],
+            "target": np.column_stack([np.interp(out.t, t, x) for x in point]),
+            "gain": np.array(gains)[which],
         }
         clock = self.clock
         notes = {

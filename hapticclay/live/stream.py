@@ -63,8 +63,8 @@ class UdpStream:
             values[name] = _by_axis(getattr(frame, name))
         values |= {"b": _by_axis(play.b), "gain": _by_axis(play.gain)}
         values["held"] = dict(zip(AXES, map(int, frame.held), strict=True))
-        if (target := getattr(play, "point", None)) is not None:
-            values["target"] = _by_axis(target)
+        if play.point is not None:
+            values["target"] = _by_axis(play.point)
         with contextlib.suppress(OSError):  # a full buffer, a network that is down
             self._socket.sendto(json.dumps(values).encode(), self._to)
 

@@ -6,16 +6,10 @@ import math
 from typing import NamedTuple
 
 from ..model.constants import AXES
-from ..scene.scenario import Scenario
 from ..simulation.monitor import Outcome
 from ..theory.pose_limits import PoseLimits
 
 CALM_TIME = 1.0  # [s] without growing oscillation after which an unstable arm counts as calm
-
-
-def is_viscous(scenario: Scenario, p: tuple[float, float]) -> bool:
-    """Whether the clay at a place is viscous; otherwise the linear gain limit does not apply."""
-    return scenario.clay is None or scenario.clay.viscous_at(p)
 
 
 class LiveVerdict(NamedTuple):
@@ -63,9 +57,12 @@ def _limit_words(limit: tuple[float, float], stable: bool) -> str:
 
 def live_gain_limits(
     limits: PoseLimits, p: tuple[float, float], b: tuple[float, float]
-) -> tuple[float, float]:
-    """Returns the gain limit of the linear loop on each axis [1/kg], inf for none.
+) -> tuple[float, float] | None:
+    """Gain limit of the linear loop on each axis with the handle where it is [1/kg], inf for none.
 
-    It applies to continuous time with the handle where it is.
+    None where it does not apply: under sampled control, and in clay that is not viscous.
     """
+    s = limits.scenario
+    if s.control != "continuous" or not (s.clay is None or s.clay.viscous_at(p)):
+        return None
     return limits.at(0, p, b), limits.at(1, p, b)

@@ -268,7 +268,7 @@ class Page:
         with self.player.lock:
             frames = session.frames
             new, self._shown = frames[self._shown :], len(frames)
-            frame, point, q = frames[-1], session.point, list(session.run.q)
+            frame, point, q = frames[-1], session.point, session.angles
             plots_due = now - self._plot_time > PLOT_TIME
             some = frames[:: max(1, len(frames) // PLOT_POINTS)] if plots_due else []
             banner = self._banner() if plots_due else ""

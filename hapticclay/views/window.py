@@ -111,15 +111,13 @@ class Window:
         play = self.play
         if isinstance(play, Session):
             play.pull(self._mouse(hand))
-            target, angles = play.point, list(play.run.q)
-        else:
-            target, angles = None, play.source.q[play.n].tolist()
+        target = play.point
         frames, anew = play.frames[max(self.shown - 1, 0) :], self.shown == 0
         self.shown = len(play.frames)
         writing, now = None, time.perf_counter()
         if now - self.written >= WRITE_TIME:
             self.written, writing = now, self._writing()
-        return Sight(frames, anew, angles, target, writing)
+        return Sight(frames, anew, play.angles, target, writing)
 
     def _mouse(self, hand: tuple[float, float] | None) -> tuple[float, float] | None:
         """Target point of the hand [m] while the mouse drags."""
