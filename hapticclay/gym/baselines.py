@@ -22,7 +22,7 @@ from .registry import ENTRIES, NAMESPACE
 from .task import FORCE, Task
 
 MARGIN = 0.9  # theoretical gains are this share of the gain limit
-# Shares with the largest mean return, as `scores.search` found them; see docs/gym_scores.json.
+# Shares with the largest mean return, found by benchmarks/gym_scores.py: docs/gym_scores.json.
 FIXED_SHARE, ORACLE_SHARE = 1.08, 0.84
 PD, PD_IN_GROOVE = (1.0, 0.1), (0.5, 0.3)  # [N/mm], [N/(cm/s)]
 PROBED = 150  # control periods after which the hand is identified
