@@ -18,6 +18,7 @@ from ..studies.identification import (
     printed_form,
     response,
 )
+from ..studies.identified_blocks import IdentifiedBlocks
 from .style import (
     BLACK,
     BLUE,
@@ -39,22 +40,20 @@ class PlottedBlock(NamedTuple):
     """Labels of an identified block.
 
     Attributes:
-        figure: file name for the simulated arm, after the figure of the paper.
         symbol: in titles.
         unit: of its magnitude.
         equations: of the paper, on x and y.
     """
 
-    figure: str
     symbol: str
     unit: str
     equations: tuple[str, str]
 
 
 BLOCKS = {
-    "G": PlottedBlock("fig4", "G", "dB re 1 m/m", ("Eq. 15", "Eq. 16")),
-    "S": PlottedBlock("fig5", "S", "dB re 1 m/N", ("Eq. 17", "Eq. 18")),
-    "Th": PlottedBlock("fig6", "T$_h$", "dB re 1 N/m", ("Eq. 19", "Eq. 19")),
+    "G": PlottedBlock("G", "dB re 1 m/m", ("Eq. 15", "Eq. 16")),
+    "S": PlottedBlock("S", "dB re 1 m/N", ("Eq. 17", "Eq. 18")),
+    "Th": PlottedBlock("T$_h$", "dB re 1 N/m", ("Eq. 19", "Eq. 19")),
 }
 
 
@@ -88,6 +87,11 @@ def identification_plot(results: Sequence[Identified], paper: bool | None = None
         figure.align_ylabels(named.ravel())
         add_legend(figure, axes[0, 0], 3)
     return figure
+
+
+def blocks_plot(found: IdentifiedBlocks) -> Figure:
+    """Plots one block on its axes."""
+    return identification_plot(found.results, found.paper)
 
 
 def identified_plot(result: Identified) -> Figure:
