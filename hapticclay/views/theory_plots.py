@@ -13,6 +13,7 @@ from numpy.polynomial import Polynomial
 
 from ..model.compensator import Compensator
 from ..theory import linear_loop, stability_margins
+from ..theory.controller_loop import ControllerStability
 from ..theory.design import DESIGN_BAND
 from ..theory.loops import Loop, of_loop
 from .style import (
@@ -167,6 +168,25 @@ def transparency_plot(
 
 def _response(n: Polynomial, d: Polynomial, omega: np.ndarray) -> np.ndarray:
     return n(1j * omega) / d(1j * omega)
+
+
+def growth_plot(found: ControllerStability) -> Figure:
+    """Plots the growth rate of the least damped mode over the gain, with the stable band."""
+    with figure_style():
+        figure = Figure(figsize=figure_size(1, 3.6))
+        ax = figure.add_subplot()
+        ax.plot(found.gains, found.rates, color=BLUE)
+        ax.axhline(0.0, color=BLACK, lw=stroke(0.8))
+        ends = np.clip((found.low, found.high), found.gains[0], found.gains[-1])
+        ax.axvspan(*ends.tolist(), color=PALE_GREY, lw=0, zorder=0, label="stable")
+        rate = float(np.interp(found.gain, found.gains, found.rates))
+        ax.plot(found.gain, rate, "o", color=VERMILION, ms=stroke(5), label="own gain")
+        least = float(found.rates.min())
+        ax.set(xscale="log", xlabel="gain", ylabel="growth rate of oscillation [1/s]")
+        ax.set_ylim(1.3 * least, -1.3 * least) if least < 0.0 else None
+        add_legend(figure, ax, 2)
+        set_title(ax, "controller of one's own", f"sampled every {1e3 * found.Ts:g} ms")
+    return figure
 
 
 def _loop_name(loop: Loop) -> str:
