@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-    from .views import figure as figures
-
 RESULT_SCHEMA = "hapticclay-result-1"
 ROOMS = (
     "model",
@@ -129,8 +127,8 @@ class Result:
         """Draws the result, as the command does."""
         return pkgutil.resolve_name(self.drawn_by)(self)
 
-    def figures(self) -> dict[str, figures.Figure]:
-        """The figures of the result by file name, each drawn on demand."""
+    def figures(self) -> dict[str, Any]:
+        """The figures of the result by file name, each a `views.figure.Figure`, drawn on demand."""
         return {self.written_as: figure_of(self)}
 
     def contents(self) -> Mapping[str, Any]:
@@ -197,8 +195,8 @@ class Result:
         return found
 
 
-def figure_of(found: Any, drawn_by: str = "", tables: Tables | None = None) -> figures.Figure:
-    """A figure of an object, drawn by the function that it names or by another one.
+def figure_of(found: Any, drawn_by: str = "", tables: Tables | None = None) -> Any:
+    """A `views.figure.Figure` of an object, drawn by the function that it names or another one.
 
     Without other tables, the figure shows those of the object.
     """
