@@ -6,11 +6,10 @@ import math
 import textwrap
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
-
-import tyro
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 from ..errors import ParameterError
+from .options import Loose
 
 if TYPE_CHECKING:
     from ..scene.fields import Field
@@ -31,7 +30,7 @@ class FieldsCommand:
             an experiment, such as constant, prints its parameters.
     """
 
-    names: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
+    names: Loose[tuple[str, ...]] = ()
 
     def __call__(self) -> int:
         from ..scene.experiments import EXPERIMENTS, parameter_fields

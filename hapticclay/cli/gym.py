@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
-import tyro
-
-from ..errors import integer
+from ..errors import Bound
 from .console import progress_bar, text_table
+from .options import Loose
 from .unused import Unused
 
 SEEDS, EPISODES, NOISE = 100, 100, 0.1  # where none is given
@@ -32,12 +31,11 @@ class GymCommand:
         engine: auto, python or native.
     """
 
-    action: Annotated[Literal["baselines", "dataset"], tyro.conf.Positional]
-    env: Annotated[
-        Literal["CutLine-v0", "PareEdge-v0", "AdaptiveGain-v0", "ProbeClay-v0"],
-        tyro.conf.Positional,
-    ] = "CutLine-v0"
-    seeds: int | None = None
+    action: Loose[Literal["baselines", "dataset"]]
+    env: Loose[Literal["CutLine-v0", "PareEdge-v0", "AdaptiveGain-v0", "ProbeClay-v0"]] = (
+        "CutLine-v0"
+    )
+    seeds: Annotated[int | None, Bound(2, 100_000)] = None
     episodes: int | None = None
     noise: float | None = None
     name: str | None = None
@@ -58,7 +56,7 @@ class GymCommand:
     def _baselines(self) -> int:
         from ..gym import baselines, scores
 
-        seeds = integer("seeds", SEEDS if self.seeds is None else self.seeds, 2, 100_000)
+        seeds = SEEDS if self.seeds is None else self.seeds
         rows, means = [], {}
         for name, maker in baselines.BASELINES[self.env].items():
             found = baselines.returns(self.env, maker, range(seeds), engine=self.engine)

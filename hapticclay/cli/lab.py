@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import tyro
+from typing import TYPE_CHECKING
 
 from ..files import versions, writable
 from . import console
+from .options import Loose
 
 if TYPE_CHECKING:
     from ..studies.labs import Lab
@@ -25,14 +24,14 @@ class LabCommand:
     Attributes:
         source: The lab: a wall and its rate, Z-width, delay and passivity, or a just-noticeable
             difference.
-        out: Folder for lab.json and the figures.
+        out: Folder for lab.json and the figures; by default out/lab/NAME.
         quick: Make fewer runs.
         view: At the end, show a run of the lab in a window.
         figures: Formats and style of the figures.
     """
 
-    source: Annotated[str, tyro.conf.Positional]
-    out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: out/lab/NAME)")] = None
+    source: Loose[str]
+    out: Path | None = None
     quick: bool = False
     view: bool = False
     figures: console.FigureOptions = console.FigureOptions()

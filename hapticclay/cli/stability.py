@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from ..errors import ParameterError, choice, number_in
+from ..errors import Bound, ParameterError, choice, number_in
 from ..files import versions, writable
 from ..model.constants import AXES, B_CONSTANT, C_DEN, C_NUM, GAIN, TS, SecondOrder
 from . import console
@@ -34,6 +34,10 @@ VERDICTS_UNITS = {
     "damping": "N.s/m",
     "flow": "N, N/(m/s)^n, 1, N.s/m",
 }
+Damping = Annotated[float, Bound(unit="1/s")]
+Stiffness = Annotated[float, Bound(unit="1/s^2")]
+PositionLoop = tuple[Annotated[float, Bound(unit="1/s^2")], Damping, Stiffness]
+ForceLoop = tuple[Annotated[float, Bound(unit="1/kg")], Damping, Stiffness]
 ONE_HZ = 2.0 * math.pi  # [rad/s]
 
 
@@ -66,14 +70,14 @@ class StabilityCommand:
     """
 
     axis: Literal["x", "y"] = "x"
-    b: float | None = None
-    gain: float | None = None
-    Ts: float | None = TS
-    delay: float = 0.0
+    b: Annotated[float | None, Bound(unit="N.s/m")] = None
+    gain: Annotated[float | None, Bound(unit="1/kg")] = None
+    Ts: Annotated[float | None, Bound(unit="s")] = TS
+    delay: Annotated[float, Bound(unit="s")] = 0.0
     num: tuple[float, ...] = C_NUM
     den: tuple[float, ...] = C_DEN
-    G: tuple[float, float, float] | None = None
-    S: tuple[float, float, float] | None = None
+    G: PositionLoop | None = None
+    S: ForceLoop | None = None
     operator: bool = True
     inertia_shaping: bool = False
     clay: tuple[str, ...] | None = None
