@@ -7,7 +7,7 @@ import pkgutil
 from pathlib import Path
 
 SHARED = ("app", "commands", "console", "device_options", "manual", "options", "parser")
-SHARED += ("unused", "walls", "shim_fields")  # modules that are no commands
+SHARED += ("unused", "walls")  # modules that are no commands
 COMMANDS = {
     name: f"{__package__}.{name}"
     for _, name, _ in pkgutil.iter_modules([str(Path(__file__).parent)])

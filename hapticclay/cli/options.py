@@ -6,22 +6,11 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
-from typing import (
-    TYPE_CHECKING,
-    Annotated,
-    Any,
-    TypeVar,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 from ..errors import ParameterError
-from ..scene.field_kinds import union_members
-from ..scene.fields import field_descriptions
-from .shim_fields import Node, node_of, of_words
+from ..fields import UNSET, Node, field_descriptions, node_of, of_words
 
 if TYPE_CHECKING:
     from ..scene.experiments import Experiment
@@ -31,13 +20,42 @@ LOOSE, SCENARIO, RECORD = "loose", "scenario", "record"
 Loose = Annotated[T, LOOSE]  # a word without a name
 ScenarioWord = Annotated[Any, SCENARIO]  # an experiment, or a scenario file
 RecordWord = Annotated[Any, RECORD]  # or a saved record
-MISSING = dataclasses.MISSING
-RAW = {str: "a word", Path: "a path"}  # types of words that are taken as they stand
 SET = "set"  # the option for the fields of a scenario
 SET_HELP = (
     "Any field of the scenario, part by part, as in --set arm.l1=0.3 servo.x.G.damping=50 "
     "compensator.den=1,40,0 operator=true operator.mass=500g; hapticclay fields lists the names."
 )
+
+
+class Verbatim(Node):
+    """A text or a path as it was given, or any number of them."""
+
+    def __init__(self, kind: type, many: bool):
+        self.hint, self.arity = kind, math.inf if many else 1
+
+    def wants(self) -> str:
+        one = "a path" if self.hint is Path else "a word"
+        return one if self.arity == 1 else f"one or more, each {one}"
+
+    def check(self, field: str, value: Any, owner: Any = None) -> Any:
+        texts = (value,) if isinstance(value, str) else value
+        return self.hint(value) if self.arity == 1 else tuple(map(self.hint, texts))
+
+
+class Unlike(Node):
+    """Numbers with a unit each."""
+
+    takes_numbers = True
+
+    def __init__(self, items: Sequence[Node]):
+        self.items, self.arity = items, len(items)
+
+    def wants(self) -> str:
+        return f"{len(self.items)} numbers"
+
+    def check(self, field: str, value: Any, owner: Any = None) -> Any:
+        pairs = zip(self.items, value, strict=True)
+        return tuple(node.check(field, node.read(x, field)) for node, x in pairs)
 
 
 @dataclass(frozen=True)
@@ -51,7 +69,7 @@ class Option:
     """
 
     name: str
-    hint: Any
+    node: Node
     about: str
     default: Any
     part: str = ""
@@ -67,85 +85,39 @@ class Option:
         """The name as an error shows it."""
         return self.name if self.note else f"--{self.word}"
 
-    @cached_property
-    def kind(self) -> Any:
-        """The type without None where words are taken as they stand; the hint elsewhere."""
-        members = [x for x in union_members(self.hint) if x is not type(None)]
-        item = get_args(members[0])[0] if get_origin(members[0]) is tuple else members[0]
-        return members[0] if item in RAW or get_origin(item) is Annotated else self.hint
-
-    @cached_property
-    def entries(self) -> tuple[Node, ...]:
-        """The numbers of a tuple whose units differ; () for other types."""
-        items = get_args(self.kind) if get_origin(self.kind) is tuple else ()
-        return tuple(map(node_of, items)) if items and get_origin(items[0]) is Annotated else ()
-
-    @cached_property
-    def node(self) -> Node:
-        """The type in the field tree, where it is there."""
-        return node_of(self.hint)
-
     @property
-    def raw(self) -> Any:
-        """The type of a word that is taken as it stands; None for others."""
-        item = get_args(self.kind)[0] if get_origin(self.kind) is tuple else self.kind
-        return item if item in RAW else None
-
-    @property
-    def arity(self) -> float:
-        """The most words that the option takes; 0 for a flag, infinite for any number."""
-        if self.raw:
-            return math.inf if get_origin(self.kind) is tuple else 1
-        return len(self.entries) or self.node.arity
-
-    @property
-    def wants(self) -> str:
-        """What the option takes, in words."""
-        if self.raw:
-            return RAW[self.raw] if self.arity == 1 else f"one or more, each {RAW[self.raw]}"
-        return f"{len(self.entries)} numbers" if self.entries else self.node.wants()
+    def fills_pair(self) -> bool:
+        """Whether one word stands for two: as in --set, for the pairs of an experiment."""
+        return self.part == SCENARIO and self.node.arity == 2
 
     @property
     def metavar(self) -> str:
-        """What stands for the words of the option on a help page."""
-        if self.raw:
-            one = "PATH" if self.raw is Path else "TEXT"
+        """What stands for its words on a help page."""
+        if isinstance(self.node, Verbatim):
+            one = "PATH" if self.node.hint is Path else "TEXT"
         else:
-            nodes = self.entries or (self.node,)
-            one = "|".join(["NUMBER"] * nodes[0].takes_numbers + list(nodes[0].words))
-        return f"{one} ..." if self.arity == math.inf else " ".join([one] * int(self.arity))
+            one = "|".join(["NUMBER"] * self.node.takes_numbers + list(self.node.words))
+        many = self.node.arity == math.inf
+        return f"{one or 'TEXT'} ..." if many else " ".join([one] * int(self.node.arity))
 
     @property
     def has_default(self) -> bool:
-        """Whether the help page shows a default."""
-        return self.default not in (None, (), False, MISSING)
+        """Whether a help page shows a default."""
+        return self.default not in (None, (), False, UNSET)
 
-    def default_text(self, _: Any = None) -> str:
+    def default_text(self, _: Any) -> str:
         """The default on a help page."""
         value = self.default() if callable(self.default) else self.default
         items = value if isinstance(value, tuple) else (value,)
         return " ".join(f"{x:g}" if isinstance(x, float) else str(x) for x in items)
 
-    @property
-    def fills_pair(self) -> bool:
-        """Whether one word stands for two: as in --set, for the pairs of an experiment."""
-        return self.part == SCENARIO and self.arity == 2
-
-    def value(self, texts: tuple[str, ...]) -> Any:
+    def value(self, texts: Sequence[str]) -> Any:
         """The value that words stand for."""
-        if self.raw:
-            values = tuple(map(self.raw, texts))
-            return values if self.arity == math.inf else values[0]
-        if self.entries:
-            named = zip(self.entries, texts, strict=True)
-            return tuple(of_words(node, self.label, [text]) for node, text in named)
-        if texts == ("none",) and "none" in self.node.words:  # a word here, no lack of a value
-            return "none"
         return of_words(self.node, self.label, texts)
 
     def refused(self, texts: Sequence[str]) -> ParameterError:
-        """The error for a number of words that the option does not take."""
-        return ParameterError(self.label, " ".join(texts), f"must be {self.wants}")
+        """The error for words of which the option takes more or less."""
+        return ParameterError(self.label, " ".join(texts), f"must be {self.node.wants()}")
 
 
 def options_of(kind: type, part: str = "") -> dict[str, Option]:
@@ -153,25 +125,39 @@ def options_of(kind: type, part: str = "") -> dict[str, Option]:
     hints, about = get_type_hints(kind, include_extras=True), field_descriptions(kind)
     out: dict[str, Option] = {}
     for field in dataclasses.fields(kind):
-        hint = hints[field.name]
+        name, hint, default = field.name, hints[field.name], field.default
         if dataclasses.is_dataclass(hint):
-            out |= options_of(hint, field.name)  # type: ignore[arg-type]
+            out |= options_of(hint, name)  # type: ignore[arg-type]
             continue
+        if field.default_factory is not UNSET:
+            default = field.default_factory
         notes = getattr(hint, "__metadata__", ())
         note = next((x for x in (LOOSE, SCENARIO, RECORD) if x in notes), "")
-        default = field.default
-        if field.default_factory is not MISSING:
-            default = field.default_factory
-        hint = get_args(hint)[0] if note else hint
-        out[field.name] = Option(field.name, hint, about[field.name], default, part, note)
+        node = _option_node(get_args(hint)[0] if note else hint)
+        out[name] = Option(name, node, about[name], default, part, note)
     return out
+
+
+def _option_node(hint: Any) -> Node:
+    """The type of an option in the field tree, where a lack of a value is no word."""
+    kind = next((x for x in get_args(hint) if get_origin(x) is tuple or x in (str, Path)), hint)
+    many = get_origin(kind) is tuple
+    item = get_args(kind)[0] if many else kind
+    if item in (str, Path):
+        return Verbatim(item, many)
+    if many and get_origin(item) is Annotated:
+        return Unlike([node_of(x) for x in get_args(kind)])
+    node = node_of(hint)
+    if "none" in node.words:
+        node.none = False
+    return node
 
 
 def experiment_options(kind: type[Experiment]) -> dict[str, Option]:
     """The parameters of an experiment, as options."""
-    from ..scene.experiments import parameter_fields
+    from ..scene.experiments import parameters
 
     return {
-        f.name: Option(f.name, Annotated[f.hint, f.bound], f.about, f.default, SCENARIO)
-        for f in parameter_fields(kind)
+        name: Option(name, f.node, f.about, f.default, SCENARIO)
+        for name, f in parameters(kind).items()
     }

@@ -15,16 +15,16 @@ from typing import Annotated, Any, get_type_hints
 import cyclopts
 
 from ..errors import ParameterError, choice, nearest
-from ..scene.fields import field_descriptions
+from ..fields import UNSET, field_descriptions
 from ..units import is_quantity
 from .commands import COMMANDS, load_command
 from .options import (
-    MISSING,
     RECORD,
     SCENARIO,
     SET,
     SET_HELP,
     Option,
+    Verbatim,
     experiment_options,
     options_of,
 )
@@ -139,7 +139,7 @@ def begun(words: Sequence[str], whole: bool = True) -> tuple[Line, list[str]]:
         return line, rest
     of_scenario = experiment_options(EXPERIMENTS[source]) if origin == EXPERIMENT else {}
     if origin != RECORD:
-        of_scenario[SET] = Option(SET, tuple[str, ...], SET_HELP, (), SCENARIO)
+        of_scenario[SET] = Option(SET, Verbatim(str, many=True), SET_HELP, (), SCENARIO)
     own = {name: option for name, option in options.items() if name != SCENARIO}
     return replace(line, options=own | of_scenario, origin=origin, source=source), rest
 
@@ -184,8 +184,8 @@ def _first_loose(line: Line, words: list[str]) -> int | None:
     from ..scene.experiments import EXPERIMENTS
     from ..scene.files import is_scenario_file
 
-    arity = {f"--{option.word}": option.arity for option in line.options.values()}
-    arity |= {f"--no-{option.word}": 0 for option in line.options.values() if not option.arity}
+    arity = {f"--{option.word}": option.node.arity for option in line.options.values()}
+    arity |= {f"--no-{option.word}": 0 for option in line.options.values() if not option.node.arity}
     left: float = 0
     for i, word in enumerate(words):
         named = word in EXPERIMENTS or (is_scenario_file(word) and "=" not in word)
@@ -248,7 +248,7 @@ def help_text(kind: type) -> str:
 
 def _parameter(option: Option, group: cyclopts.Group) -> inspect.Parameter:
     """An option as a parameter of a function, as cyclopts reads it."""
-    arity, many = option.arity, option.arity == math.inf
+    arity, many = option.node.arity, option.node.arity == math.inf
     settings: dict[str, Any] = {
         "help": option.about[:1].upper() + option.about[1:],
         "show_default": option.has_default and option.default_text,
@@ -266,7 +266,7 @@ def _parameter(option: Option, group: cyclopts.Group) -> inspect.Parameter:
         kind = inspect.Parameter.VAR_POSITIONAL
         settings = {"help": settings["help"]}
     hint: Any = bool if not arity else str if arity == 1 or option.note else tuple[str, ...]
-    needed = option.default is MISSING or kind == inspect.Parameter.VAR_POSITIONAL
+    needed = option.default is UNSET or kind == inspect.Parameter.VAR_POSITIONAL
     return inspect.Parameter(
         option.name,
         kind,
@@ -294,7 +294,7 @@ def _refusal(error: cyclopts.CycloptsError, line: Line) -> ParameterError:
     option = line.options[found]
     if isinstance(error, cyclopts.MissingArgumentError):
         if option.note:
-            return _refused(f"{line.path} needs {option.word}: {option.wants}")
+            return _refused(f"{line.path} needs {option.word}: {option.node.wants()}")
         return option.refused(error.tokens_so_far)
     token = getattr(error, "token", None)
     return option.refused([token.value] if token else [])
@@ -320,7 +320,7 @@ def _unexpected(word: str, line: Line) -> ParameterError:
 
 def _option_names(line: Line) -> list[str]:
     options = [option for option in line.options.values() if not option.note]
-    return [o.word for o in options] + [f"no-{o.word}" for o in options if not o.arity]
+    return [o.word for o in options] + [f"no-{o.word}" for o in options if not o.node.arity]
 
 
 def _refused(text: str) -> ParameterError:

@@ -30,8 +30,8 @@ class ReproduceCommand:
 
     Attributes:
         source: The classic; none for the paper of 2002.
-        out: Folder for report.html (self-contained), report.md, ledger.json and figures/; by default
-            out/paper, or out/CLASSIC.
+        out: Folder for report.html (self-contained), report.md, ledger.json and figures/; by
+            default out/paper, or out/CLASSIC.
         quick: Omit the map of Sh over the workspace; for a classic, make fewer runs.
         page: Also write the table of numbers alone, as Markdown, to this file; of a classic, with
             its figures beside it.

@@ -16,7 +16,7 @@ from .options import Loose
 from .unused import Unused
 
 if TYPE_CHECKING:
-    from ..studies.wall_lines import Wall
+    from ..studies.wall import Subject
     from ..studies.zwidth import ZRegion, ZWidth
 
 ZWIDTH_SCHEMA = "hapticclay-zwidth-1"
@@ -104,14 +104,14 @@ class ZWidthCommand:
         print(f"written to {self.out}")
         return 0
 
-    def _wall(self) -> Wall:
+    def _wall(self) -> Subject:
         if self.arm:
             return self._arm(self.arm)
         if self.gain is not None:
             raise ParameterError("gain", self.gain, "is for the arm: give --arm x or y")
         return self.device.wall(self.source)
 
-    def _arm(self, axis: Literal["x", "y"]) -> Wall:
+    def _arm(self, axis: Literal["x", "y"]) -> Subject:
         from ..scene.changes import with_fields
         from ..studies.boundary import PushedLoop
 
@@ -123,7 +123,7 @@ class ZWidthCommand:
         loop = PushedLoop(axis, K=gain, Ts=TS, operator=walls.operator_of(self.device.hand))
         return with_fields(loop, self.device.timing)
 
-    def _values(self, wall: Wall) -> list[Any]:
+    def _values(self, wall: Subject) -> list[Any]:
         """The values behind --vary."""
         from ..scene.changes import named_values
 
