@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay import errors, units
 from hapticclay.cli import app
-from hapticclay.cli import words as cli_words
 from hapticclay.errors import ParameterError
 from hapticclay.fields import nodes_of
 from hapticclay.scene.experiments import EXPERIMENTS
@@ -324,15 +323,6 @@ def test_options_take_units(words, same):
 def test_options_refuse_another_kind_of_unit(words):
     with pytest.raises(ParameterError, match="--b = '90kg': must be a number in N.s/m, not in kg"):
         app.parse_words(words.split())
-
-
-def test_every_option_with_a_number_says_its_unit_in_a_known_way():
-    """What stands in brackets in the help is a unit, or a list of them."""
-    for command in app.COMMANDS:
-        for name, told in cli_words._option_units([command]).items():
-            kind = cli_words.options([command]).get(name)
-            if float in cli_words._members(kind) and told not in ("", "pixels/inch"):
-                assert all(units.parse_unit(x) for x in told.split(", ")), (command, name, told)
 
 
 @given(st.floats(allow_nan=False), st.sampled_from(["", "e", ".3e", "E", "+.2E", "g"]))

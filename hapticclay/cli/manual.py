@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 from collections.abc import Sequence
 
 import cyclopts
@@ -10,6 +12,7 @@ from . import parser
 from .commands import COMMANDS, load_command
 from .options import SCENARIO
 
+NARROWEST = 20  # columns of a terminal in which help is laid out; in five that never ends
 ABOUT = "Virtual clay, cut with a simulated haptic arm."
 MORE = "hapticclay COMMAND --help shows the options of a command."
 
@@ -26,6 +29,8 @@ def print_help(words: Sequence[str]) -> None:
         app = parser.app_of(line)
         if SCENARIO in line.options:
             _add_experiments(app, line)
+    if shutil.get_terminal_size().columns < NARROWEST:
+        os.environ["COLUMNS"] = str(NARROWEST)
     app.help_print([])
 
 

@@ -4,10 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import types
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 from ..errors import ParameterError
 from ..fields import UNSET, Node, field_descriptions, node_of, of_words
@@ -28,33 +38,33 @@ SET_HELP = (
 
 
 class Verbatim(Node):
-    """A text or a path as it was given, or any number of them."""
+    """A text or a path as it was given."""
 
-    def __init__(self, kind: type, many: bool):
-        self.hint, self.arity = kind, math.inf if many else 1
-
-    def wants(self) -> str:
-        one = "a path" if self.hint is Path else "a word"
-        return one if self.arity == 1 else f"one or more, each {one}"
-
-    def check(self, field: str, value: Any, owner: Any = None) -> Any:
-        texts = (value,) if isinstance(value, str) else value
-        return self.hint(value) if self.arity == 1 else tuple(map(self.hint, texts))
-
-
-class Unlike(Node):
-    """Numbers with a unit each."""
-
-    takes_numbers = True
-
-    def __init__(self, items: Sequence[Node]):
-        self.items, self.arity = items, len(items)
+    def __init__(self, kind: type):
+        self.hint = kind
 
     def wants(self) -> str:
-        return f"{len(self.items)} numbers"
+        return "a path" if self.hint is Path else "a word"
 
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
-        pairs = zip(self.items, value, strict=True)
+        return self.hint(value)
+
+
+class Several(Node):
+    """Values with a type each, or any number of values of one type."""
+
+    def __init__(self, items: Sequence[Node], many: bool):
+        self.items, self.many, self.takes_numbers = items, many, items[0].takes_numbers
+        self.arity = math.inf if many else len(items)
+
+    def wants(self) -> str:
+        one = self.items[0].wants()
+        return f"one or more, each {one}" if self.many else f"{len(self.items)} numbers"
+
+    def check(self, field: str, value: Any, owner: Any = None) -> Any:
+        values = value if isinstance(value, list) else [value]
+        nodes = [*self.items] * len(values) if self.many else self.items
+        pairs = zip(nodes, values, strict=True)
         return tuple(node.check(field, node.read(x, field)) for node, x in pairs)
 
 
@@ -93,12 +103,12 @@ class Option:
     @property
     def metavar(self) -> str:
         """What stands for its words on a help page."""
-        if isinstance(self.node, Verbatim):
-            one = "PATH" if self.node.hint is Path else "TEXT"
-        else:
-            one = "|".join(["NUMBER"] * self.node.takes_numbers + list(self.node.words))
+        node = self.node.items[0] if isinstance(self.node, Several) else self.node
+        one = "|".join(["NUMBER"] * node.takes_numbers + list(node.words))
+        if isinstance(node, Verbatim):
+            one = "PATH" if node.hint is Path else "TEXT"
         many = self.node.arity == math.inf
-        return f"{one or 'TEXT'} ..." if many else " ".join([one] * int(self.node.arity))
+        return f"{one} ..." if many else " ".join([one] * int(self.node.arity))
 
     @property
     def has_default(self) -> bool:
@@ -140,13 +150,15 @@ def options_of(kind: type, part: str = "") -> dict[str, Option]:
 
 def _option_node(hint: Any) -> Node:
     """The type of an option in the field tree, where a lack of a value is no word."""
-    kind = next((x for x in get_args(hint) if get_origin(x) is tuple or x in (str, Path)), hint)
-    many = get_origin(kind) is tuple
-    item = get_args(kind)[0] if many else kind
-    if item in (str, Path):
-        return Verbatim(item, many)
-    if many and get_origin(item) is Annotated:
-        return Unlike([node_of(x) for x in get_args(kind)])
+    bare, *notes = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+    members = get_args(bare) if get_origin(bare) in (Union, types.UnionType) else (bare,)
+    kind, *others = (x for x in members if x is not type(None))
+    items = get_args(kind) if get_origin(kind) is tuple else ()
+    if kind in (str, Path) and not others:
+        return Verbatim(kind)
+    if items[1:] == (...,) or (items and get_origin(items[0]) is Annotated):
+        each = [Annotated[(x, *notes)] if notes else x for x in items if x is not ...]
+        return Several([_option_node(x) for x in each], items[-1] is ...)
     node = node_of(hint)
     if "none" in node.words:
         node.none = False

@@ -24,6 +24,7 @@ from .options import (
     SET,
     SET_HELP,
     Option,
+    Several,
     Verbatim,
     experiment_options,
     options_of,
@@ -139,7 +140,7 @@ def begun(words: Sequence[str], whole: bool = True) -> tuple[Line, list[str]]:
         return line, rest
     of_scenario = experiment_options(EXPERIMENTS[source]) if origin == EXPERIMENT else {}
     if origin != RECORD:
-        of_scenario[SET] = Option(SET, Verbatim(str, many=True), SET_HELP, (), SCENARIO)
+        of_scenario[SET] = Option(SET, Several([Verbatim(str)], many=True), SET_HELP, (), SCENARIO)
     own = {name: option for name, option in options.items() if name != SCENARIO}
     return replace(line, options=own | of_scenario, origin=origin, source=source), rest
 

@@ -46,8 +46,8 @@ class DeviceOptions:
         unilateral: The wall has a surface and never pulls.
     """
 
-    mass: Mass | None = None
-    damper: Damper | None = None
+    mass: Annotated[float | None, Bound(unit="kg")] = None
+    damper: Annotated[float | None, Bound(unit="N.s/m")] = None
     friction: Annotated[float | None, Bound(unit="N")] = None
     quantum: Annotated[float | None, Bound(unit="m")] = None
     Ts: Annotated[OrNone, Bound(unit="s")] = None
@@ -108,9 +108,9 @@ class WallOptions(DeviceOptions):
         M: Virtual mass [kg].
     """
 
-    K: Spring | None = None
-    B: Damper | None = None
-    M: Mass | None = None
+    K: Annotated[float | None, Bound(unit="N/m")] = None
+    B: Annotated[float | None, Bound(unit="N.s/m")] = None
+    M: Annotated[float | None, Bound(unit="kg")] = None
 
 
 def operator_of(hand: Hand | None) -> Any:

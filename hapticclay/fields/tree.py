@@ -260,7 +260,10 @@ class Either(Node):
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
         if value is None and self.none:
             return None
-        return self.member(value).check(field, value, owner)
+        member = self.member(value)
+        if isinstance(member, Word) and self.takes_numbers:
+            return choice(field, value, self.words, self.wants())
+        return member.check(field, value, owner)
 
     def _read(self, value: Any, path: str, old: Any) -> Any:
         return self.member(value, old).read(value, path, old)
