@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Sequence
 
 import cyclopts
+from rich.console import Console
 
 from . import parser
 from .commands import COMMANDS, load_command
@@ -29,9 +30,9 @@ def print_help(words: Sequence[str]) -> None:
         app = parser.app_of(line)
         if SCENARIO in line.options:
             _add_experiments(app, line)
-    if shutil.get_terminal_size().columns < NARROWEST:
-        os.environ["COLUMNS"] = str(NARROWEST)
-    app.help_print([])
+    width = max(shutil.get_terminal_size().columns, NARROWEST)
+    color = None if os.environ.get("NO_COLOR") else "auto"
+    app.help_print([], console=Console(width=width, color_system=color))
 
 
 def _add_experiments(app: cyclopts.App, line: parser.Line) -> None:
