@@ -16,8 +16,10 @@ from .nodes import ENTIRE as ENTIRE
 from .nodes import JOINTS as JOINTS
 from .nodes import KIND as KIND
 from .nodes import UNSET as UNSET
+from .nodes import Axis as Axis
 from .nodes import Field as Field
 from .nodes import Node as Node
+from .nodes import Seed as Seed
 from .nodes import function_name as function_name
 from .nodes import join_names as join_names
 from .nodes import no_field as no_field

@@ -10,13 +10,12 @@ import os
 import pkgutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from ..errors import (
     Bound,
     ParameterError,
     choice,
-    flag,
     integer,
     is_series,
     nearest,
@@ -28,6 +27,8 @@ from ..errors import (
 from ..units import is_quantity
 
 AXES = ("x", "y")
+Axis = Literal["x", "y"]
+Seed = Annotated[int, Bound(0, 2**32 - 1)]
 JOINTS = ("shoulder", "elbow")  # also named x and y
 KIND = "kind"  # key of the class, for a field of several classes
 ENTIRE = None  # key of the value of a whole field, besides those of its entries
@@ -51,6 +52,7 @@ class Node:
     bound, none, takes_numbers = Bound(), False, False
     words: tuple[str, ...] = ()
     arity: float = 1
+    members: Sequence[Node] = ()  # whose parts are its parts
 
     def wants(self) -> str:
         """What it takes, in words that follow "must be"."""
@@ -58,6 +60,8 @@ class Node:
 
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
         """The value as the field keeps it; owner has the fields that bounds name."""
+        if not self.fits(value):
+            raise ParameterError(field, value, f"must be {self.wants()}")
         return value
 
     def fits(self, value: Any, old: Any = UNSET) -> bool:
@@ -94,11 +98,17 @@ class Node:
 
     def classes(self) -> dict[str, type]:
         """Classes of the parts that it takes, by lower-case name."""
-        return {}
+        return {name: kind for node in self.members for name, kind in node.classes().items()}
 
     def bounds_at(self, names: Sequence[str]) -> list[Bound]:
         """Bounds of the values at a dotted name below; none where there is no such name."""
-        return [] if names else [self.bound]
+        if not names:
+            return [self.bound]
+        return [bound for node, rest in self.below(*names) for bound in node.bounds_at(rest)]
+
+    def below(self, name: str, *rest: str) -> Iterable[tuple[Node, Sequence[str]]]:
+        """Nodes of a name, and the names below each."""
+        return ()
 
     def leaves(self, path: str, default: Any, about: str) -> Iterator[Field]:
         """The fields below it that take numbers or words; itself if it has no parts."""
@@ -189,8 +199,8 @@ class Flag(Node):
     def wants(self) -> str:
         return "True or False"
 
-    def check(self, field: str, value: Any, owner: Any = None) -> Any:
-        return flag(field, value)
+    def fits(self, value: Any, old: Any = UNSET) -> bool:
+        return isinstance(value, bool)
 
     def _read(self, value: Any, path: str, old: Any) -> Any:
         if isinstance(value, float) and value in (0.0, 1.0):
@@ -215,18 +225,16 @@ class Word(Node):
 
 
 class Text(Node):
-    """A text that is not empty."""
+    """A text, which may be empty where the default is."""
+
+    def __init__(self, empty: bool = False):
+        self.empty = empty
 
     def wants(self) -> str:
-        return "a non-empty string"
-
-    def check(self, field: str, value: Any, owner: Any = None) -> Any:
-        if not isinstance(value, str) or not value:
-            raise ParameterError(field, value, f"must be {self.wants()}")
-        return value
+        return "a string" if self.empty else "a non-empty string"
 
     def fits(self, value: Any, old: Any = UNSET) -> bool:
-        return isinstance(value, str)
+        return isinstance(value, str) and (self.empty or value != "")
 
 
 @functools.lru_cache(maxsize=64)
@@ -304,12 +312,9 @@ class Numbers(Node):
         also = AXES if names == JOINTS else ()
         return {x: i for row in (names, also, place_names(len(names))) for i, x in enumerate(row)}
 
-    def bounds_at(self, names: Sequence[str]) -> list[Bound]:
-        if not names:
-            return [self.bound]
-        first, *rest = names
-        found = first.isdecimal() if self.any_length else first in self._places(0)
-        return self.item.bounds_at(rest) if found else []
+    def below(self, name: str, *rest: str) -> Iterable[tuple[Node, Sequence[str]]]:
+        found = name.isdecimal() if self.any_length else name in self._places(0)
+        return [(self.item, rest)] * found
 
 
 CLASS_WORDS: dict[Any, str] = {
