@@ -11,7 +11,7 @@ from rich.console import Console
 
 from . import parser
 from .commands import COMMANDS, load_command
-from .options import SCENARIO
+from .options import RECORD, SCENARIO
 
 NARROWEST = 20  # columns of a terminal in which help is laid out; in five that never ends
 ABOUT = "Virtual clay, cut with a simulated haptic arm."
@@ -40,6 +40,8 @@ def _add_experiments(app: cyclopts.App, line: parser.Line) -> None:
 
     for name, kind in EXPERIMENTS.items():
         _list(app, name, kind, group="Experiments")
+    record = "|RECORD" if line.options[SCENARIO].note == RECORD else ""
+    app.usage = f"Usage: hapticclay {line.name} EXPERIMENT|FILE{record} [OPTIONS]"
     app.help_epilogue = f"hapticclay {line.name} EXPERIMENT --help shows the options of one."
 
 
