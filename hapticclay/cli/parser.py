@@ -128,16 +128,11 @@ def begun(words: Sequence[str], whole: bool = True) -> tuple[Line, list[str]]:
     kind = load_command(choice("command", name, tuple(COMMANDS)))
     options = options_of(kind)
     line = Line(name, kind, options)
-    if SCENARIO not in options:
+    if SCENARIO not in options or (not whole and _first_loose(line, rest) is None):
         return line, rest
     from ..scene.experiments import EXPERIMENTS
 
-    try:
-        origin, source, rest = _scenario_of(line, rest)
-    except ParameterError as error:
-        if whole or error.field != "arguments":
-            raise
-        return line, rest
+    origin, source, rest = _scenario_of(line, rest)
     of_scenario = experiment_options(EXPERIMENTS[source]) if origin == EXPERIMENT else {}
     if origin != RECORD:
         of_scenario[SET] = Option(SET, Several([Verbatim(str)], many=True), SET_HELP, (), SCENARIO)
