@@ -9,11 +9,9 @@ from typing import Annotated, Literal
 import tyro
 
 from ..errors import ParameterError
-from ..files import atomic, versions, writable
+from ..files import writable
 from ..model.constants import AXES
 from . import console
-
-COMPARE_SCHEMA = "hapticclay-compare-1"
 
 
 @dataclass(frozen=True)
@@ -33,9 +31,8 @@ class CompareCommand:
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
-        from ..paper.comparison import comparison_page, number_rows
-        from ..studies.comparison import compare_files, differing_fields, is_wall_file
-        from ..views.compare_plots import compare_figures
+        from ..paper.comparison import comparison_page
+        from ..studies.comparison import compare_files, is_wall_file
 
         writable(self.out)
         if self.axis and all(is_wall_file(x) for x in self.source):
@@ -45,21 +42,7 @@ class CompareCommand:
             self.axis or AXES[0],
             lambda files: console.progress_bar(files, desc="files"),
         )
-        rows = [[name, *cells] for name, cells in number_rows(found).items()]
-        try:
-            with atomic(self.out / "compare.html") as f:
-                f.write(comparison_page(found).encode())
-            data = {
-                "schema": COMPARE_SCHEMA,
-                "files": {x.name: x.numbers for x in found},
-                "fields": differing_fields(found),
-                "versions": versions(),
-            }
-            console.save_json(data, self.out / "compare.json")
-            figures = {name: figure for name, (_, figure) in compare_figures(found).items()}
-            console.save_figures(figures, self.out, self.figures)
-        finally:  # a full disk must not hide the results
-            names = [x.name for x in found]
-            print(console.text_table(rows, ["", *names], "l" + "r" * len(names)))
+        pages = {"compare.html": lambda: comparison_page(found)}
+        console.deliver(found, self.out, self.figures, pages=pages)
         print(f"page: {(self.out / 'compare.html').resolve()}")
         return 0

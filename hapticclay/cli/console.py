@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import inspect
-import json
-import math
 import re
+import shutil
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,6 +20,7 @@ from ..errors import number
 from ..files import atomic
 
 if TYPE_CHECKING:
+    from ..results import Result
     from ..scene.experiments import Experiment
     from ..scene.scenario import Scenario
     from ..views.figure import Figure
@@ -158,40 +159,25 @@ def fraction_bar(title: str) -> Iterator[Callable[..., None]]:
         yield show
 
 
-def text_table(
-    rows: Sequence[Sequence[str]], head: Sequence[str], align: str, form: str = "simple"
-) -> str:
-    """A table for a terminal, or a page.
+def announce(runs: str, seconds: float, crew: int, size: float, folder: Path) -> None:
+    """Prints the time and the room on disk that runs will take, before they begin.
 
     Args:
-        rows: its cells.
-        head: its column titles.
-        align: a letter a column, "l" for left, "r" for right.
-        form: "simple", or "pipe" for Markdown.
+        runs: the runs, in words.
+        seconds: their time [s].
+        crew: number of processes.
+        size: room that they take [bytes].
+        folder: where they are stored.
     """
-    from tabulate import tabulate
+    from tqdm import tqdm
 
-    sides = [{"l": "left", "r": "right"}[a] for a in align]
-    return tabulate(rows, head, form, colalign=sides if rows else None, disable_numparse=True)
-
-
-def fixed(x: float | None, digits: int) -> str:
-    """x with a number of decimals, without a negative zero; "-" for None.
-
-    Args:
-        x: the number.
-        digits: decimals.
-    """
-    return "-" if x is None else f"{round(x, digits) + 0.0:.{digits}f}"
-
-
-def significant(x: float) -> str:
-    """x with four significant digits; "-" for NaN, "any" for infinity.
-
-    Args:
-        x: the number.
-    """
-    return "-" if math.isnan(x) else "any" if x == math.inf else f"{x:.4g}"
+    free = shutil.disk_usage(folder.parent).free
+    print(
+        f"hapticclay: {runs}: about {tqdm.format_interval(seconds)} on {crew} "
+        f"process{'es' if crew > 1 else ''}, {tqdm.format_sizeof(size, 'B')} in {folder} "
+        f"({'only ' if free < size else ''}{tqdm.format_sizeof(free, 'B')} free)",
+        file=sys.stderr,
+    )
 
 
 @contextlib.contextmanager
@@ -293,25 +279,35 @@ def save_figures(
     return {name: files for name, files in written.items() if files}
 
 
-def save_json(data: Any, file: Path) -> None:
-    """Writes data as JSON, whole or not at all; null stands for NaN and infinity.
+def deliver(
+    found: Result,
+    out: Path,
+    figures: FigureOptions | None = None,
+    *,
+    text: str | None = None,
+    pages: Mapping[str, Callable[[], str]] | None = None,
+    **asked: Any,
+) -> None:
+    """Writes a result as NAME.json, its figures and pages, and prints it.
 
     Args:
-        data: dictionaries, sequences, arrays, numbers and texts.
-        file: where to.
+        found: the result.
+        out: where to.
+        figures: formats and style of the figures; None for no figures.
+        text: what to print in place of `found.text()`.
+        pages: texts of further files, by file name.
+        **asked: the question, as NAME.json repeats it.
 
     Raises:
-        ParameterError: the file cannot be written.
+        ParameterError: a file cannot be written; the result is printed nevertheless.
     """
-    with atomic(file) as f:
-        f.write((json.dumps(_json_ready(data), indent=2, allow_nan=False) + "\n").encode())
-
-
-def _json_ready(x: Any) -> Any:
-    if hasattr(x, "tolist"):  # an array or a number of NumPy, which is not imported here
-        x = x.tolist()
-    if isinstance(x, dict):
-        return {k: _json_ready(v) for k, v in x.items()}
-    if isinstance(x, list | tuple):
-        return [_json_ready(v) for v in x]
-    return None if isinstance(x, float) and not math.isfinite(x) else x
+    try:
+        found.write(out, asked)
+        for name, page in (pages or {}).items():
+            with atomic(out / name) as f:
+                f.write(page().encode())
+        if figures is not None:
+            save_figures(found.figures(), out, figures)
+    finally:  # a full disk must not hide the result
+        print(found.text() if text is None else text, end="\n" if text != "" else "")
+    print(f"written to {out}")

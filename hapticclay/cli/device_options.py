@@ -15,7 +15,6 @@ from . import console
 if TYPE_CHECKING:
     from ..live.session import Session
     from ..ports.exchanges import Exchanges
-    from ..ports.report import LoopReport
     from ..scene.scenario import Scenario
     from ..studies.removal import Tool
 
@@ -158,27 +157,4 @@ def write_report(
     """Writes and prints the report of a loop."""
     from ..ports.report import loop_report
 
-    found = loop_report(exchanges, scenario)
-    try:
-        found.save(folder / "loop.json")
-        if figures is not None and found.line_K:  # without a wall there is nothing to show
-            _draw(found, folder, figures)
-    finally:  # a full disk must not hide the result
-        print(report_table(found))
-        print(found.headline())
-
-
-def _draw(found: LoopReport, folder: Path, figures: console.FigureOptions) -> None:
-    from ..views.figure import Figure
-    from ..views.loop_plots import loop_plot
-
-    console.save_figures({"loop": Figure(lambda: loop_plot(found), found.tables)}, folder, figures)
-
-
-def report_table(found: LoopReport) -> str:
-    """The report for a terminal."""
-    rows = [
-        (name, value if isinstance(value, str) else console.significant(value))
-        for name, (value,) in found.tables()["report"].items()
-    ]
-    return console.text_table(rows, ("loop", ""), "lr")
+    console.deliver(loop_report(exchanges, scenario), folder, figures)

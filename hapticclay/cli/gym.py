@@ -7,8 +7,9 @@ from typing import Annotated, ClassVar, Literal
 
 import tyro
 
+from ..display import text_table
 from ..errors import integer
-from .console import progress_bar, text_table
+from .console import progress_bar
 from .unused import Unused
 
 SEEDS, EPISODES, NOISE = 100, 100, 0.1  # where none is given
@@ -59,16 +60,20 @@ class GymCommand:
         from ..gym import baselines, scores
 
         seeds = integer("seeds", SEEDS if self.seeds is None else self.seeds, 2, 100_000)
-        rows, means = [], {}
-        for name, maker in baselines.BASELINES[self.env].items():
-            found = baselines.returns(self.env, maker, range(seeds), engine=self.engine)
-            means[name], half = baselines.mean_of(found.total)
-            rows.append([name, f"{means[name]:.2f}", f"{half:.2f}", f"{found.length.mean():.0f}"])
-        columns = ["policy", "return", "95 % interval +-", "periods"]
-        if score := scores.scores_of(self.env, means):
-            columns.append("score")
-            rows = [[*row, f"{score[row[0]]:.2f}"] for row in rows]
-        print(text_table(rows, columns, "lrrrr"[: len(columns)]))
+        found = {
+            name: baselines.returns(self.env, maker, range(seeds), engine=self.engine)
+            for name, maker in baselines.BASELINES[self.env].items()
+        }
+        means = {name: baselines.mean_of(x.total) for name, x in found.items()}
+        table: dict[str, list] = {
+            "policy": list(found),
+            "return": [mean for mean, _ in means.values()],
+            "95 % interval +-": [half for _, half in means.values()],
+            "periods": [x.length.mean() for x in found.values()],
+        }
+        if score := scores.scores_of(self.env, {name: mean for name, (mean, _) in means.items()}):
+            table["score"] = [score[name] for name in found]
+        print(text_table(table, dict.fromkeys(table, ".2f") | {"periods": ".0f"}))
         return 0
 
     def _dataset(self) -> int:

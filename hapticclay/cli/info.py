@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from ..display import one_line, printable
+from ..display import one_line, printable, text_table
 from ..files import versions
 from . import console
 
@@ -74,14 +74,16 @@ def array_table(record: Record) -> str:
     arrays = recorded_arrays(record)
     if record.ground is not None:
         arrays["ground"] = record.ground
-    rows = []
-    for name, x in arrays.items():
-        known = x[np.isfinite(x)]
-        ends = [f"{v():.6g}" for v in (known.min, known.max)] if known.size else ["-", "-"]
-        shape = " x ".join(map(str, x.shape))
-        rows.append([name, shape, ARRAY_UNITS.get(name, "m"), *ends, LONG_NAMES[name]])
-    head = ("array", "shape", "unit", "lowest", "highest", "what it is")
-    return console.text_table(rows, head, "lrlrrl")
+    known = [x[np.isfinite(x)] for x in arrays.values()]
+    table = {
+        "array": list(arrays),
+        "shape": [" x ".join(map(str, x.shape)) for x in arrays.values()],
+        "unit": [ARRAY_UNITS.get(name, "m") for name in arrays],
+        "lowest": [x.min() if x.size else np.nan for x in known],
+        "highest": [x.max() if x.size else np.nan for x in known],
+        "what it is": [LONG_NAMES[name] for name in arrays],
+    }
+    return text_table(table, {"lowest": ".6g", "highest": ".6g"})
 
 
 def _size_text(size: float) -> str:

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from ..display import text_table
 from ..files import atomic, writable
-from .console import FigureOptions, progress_bar, save_figures, text_table
+from .console import FigureOptions, progress_bar, save_figures
 
 if TYPE_CHECKING:
     from ..paper.ledger import Row
@@ -95,14 +96,12 @@ def claims_table(rows: Sequence[Row]) -> str:
     """The claims of a classic, for a terminal."""
     from ..paper.report import format_error, format_number, format_verdict
 
-    cells = [
-        [
-            textwrap.fill(r.what, WIDE),
-            format_number(r.expected, r.unit),
-            format_number(r.ours, r.unit),
-            format_error(r),
-            format_verdict(r),
-        ]
-        for r in rows
-    ]
-    return text_table(cells, ["claim", "expected", "ours", "error", "agrees"], "lrrrl")
+    return text_table(
+        {
+            "claim": [textwrap.fill(r.what, WIDE) for r in rows],
+            "expected": [format_number(r.expected, r.unit) for r in rows],
+            "ours": [format_number(r.ours, r.unit) for r in rows],
+            "error": [format_error(r) for r in rows],
+            "agrees": [format_verdict(r) for r in rows],
+        }
+    )

@@ -142,23 +142,12 @@ class SweepCommand:
 
     def _estimate(self, plan: Sweep, left: int, todo: list[range]) -> None:
         """Prints the time and room on disk that the runs left will take."""
-        import shutil
-
-        from tqdm import tqdm
-
         from ..studies import store_runs, sweep
 
-        seconds, size = sweep.estimate_time(plan)
+        each, size = sweep.estimate_time(plan)
         crew = 1 if self.scheduler else store_runs.processes(plan, todo, self.workers)
-        span = tqdm.format_interval(seconds * left / crew)
-        free, room = shutil.disk_usage(self.out).free, size * left
-        print(
-            f"hapticclay: {left} runs, {1e3 * seconds:.3g} ms each: about {span} on {crew} "
-            f"process{'es' if crew > 1 else ''}, {tqdm.format_sizeof(room, 'B')} in "
-            f"{self.out / 'data'} ({'only ' if free < room else ''}"
-            f"{tqdm.format_sizeof(free, 'B')} free)",
-            file=sys.stderr,
-        )
+        runs, data = f"{left} runs, {1e3 * each:.3g} ms each", self.out / "data"
+        console.announce(runs, each * left / crew, crew, size * left, data)
 
     def _draw(self, table: Any) -> None:
         from ..views import sweep_plots

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import math
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import tyro
 
 from ..errors import ParameterError
-from ..files import versions, writable
+from ..files import writable
 from ..model.constants import GAIN, TS
 from . import console, walls
 from .unused import Unused
 
 if TYPE_CHECKING:
     from ..studies.wall import Subject
-    from ..studies.zwidth import ZRegion, ZWidth
-
-ZWIDTH_SCHEMA = "hapticclay-zwidth-1"
 
 
 @dataclass(frozen=True)
@@ -71,8 +67,6 @@ class ZWidthCommand:
         from ..scene.changes import with_fields
         from ..studies.wall_runs import Press
         from ..studies.zwidth import zwidth
-        from ..views.figure import Figure
-        from ..views.wall_plots import zwidth_plot
 
         writable(self.out)
         tried = walls.quantities({n: getattr(self, n) for n in ("force", "speed", "still")})
@@ -89,19 +83,10 @@ class ZWidthCommand:
                 quick=self.quick,
                 progress=show,
             )
-        data = {"schema": ZWIDTH_SCHEMA, "wall": asdict(wall), "vary": self.vary, "box": self.box,
-                "press": asdict(press), "tables": found.tables(), "gap": found.gap(),
-                "violations": found.violations(), "versions": versions()}  # fmt: skip
-        try:
-            console.save_json(data, self.out / "zwidth.json")
-            figure = Figure(lambda: zwidth_plot(found), found.tables)
-            console.save_figures({"zwidth": figure}, self.out, self.figures)
-        finally:  # a full disk must not hide the result
-            print(zwidth_table(found))
+        console.deliver(found, self.out, self.figures, wall=wall, vary=self.vary, box=self.box)
         if tried and all(r.linear for r in found.regions):
             told = f"{', '.join(f'--{name}' for name in tried)} did not count: no push tries a loop"
             print(f"hapticclay: {told} that is linear, its growth rate does", file=sys.stderr)
-        print(f"written to {self.out}")
         return 0
 
     def _wall(self) -> Subject:
@@ -134,34 +119,3 @@ class ZWidthCommand:
             bound = "must be a name and its values, as in --vary damper 0.2 0.5"
             raise ParameterError("vary", self.vary[0], bound)
         return [named_values("--vary", [f"x={word}"])["x"] for word in self.vary[1:]]
-
-
-def zwidth_table(found: ZWidth) -> str:
-    """The regions and what was found beside theory, for a terminal."""
-    number = console.significant
-    rows = []
-    for r in found.regions:
-        gap = "-" if math.isnan(r.gap()) else f"{100.0 * r.gap():.2g} %"
-        sizes = [r.K[0], r.largest_K, r.largest_B, r.area]
-        rows.append([r.name or "-", *map(number, sizes), r.verdict, gap])
-    head = ["region", "K at least B", "largest K", "largest B", "area", "verdict", "from exact"]
-    lines = [console.text_table(rows, head, "lrrrrll")]
-    lines.append("K [N/m], B [N.s/m], area [N^2.s/m^2]")
-    lines += [_top_told(r) for r in found.regions if len(r.B) > 1]
-    if not math.isnan(found.gap()):
-        lines.append(f"runs against the exact linear loop: within {100.0 * found.gap():.2g} %")
-    if rough := [r for r in found.regions if not r.linear]:
-        lines.append(
-            f"rest: back and forth by {1e6 * found.press.still:g} um at most, after a push of "
-            f"{found.press.force:g} N at {1e3 * found.press.speed:g} mm/s"
-            f" ({len(rough)} of {len(found.regions)} regions)"
-        )
-    below = found.violations()
-    lines += below or ["no run was unstable below a line that is sufficient"]
-    return "\n".join(lines)
-
-
-def _top_told(r: ZRegion) -> str:
-    """Where the largest K lies: between the tested dampings it is not known."""
-    name, (low, high) = f"{r.name}: " if r.name else "", r.top_between
-    return f"{name}between B = {low:.4g} and {high:.4g}, of {len(r.B)} tried, K may be larger"

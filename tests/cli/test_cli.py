@@ -14,8 +14,9 @@ import pytest
 from matplotlib.figure import Figure
 
 import hapticclay as hc
-from hapticclay.cli import app, console
+from hapticclay.cli import app
 from hapticclay.cli.words import ordered
+from hapticclay.display import cell_text
 from hapticclay.simulation import record, simulate
 from hapticclay.views import run_figures
 
@@ -503,7 +504,7 @@ def test_the_table_fits_a_terminal_and_knows_no_negative_zero(capsys, tmp_path, 
     "x,said", [(-1e-9, "0.00"), (-0.004, "0.00"), (-0.006, "-0.01"), (0.0, "0.00"), (-2.0, "-2.00")]
 )
 def test_fixed_point_has_no_negative_zero(x, said):
-    assert console.fixed(x, 2) == said
+    assert cell_text(x, "z.2f") == said
 
 
 @pytest.mark.parametrize("args", [("--every", "5000"), ("--t-max", "0.005")])

@@ -147,13 +147,9 @@ class ReachCommand:
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
-        from hapticclay.views.figure import Figure
         from reach_study import reach
 
-        found = reach(self.force)
-        console.save_json(found.tables(), self.out / "reach.json")
-        console.save_figures({"reach": Figure(found.plot, found.tables)}, self.out, self.figures)
-        print(found.headline())
+        console.deliver(reach(self.force), self.out, self.figures)
         return 0
 ''',
 }
@@ -262,12 +258,12 @@ def test_a_new_study_has_a_command_a_figure_its_numbers_and_a_result(capsys, tmp
     out = tmp_path / "o"
     words = ["reach", "--force", "1N", "0.002kN", "--data", "--format", "svg", "--out", str(out)]
     code, told, err = said(capsys, *words)
-    assert (code, err) == (0, "") and told.startswith("up to ")
+    assert (code, err) == (0, "") and "\nup to " in told
     assert {p.name for p in out.iterdir()} == {"reach.json", "reach.svg", "reach.csv"}
     head, first, *_ = (out / "reach.csv").read_text().splitlines()
     assert head == "force [N],reach [m]" and first.startswith("1.0,")
     found = importlib.import_module("reach_study").reach([2.0])
-    assert repr(found) == f"<Reach: {told.strip()}>" and "reach [m]" in found._repr_html_()
+    assert repr(found) == "<Reach: up to 0.0178 m>" and "reach [m]" in found._repr_html_()
     assert list(found.to_frame().columns) == ["force [N]", "reach [m]"]
     assert found.plot().axes[0].get_xlabel() == "force [N]"
     assert "• reach" in said(capsys, "--help")[1]
