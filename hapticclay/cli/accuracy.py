@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
-
-import tyro
+from typing import TYPE_CHECKING, ClassVar
 
 from ..display import text_table
 from ..files import writable
 from . import console
+from .options import ScenarioWord
 from .unused import Unused
 
 if TYPE_CHECKING:
@@ -28,15 +27,14 @@ class AccuracyCommand:
 
     Attributes:
         scenario: The experiment, or a scenario file. Its dt and integrator are ignored.
-        out: Folder for accuracy.png, accuracy.md and accuracy.json.
+        out: Folder for accuracy.png, accuracy.md and accuracy.json; by default
+            out/accuracy/EXPERIMENT.
         quick: Run fewer steps, once each.
         figures: Format and style of the figure.
     """
 
-    scenario: Annotated[Any, tyro.conf.arg(constructor_factory=console.experiment_words)]
-    out: Annotated[
-        Path | None, tyro.conf.arg(help_behavior_hint="(default: out/accuracy/EXPERIMENT)")
-    ] = None
+    scenario: ScenarioWord
+    out: Path | None = None
     quick: bool = False
     figures: console.FigureOptions = console.FigureOptions()
 

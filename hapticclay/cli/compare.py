@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
-
-import tyro
+from typing import Literal
 
 from ..errors import ParameterError
 from ..files import writable
 from ..model.constants import AXES
 from . import console
+from .options import Loose
 
 
 @dataclass(frozen=True)
@@ -25,7 +24,7 @@ class CompareCommand:
         figures: Formats and style of the figure files; those on the page are for a screen.
     """
 
-    source: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
+    source: Loose[tuple[Path, ...]] = ()
     axis: Literal["x", "y"] | None = None
     out: Path = Path("out/compare")
     figures: console.FigureOptions = console.FigureOptions()

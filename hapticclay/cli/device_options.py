@@ -7,10 +7,10 @@ import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from ..errors import ParameterError
-from . import console
+from ..errors import Bound, ParameterError
+from . import console, walls
 
 if TYPE_CHECKING:
     from ..live.session import Session
@@ -41,9 +41,9 @@ class DeviceOptions:
     device_server: bool = False
     device_port: int = 10_001
     device_plane: Literal["xy", "xz"] = "xy"
-    device_force: float | None = None
-    device_rate: float = 1000.0
-    coupling: tuple[float, float] = (300.0, 5.0)
+    device_force: Annotated[float | None, Bound(unit="N")] = None
+    device_rate: Annotated[float, Bound(unit="Hz")] = 1000.0
+    coupling: tuple[walls.Spring, walls.Damper] = (300.0, 5.0)
 
     def __post_init__(self):
         if self.device and self.device_server:

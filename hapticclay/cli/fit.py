@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
-
-from ..errors import ParameterError
+from ..errors import Bound, ParameterError
 from ..files import writable
 from . import console
 from .identify import column_names
+from .options import Loose
 
 if TYPE_CHECKING:
     from ..studies.measurement import Measurement
@@ -39,14 +38,14 @@ class FitCommand:
         figures: Format and style of the figure.
     """
 
-    source: Annotated[Path, tyro.conf.Positional]
+    source: Loose[Path]
     out: Path = Path("out/fit")
     axis: Literal["x", "y", "path"] | None = None
     columns: tuple[str, ...] = ()
     laws: tuple[str, ...] = ()
     level: float = 0.95
-    time: tuple[float, float] | None = None
-    place: tuple[float, float] | None = None
+    time: Annotated[tuple[float, float] | None, Bound(unit="s", names=("first", "last"))] = None
+    place: Annotated[tuple[float, float] | None, Bound(unit="m", names=("low", "high"))] = None
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:

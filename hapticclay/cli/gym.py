@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
-import tyro
-
 from ..display import text_table
-from ..errors import integer
+from ..errors import Bound
 from .console import progress_bar
+from .options import Loose
 from .unused import Unused
 
 SEEDS, EPISODES, NOISE = 100, 100, 0.1  # where none is given
@@ -33,12 +32,11 @@ class GymCommand:
         engine: auto, python or native.
     """
 
-    action: Annotated[Literal["baselines", "dataset"], tyro.conf.Positional]
-    env: Annotated[
-        Literal["CutLine-v0", "PareEdge-v0", "AdaptiveGain-v0", "ProbeClay-v0"],
-        tyro.conf.Positional,
-    ] = "CutLine-v0"
-    seeds: int | None = None
+    action: Loose[Literal["baselines", "dataset"]]
+    env: Loose[Literal["CutLine-v0", "PareEdge-v0", "AdaptiveGain-v0", "ProbeClay-v0"]] = (
+        "CutLine-v0"
+    )
+    seeds: Annotated[int | None, Bound(2, 100_000)] = None
     episodes: int | None = None
     noise: float | None = None
     name: str | None = None
@@ -59,7 +57,7 @@ class GymCommand:
     def _baselines(self) -> int:
         from ..gym import baselines, scores
 
-        seeds = integer("seeds", SEEDS if self.seeds is None else self.seeds, 2, 100_000)
+        seeds = SEEDS if self.seeds is None else self.seeds
         found = {
             name: baselines.returns(self.env, maker, range(seeds), engine=self.engine)
             for name, maker in baselines.BASELINES[self.env].items()

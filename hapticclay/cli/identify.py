@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from ..errors import ParameterError, choice
+from ..errors import Bound, ParameterError, choice
 from ..files import writable
 from ..model.constants import AXES
 from . import console
@@ -67,7 +67,7 @@ class IdentifyCommand:
     csv: Path | None = None
     what: Literal["G", "S", "Th"] | None = None
     columns: tuple[str, ...] = ()
-    band: tuple[float, float] | None = None
+    band: Annotated[tuple[float, float] | None, Bound(unit="Hz", names=("low", "high"))] = None
     held: bool = False
     paper: bool = False
     figures: console.FigureOptions = console.FigureOptions()

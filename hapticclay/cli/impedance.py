@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
-
-from ..errors import ParameterError, choice
+from ..errors import Bound, ParameterError, choice
 from ..files import writable
 from ..model.constants import AXES
 from . import console, walls
+from .options import Loose
 
 if TYPE_CHECKING:
     from ..studies.impedance import Subject
@@ -43,13 +42,13 @@ class ImpedanceCommand:
         figures: Format and style of the figures.
     """
 
-    source: Annotated[str | None, tyro.conf.Positional] = None
+    source: Loose[str | None] = None
     axis: Literal["x", "y"] | None = None
-    b: float | None = None
-    k: float | None = None
-    band: tuple[float, float] = (0.5, 30.0)
+    b: Annotated[float | None, Bound(unit="N.s/m")] = None
+    k: Annotated[float | None, Bound(unit="N/m")] = None
+    band: Annotated[tuple[float, float], Bound(unit="Hz", names=("low", "high"))] = (0.5, 30.0)
     lines: int = 24
-    amplitude: float = 1e-5
+    amplitude: Annotated[float, Bound(unit="m")] = 1e-5
     seed: int = 0
     out: Path = Path("out/impedance")
     wall: walls.WallOptions = walls.WallOptions()
@@ -73,7 +72,7 @@ class ImpedanceCommand:
         file = self.source if self.source and is_scenario_file(self.source) else None
         if file and is_wall_file(file):
             return self._wall(file)
-        if self.source is None and set(self.wall.given) - {"hand"}:
+        if self.source is None and self.wall.given.keys() - {"hand"}:
             return self._wall(None)
         self.wall.refuse("is for a wall: leave it out beside an experiment or scenario", ("hand",))
         return self._loop(file)

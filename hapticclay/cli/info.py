@@ -5,13 +5,11 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import tyro
+from typing import TYPE_CHECKING
 
 from ..display import one_line, printable, text_table
 from ..files import versions
-from . import console
+from .options import Loose
 
 if TYPE_CHECKING:
     from ..simulation.record import Record
@@ -25,10 +23,12 @@ class InfoCommand:
         record: The record: its folder, or its record.npz.
     """
 
-    record: Annotated[Path, tyro.conf.Positional]
+    record: Loose[Path]
 
     def __call__(self) -> int:
-        record = console.load_record(self.record)
+        from ..simulation.record import Record
+
+        record = Record.load(self.record)
         file = self.record / "record.npz" if os.path.isdir(self.record) else self.record
         print(record_text(record, file.stat().st_size))
         return 0

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
-
-import tyro
 
 from ..files import writable
 from . import console
+from .options import Loose
 
 
 @dataclass(frozen=True)
@@ -19,14 +17,14 @@ class LabCommand:
     Attributes:
         source: The lab: a wall and its rate, Z-width, delay and passivity, or a just-noticeable
             difference.
-        out: Folder for lab.json and the figures.
+        out: Folder for lab.json and the figures; by default out/lab/NAME.
         quick: Make fewer runs.
         view: At the end, show a run of the lab in a window.
         figures: Formats and style of the figures.
     """
 
-    source: Annotated[str, tyro.conf.Positional]
-    out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: out/lab/NAME)")] = None
+    source: Loose[str]
+    out: Path | None = None
     quick: bool = False
     view: bool = False
     figures: console.FigureOptions = console.FigureOptions()

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from ..display import text_table
+from ..errors import Bound
 
 if TYPE_CHECKING:
     from ..model.tool import Tool
@@ -28,8 +29,12 @@ class MaterialsCommand:
         tool_depth: Depth of the cut [m].
     """
 
-    tool_width: float = field(default_factory=lambda: _small_tool("width"))
-    tool_depth: float = field(default_factory=lambda: _small_tool("depth"))
+    tool_width: Annotated[float, Bound(unit="m")] = field(
+        default_factory=lambda: _small_tool("width")
+    )
+    tool_depth: Annotated[float, Bound(unit="m")] = field(
+        default_factory=lambda: _small_tool("depth")
+    )
 
     def __call__(self) -> int:
         from ..model.tool import Tool

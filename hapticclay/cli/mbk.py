@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import tyro
-
-from ..errors import ParameterError, integer
+from ..errors import Bound, ParameterError
 from ..files import writable
 from ..model.constants import TS
 from . import console, walls
+from .options import Loose
 
 RENDERED_WALL = {"K": 1000.0, "B": 2.0, "device.damper": 0.5}
 
@@ -38,10 +37,10 @@ class MBKCommand:
         figures: Format and style of the figures.
     """
 
-    source: Annotated[Path | None, tyro.conf.Positional] = None
+    source: Loose[Path | None] = None
     arm: Literal["x", "y"] | None = None
     box: walls.HandEnds | None = None
-    columns: int | None = None
+    columns: Annotated[int | None, Bound(1, 100)] = None
     quick: bool = False
     out: Path = Path("out/mbk")
     wall: walls.WallOptions = walls.WallOptions()
@@ -50,7 +49,6 @@ class MBKCommand:
     def __call__(self) -> int:
         writable(self.out)
         columns = (2 if self.quick else 5) if self.columns is None else self.columns
-        integer("columns", columns, 1, 100)
         if self.arm:
             return self._arm(columns)
         if self.box:
@@ -73,15 +71,14 @@ class MBKCommand:
         from ..studies.mbk import HANDS, arm_mbk
 
         bound = "is for a bare device: leave it out with --arm"
-        self.wall.refuse(bound, but=("Ts", "delay", "hand"))
+        self.wall.refuse(bound, but=("Ts", "rate", "delay", "hand"))
         if self.source:
             raise ParameterError("source", str(self.source), bound)
         assert self.arm is not None
         box = walls.box_of(self.box) or HANDS
         operator = walls.operator_of(self.wall.hand) or Operator()
         loop = PushedLoop(self.arm, b=0.0, operator=operator, Ts=TS)
-        timing = {n: getattr(self.wall, n) for n in ("Ts", "delay")}
-        loop = with_fields(loop, walls.quantities(timing))
+        loop = with_fields(loop, self.wall.timing)
         points = 7 if self.quick else 17
         found = arm_mbk(
             loop, box, columns=columns, points=points, samples=0 if self.quick else 24,

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import tyro
+from typing import TYPE_CHECKING, Any
 
 from ..files import writable
 from ..model.constants import AXES, TS
 from . import console, walls
+from .options import Loose
 
 if TYPE_CHECKING:
     from ..scene.scenario import Scenario
@@ -39,7 +38,7 @@ class PassivityCommand:
         figures: Formats and style of the figures.
     """
 
-    source: Annotated[Path | None, tyro.conf.Positional] = None
+    source: Loose[Path | None] = None
     cut: Path | None = None
     delays: tuple[float, ...] = (0.0, 0.5, 1.0, 2.0)
     out: Path = Path("out/passivity")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from ..display import text_table
-from ..errors import ParameterError, integer
+from ..errors import Bound, ParameterError
 from ..files import writable
 from . import console
 
@@ -55,10 +55,10 @@ class RobustnessCommand:
     """
 
     axis: Literal["x", "y"] = "x"
-    b: float | None = None
-    gain: float | None = None
-    Ts: float | None = None
-    delay: float = 0.0
+    b: Annotated[float | None, Bound(unit="N.s/m")] = None
+    gain: Annotated[float | None, Bound(unit="1/kg")] = None
+    Ts: Annotated[float | None, Bound(unit="s")] = None
+    delay: Annotated[float, Bound(unit="s")] = 0.0
     inertia_shaping: bool = True
     hands: str = "published range"
     variation: float | None = None
@@ -68,7 +68,7 @@ class RobustnessCommand:
     seed: int = 0
     chunk: int = 1000
     out: Path = Path("out/robustness")
-    workers: int | None = None
+    workers: Annotated[int | None, Bound(1, 1024)] = None
     band: int = 200
     list: bool = False
     figures: console.FigureOptions = console.FigureOptions()
@@ -86,7 +86,7 @@ class RobustnessCommand:
         writable(self.out)
         trials = self._trials()
         draw = Draw(self.band, self.seed) if self.band else None
-        workers = integer("workers", cores() if self.workers is None else self.workers, 1, 1024)
+        workers = cores() if self.workers is None else self.workers
         hands = trials.hands or hands_of(self.hands)
         assert not isinstance(hands, str)
         print(hands_table({self.hands: hands}))

@@ -7,14 +7,13 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
-
-import tyro
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..display import text_table
 from ..files import writable
 from ..model.constants import AXES
 from . import console
+from .options import ScenarioWord
 from .unused import Unused, undrawn
 
 if TYPE_CHECKING:
@@ -43,7 +42,8 @@ class RunCommand:
 
     Attributes:
         scenario: The experiment, or a scenario file.
-        out: Folder for record.npz, scenario.toml, summary.json and the plots.
+        out: Folder for record.npz, scenario.toml, summary.json and the plots; by default
+            out/run/EXPERIMENT.
         every: Keep every n-th sample in the record.
         error: Largest allowed error, as in 1e-6 (seconds, of the border-crossing times) or 1e-7m
             (of positions). dt and integrator are then chosen, and verified by runs at other steps.
@@ -51,10 +51,8 @@ class RunCommand:
         figures: Formats and style of the plots.
     """
 
-    scenario: Annotated[Any, tyro.conf.arg(constructor_factory=console.experiment_words)]
-    out: Annotated[
-        Path | None, tyro.conf.arg(help_behavior_hint="(default: out/run/EXPERIMENT)")
-    ] = None
+    scenario: ScenarioWord
+    out: Path | None = None
     every: int = 1
     error: str | None = None
     plots: bool = True

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from ..errors import ParameterError, choice, number_in
+from ..errors import Bound, ParameterError, choice, number_in
 from ..files import writable
 from ..model.constants import AXES, B_CONSTANT, C_DEN, C_NUM, GAIN, TS, SecondOrder
 from . import console
@@ -19,6 +19,11 @@ if TYPE_CHECKING:
     from ..studies.boundary import PushedLoop
     from ..studies.stability_map import StabilityMap
     from ..studies.yield_map import YieldMap
+
+Damping = Annotated[float, Bound(unit="1/s")]
+Stiffness = Annotated[float, Bound(unit="1/s^2")]
+PositionLoop = tuple[Annotated[float, Bound(unit="1/s^2")], Damping, Stiffness]
+ForceLoop = tuple[Annotated[float, Bound(unit="1/kg")], Damping, Stiffness]
 
 
 @dataclass(frozen=True)
@@ -50,14 +55,14 @@ class StabilityCommand:
     """
 
     axis: Literal["x", "y"] = "x"
-    b: float | None = None
-    gain: float | None = None
-    Ts: float | None = TS
-    delay: float = 0.0
+    b: Annotated[float | None, Bound(unit="N.s/m")] = None
+    gain: Annotated[float | None, Bound(unit="1/kg")] = None
+    Ts: Annotated[float | None, Bound(unit="s")] = TS
+    delay: Annotated[float, Bound(unit="s")] = 0.0
     num: tuple[float, ...] = C_NUM
     den: tuple[float, ...] = C_DEN
-    G: tuple[float, float, float] | None = None
-    S: tuple[float, float, float] | None = None
+    G: PositionLoop | None = None
+    S: ForceLoop | None = None
     operator: bool = True
     inertia_shaping: bool = False
     clay: tuple[str, ...] | None = None

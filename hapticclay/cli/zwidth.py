@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-import tyro
-
-from ..errors import ParameterError
+from ..errors import Bound, ParameterError
 from ..files import writable
 from ..model.constants import GAIN, TS
 from . import console, walls
+from .options import Loose
 from .unused import Unused
 
 if TYPE_CHECKING:
@@ -33,27 +32,27 @@ class ZWidthCommand:
             values, as in --vary damper 0.2 0.5 1; on the arm Ts, delay or gain.
         box: Hands for a second set of runs: least and largest mass [kg, kg], damper [N.s/m, N.s/m],
             spring [N/m, N/m], as in --box 0 1 0 5 0 300.
-        force: Of the push that tries a loop which is not linear [N].
-        speed: Of that push [m/s].
+        force: Force of the push that tries a loop which is not linear [N].
+        speed: Speed of that push [m/s].
         still: Largest motion back and forth that counts as rest [m].
         arm: Axis of the arm with servo and compensator, in the place of a bare device: the plane is
             that of the clay's k and b.
-        gain: Of the compensator [1/kg], with --arm; by default 1 on x and 0.5 on y.
+        gain: Gain of the compensator [1/kg], with --arm; by default 1 on x and 0.5 on y.
         out: Folder for zwidth.json and the figure.
         quick: Try fewer dampings.
         device: The device, its sampling and the hand.
         figures: Format and style of the figure.
     """
 
-    source: Annotated[Path | None, tyro.conf.Positional] = None
-    B: tuple[float, ...] = ()
+    source: Loose[Path | None] = None
+    B: Annotated[tuple[float, ...], Bound(unit="N.s/m")] = ()
     vary: tuple[str, ...] = ()
     box: walls.HandEnds | None = None
-    force: walls.Quantity = None
-    speed: walls.Quantity = None
-    still: walls.Quantity = None
+    force: Annotated[float | None, Bound(unit="N")] = None
+    speed: Annotated[float | None, Bound(unit="m/s")] = None
+    still: Annotated[float | None, Bound(unit="m")] = None
     arm: Literal["x", "y"] | None = None
-    gain: float | None = None
+    gain: Annotated[float | None, Bound(unit="1/kg")] = None
     out: Path = Path("out/zwidth")
     quick: bool = False
     device: walls.DeviceOptions = walls.DeviceOptions()
@@ -69,7 +68,8 @@ class ZWidthCommand:
         from ..studies.zwidth import zwidth
 
         writable(self.out)
-        tried = walls.quantities({n: getattr(self, n) for n in ("force", "speed", "still")})
+        push = {"force": self.force, "speed": self.speed, "still": self.still}
+        tried = {name: x for name, x in push.items() if x is not None}
         press = with_fields(Press(), tried)
         wall, box = self._wall(), walls.box_of(self.box)
         with console.fraction_bar("runs") as show:
@@ -101,13 +101,12 @@ class ZWidthCommand:
         from ..studies.boundary import PushedLoop
 
         bound = "is for a bare device: leave it out beside --arm"
-        self.device.refuse(bound, but=("Ts", "delay", "hand"))
+        self.device.refuse(bound, but=("Ts", "rate", "delay", "hand"))
         if self.source:
             raise ParameterError("source", str(self.source), bound)
         gain = GAIN["xy".index(axis)] if self.gain is None else self.gain
         loop = PushedLoop(axis, K=gain, Ts=TS, operator=walls.operator_of(self.device.hand))
-        timing = {n: getattr(self.device, n) for n in ("Ts", "delay")}
-        return with_fields(loop, walls.quantities(timing))
+        return with_fields(loop, self.device.timing)
 
     def _values(self, wall: Subject) -> list[Any]:
         """The values behind --vary."""

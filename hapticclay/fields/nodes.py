@@ -148,7 +148,7 @@ class Field(NamedTuple):
 
 def limits(bound: Bound, owner: Any) -> dict[str, Any]:
     """Arguments of `number`; owner has the field that the bound names."""
-    low = getattr(owner, bound.low) if isinstance(bound.low, str) else bound.low
+    low = getattr(owner, bound.low, -math.inf) if isinstance(bound.low, str) else bound.low
     return {"low": low, "high": bound.high, "above": bound.above, "unit": bound.unit}
 
 
