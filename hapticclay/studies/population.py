@@ -10,7 +10,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named, part
-from ..errors import Bound, ParameterError, choice, integer, number, numbers_of
+from ..errors import Bound, ParameterError, choice, integer, number
+from ..fields import Seed
 from ..model.operator import Operator
 from ..results import Result
 from ..scene.virtual_wall import VirtualWall
@@ -23,12 +24,13 @@ from .stability_map import Progress
 
 HAND = ("mass", "damper", "spring")
 HAND_UNITS = ("kg", "N.s/m", "N/m")
-PAIRS = tuple(itertools.combinations(HAND, 2))
+PAIRS = tuple(f"{a}, {b}" for a, b in itertools.combinations(HAND, 2))
 MOST_HANDS = 100_000
+Correlations = Annotated[tuple[float, float, float], Bound(-1.0, 1.0, names=PAIRS)]
+Variation = Annotated[float, Bound(1e-3, 10.0)]
 
 
-@named
-@dataclass(frozen=True)
+@part("hands.")
 class Hands:
     """A population of hands: the known distribution of mass, damper and spring of Th.
 
@@ -43,35 +45,27 @@ class Hands:
             to 1; that of the logarithms where both are log-normal. 0 where none was published.
     """
 
-    mass: float | Distribution
-    damper: float | Distribution
-    spring: float | Distribution
+    mass: Annotated[float | Distribution, Bound(0.0, unit="kg")]
+    damper: Annotated[float | Distribution, Bound(0.0, unit="N.s/m")]
+    spring: Annotated[float | Distribution, Bound(0.0, unit="N/m")]
     source: str = ""
     spread: str = ""
-    subjects: int = 0
-    correlation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    subjects: Annotated[int, Bound(0, 1_000_000)] = 0
+    correlation: Correlations = (0.0, 0.0, 0.0)
 
     def __post_init__(self):
-        for name, unit in zip(HAND, HAND_UNITS, strict=True):
-            value = getattr(self, name)
-            if not isinstance(value, Distribution):
-                value = number(f"hands.{name}", value, 0.0, unit=unit)
-                object.__setattr__(self, name, value)
-            elif value.law == "normal" or value.first < 0.0:
+        for name, value in self._values.items():
+            if isinstance(value, Distribution) and (value.law == "normal" or value.first < 0.0):
                 laws = ", ".join(x for x in LAWS if x != "normal")
                 bound = f"must have no negative values: {laws}, from 0 on"
                 raise ParameterError(f"hands.{name}", value, bound)
-        integer("hands.subjects", self.subjects, 0, 1_000_000)
-        names = [f"{a}, {b}" for a, b in PAIRS]
-        found = numbers_of("hands.correlation", self.correlation, names, -1.0, 1.0)
-        object.__setattr__(self, "correlation", found)
         if np.linalg.eigvalsh(self._correlations).min() < -1e-12:
             bound = "must be correlations of three numbers: no three numbers have these"
             raise ParameterError("hands.correlation", self.correlation, bound)
 
     @classmethod
     @checked
-    def around(cls, operator: Operator, variation: float = 0.3, **about: Any) -> Hands:
+    def around(cls, operator: Operator, variation: Variation = 0.3, **about: Any) -> Hands:
         """Log-normal hands around a mean: an assumption for data without a published spread.
 
         Args:
@@ -79,25 +73,27 @@ class Hands:
             variation: standard deviation over mean of each number, 0.001 to 10.
             **about: other attributes.
         """
-        c = number("variation", variation, 1e-3, 10.0)
         mass, damper, spring = (
-            Distribution("log-normal", x, c * x) if x else 0.0
+            Distribution("log-normal", x, variation * x) if x else 0.0
             for x in (operator.mass, operator.damper, operator.spring)
         )
-        return cls(
-            mass, damper, spring, **{"spread": f"assumed: {100.0 * c:g} % of the mean", **about}
-        )
+        spread = f"assumed: {100.0 * variation:g} % of the mean"
+        return cls(mass, damper, spring, **{"spread": spread, **about})
 
     @property
     def random(self) -> tuple[str, ...]:
         """Which of mass, damper and spring vary."""
-        return tuple(n for n in HAND if isinstance(getattr(self, n), Distribution))
+        return tuple(n for n, x in self._values.items() if isinstance(x, Distribution))
 
     @property
     def median(self) -> Operator:
         """The hand with median mass, damper and spring."""
-        values = [getattr(self, n) for n in HAND]
+        values = self._values.values()
         return Operator(*(x.median if isinstance(x, Distribution) else x for x in values))
+
+    @property
+    def _values(self) -> dict[str, float | Distribution]:
+        return {name: getattr(self, name) for name in HAND}
 
     @property
     def _correlations(self) -> np.ndarray:
@@ -118,9 +114,8 @@ class Hands:
             w, v = np.linalg.eigh(self._correlations)  # singular ones have no Cholesky factor
             z = z @ (v * np.sqrt(np.maximum(w, 0.0))) @ v.T
         out = np.empty_like(z)
-        for i, name in enumerate(HAND):
-            law = getattr(self, name)
-            out[:, i] = law.of_score(z[:, i]) if isinstance(law, Distribution) else law
+        for i, x in enumerate(self._values.values()):
+            out[:, i] = x.of_score(z[:, i]) if isinstance(x, Distribution) else x
         return out
 
     def sample(self, n: int, seed: int = 0) -> list[Operator]:
@@ -142,10 +137,9 @@ class Hands:
         """
         out = 0.5 * (1.0 - number("share", share, 0.0, 1.0 - 1e-9))
         ends = {}
-        for name in HAND:
-            law = getattr(self, name)
-            x = law.spread(np.array([out, 1.0 - out])) if isinstance(law, Distribution) else law
-            ends[name] = (float(np.min(x)), float(np.max(x)))
+        for name, x in self._values.items():
+            both = x.spread(np.array([out, 1.0 - out])) if isinstance(x, Distribution) else x
+            ends[name] = (float(np.min(both)), float(np.max(both)))
         return Box(**ends)
 
     def row(self, name: str) -> list[str]:
@@ -154,9 +148,9 @@ class Hands:
         Args:
             name: of the population.
         """
-        values = [getattr(self, n) for n in HAND]
-        told = [x.text() if isinstance(x, Distribution) else f"{x:g}" for x in values]
-        return [name, *told, str(self.subjects or "-"), self.spread or "none", self.source]
+        values = self._values.values()
+        texts = [x.text() if isinstance(x, Distribution) else f"{x:g}" for x in values]
+        return [name, *texts, str(self.subjects or "-"), self.spread or "none", self.source]
 
 
 PAPER_HAND = "Her, Hsu, Lan, Karkoub 2002, J. Intelligent and Robotic Systems 35, Eq. 19"
@@ -263,7 +257,7 @@ class Draw:
     """
 
     hands: Annotated[int, Bound(2, MOST_HANDS)] = 200
-    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
+    seed: Seed = 0
 
 
 @checked
