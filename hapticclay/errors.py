@@ -67,8 +67,8 @@ class _Bounded(reprlib.Repr):
         if x and level <= 0:
             return "{...}"
         items = itertools.islice(x.items(), self.maxdict)
-        told = [f"{self.repr1(k, level - 1)}: {self.repr1(v, level - 1)}" for k, v in items]
-        return "{" + ", ".join(told + ["..."] * (len(x) > self.maxdict)) + "}"
+        texts = [f"{self.repr1(k, level - 1)}: {self.repr1(v, level - 1)}" for k, v in items]
+        return "{" + ", ".join(texts + ["..."] * (len(x) > self.maxdict)) + "}"
 
     def repr_bytes(self, x: bytes, level: int) -> str:
         return repr(x[: self.maxstring])
@@ -200,13 +200,7 @@ def numbers_of(
 
 
 def table_of(
-    field: str,
-    value: object,
-    low: float = -math.inf,
-    high: float = math.inf,
-    *,
-    above: bool = False,
-    unit: str = "",
+    field: str, value: object, low: float, high: float, *, above: bool, unit: str
 ) -> tuple[tuple[float, ...], ...]:
     """Returns value as rows of floats of equal length, each checked by `number`."""
     import numpy as np
@@ -245,17 +239,9 @@ def array_of(field: str, value: object, bound: str = "must be numbers") -> np.nd
         raise ParameterError(field, value, bound) from None
 
 
-def pair(
-    field: str,
-    value: object,
-    low: float = -math.inf,
-    high: float = math.inf,
-    *,
-    above: bool = False,
-    unit: str = "",
-) -> tuple[float, float]:
+def pair(field: str, value: object, *limits: float, **how: Any) -> tuple[float, float]:
     """Returns value as an (x, y) pair of floats, each checked by `number`."""
-    x, y = numbers_of(field, value, ("x", "y"), low, high, above=above, unit=unit)
+    x, y = numbers_of(field, value, ("x", "y"), *limits, **how)
     return x, y
 
 
