@@ -407,7 +407,7 @@ def _reaches(node: Node, value: Any, *names: str) -> bool:
 
 
 def parameter_names(kind: type[Experiment] | None) -> list[str]:
-    """Names of all that can be set of an experiment: its parameters, and fields of the scenario."""
+    """Names of what can be set: parameters of an experiment, if any, and fields of the scenario."""
     own = parameters(kind) if kind else {}
     return list(dict.fromkeys([*own, *dotted_names(Scenario)]))
 
