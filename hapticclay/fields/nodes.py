@@ -1,4 +1,4 @@
-"""Nodes for numbers, words and whatever has no fields of its own."""
+"""Nodes of numbers, words, rows, pairs and unions, and the names of what lies below them."""
 
 from __future__ import annotations
 
@@ -47,13 +47,14 @@ class Node:
         words: words that it takes.
         takes_numbers: whether it takes a number, which may have a unit.
         arity: words of a command line that make a value; infinite for any number of them.
+        members: nodes within it, whose parts are its parts.
     """
 
     hint: Any = Any
     bound, none, takes_numbers = Bound(), False, False
     words: tuple[str, ...] = ()
     arity: float = 1
-    members: Sequence[Node] = ()  # whose parts are its parts
+    members: Sequence[Node] = ()
 
     def wants(self) -> str:
         """What it takes, in words that follow "must be"."""
@@ -132,16 +133,6 @@ class Field(NamedTuple):
     node: Node
     default: Any
     about: str
-
-    @property
-    def bound(self) -> Bound:
-        """Its bound and unit."""
-        return self.node.bound
-
-    @property
-    def kind(self) -> Any:
-        """Its type hint, without annotations."""
-        return self.node.hint
 
     @property
     def unit(self) -> str:
