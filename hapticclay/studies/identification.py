@@ -364,14 +364,10 @@ class Identification:
         )  # fmt: skip
 
 
-def _identified(experiment: Identification) -> Identified:
-    return experiment.identified()
-
-
 identify = function_of(
     Identification,
     "identify",
-    _identified,
+    Identification.identified,
     "a value is out of its bounds, the handle cannot be there, or a run ended early or met the "
     "limits of the motors.",
 )

@@ -136,8 +136,9 @@ def drift_map(
     places = list(zip(x.tolist(), y.tolist(), strict=True))
     for m, at in enumerate(places):
         for k, j, i in np.ndindex(2, 2, 2):
-            settings = dict(origin=at, inertia_shaping=bool(k), seed=seed, **DRIFT_SETTINGS)
-            out[m, k, j, i] = identify(AXES[i], DRIFT_BLOCKS[j], **settings).values
+            place: dict[str, Any] = {"origin": at, "inertia_shaping": bool(k), "seed": seed}
+            found = identify(AXES[i], DRIFT_BLOCKS[j], **place, **DRIFT_SETTINGS)
+            out[m, k, j, i] = found.values
         if progress:
             progress(m + 1, len(x))
     w = np.array([endpoint_mobility(*at) for at in places])

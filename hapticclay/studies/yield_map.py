@@ -93,7 +93,7 @@ class YieldMap(Result):
         cells: points at which theory and a run are compared.
     """
 
-    drawn_by = "hapticclay.views.yield_map_plots:yield_map_plot"
+    drawn_by = "hapticclay.views.stability_map_plots:yield_map_plot"
     written_as = "gain-yield"
 
     loop: PushedLoop
