@@ -18,8 +18,10 @@ from numpy.polynomial import Polynomial
 from ..arguments import named
 from ..errors import Bound, ParameterError, choice, number
 from ..fields import check_fields
+from ..formulas import arm as arm_law
 from ..formulas.constants import B_MAX
 from ..model import controller
+from ..model.arm import Arm
 from ..model.compensator import PRINTED, Compensator
 from ..model.constants import AXES
 from ..model.controller import SERVO, Servo
@@ -348,6 +350,13 @@ def whole_samples(delay: float, Ts: float) -> tuple[int, float]:
     whole = math.floor(delay / Ts + 1e-9)
     part = delay / Ts - whole
     return whole, part if part > 1e-9 else 0.0
+
+
+def mobility_at(arm: Arm, x: float, y: float) -> np.ndarray:
+    """Mobility of the bare handle with the handle at a world position [1/kg], shape (2, 2)."""
+    u = arm_law.jacobian(*arm_law.inverse_kinematics(x, y, arm.links), arm.links)
+    xx, xy, yy = arm_law.mobility(u, arm.links)
+    return np.array([[xx, xy], [xy, yy]])
 
 
 def _places(loops: Sequence[LinearLoop]) -> list[int]:
