@@ -6,7 +6,7 @@ import dataclasses
 import html
 import math
 import numbers
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 TABLE_STYLE = "border-collapse:collapse;margin:0.3em 0;color:inherit;background:transparent"
@@ -39,6 +39,18 @@ def html_table(title: str, rows: Iterable[tuple[str, str]]) -> str:
     ]
     caption = f'<caption style="text-align:left;color:inherit">{html.escape(title)}</caption>'
     return f'<table style="{TABLE_STYLE}">{caption}{"".join(lines)}</table>'
+
+
+def fields_of(part: Any, *left_out: str) -> dict[str, Any]:
+    """Fields of a dataclass by name, without some."""
+    names = [f.name for f in dataclasses.fields(part) if f.name not in left_out]
+    return {name: getattr(part, name) for name in names}
+
+
+def table_of(head: Sequence[str], rows: Iterable[Any]) -> dict[str, list[Any]]:
+    """Columns by heading of rows: each is a sequence, or a dataclass whose fields are the cells."""
+    cells = [[*fields_of(x).values()] if dataclasses.is_dataclass(x) else x for x in rows]
+    return {name: [row[i] for row in cells] for i, name in enumerate(head)}
 
 
 def text_table(

@@ -125,8 +125,8 @@ class Part(Node):
             if any(kind in node.classes().values() for node in nodes_of(kind).values()):
                 continue  # made of parts of its own class
             for field in leaves(kind, path, default if type(default) is kind else UNSET):
-                told = f"of {name}: {field.about}" if len(classes) > 1 else field.about
-                yield field._replace(about=told)
+                about = f"of {name}: {field.about}" if len(classes) > 1 else field.about
+                yield field._replace(about=about)
 
 
 # ---- the node of a type hint ---------------------------------------------------------------------
@@ -234,13 +234,13 @@ def _checks_to_make(kind: type, prefix: str) -> list[tuple[str, str, Node, Any]]
     """Field, name for the error, node, and the default if it needs no check; else UNSET."""
     out = []
     for field in dataclasses.fields(kind):
-        node, good, name = nodes_of(kind)[field.name], field.default, prefix + field.name
+        node, good, full_name = nodes_of(kind)[field.name], field.default, prefix + field.name
         try:  # not if the bound is another field
-            if isinstance(node.bound.low, str) or node.check(name, good) is not good:
+            if isinstance(node.bound.low, str) or node.check(full_name, good) is not good:
                 good = UNSET
         except ParameterError:
             good = UNSET
-        out.append((field.name, name, node, good))
+        out.append((field.name, full_name, node, good))
     return out
 
 
@@ -249,10 +249,10 @@ def check_fields(part: Any, prefix: str = "") -> None:
 
     Numbers become floats, sequences become tuples. prefix: what errors put before the field.
     """
-    for name, told, node, good in _checks_to_make(type(part), prefix):
+    for name, full_name, node, good in _checks_to_make(type(part), prefix):
         value = getattr(part, name)
         if value is not good:
-            checked = node.check(told, value, part)
+            checked = node.check(full_name, value, part)
             if checked is not value:
                 object.__setattr__(part, name, checked)
 

@@ -74,6 +74,8 @@ class Node:
         if isinstance(value, Mapping) and ENTIRE in value:
             old = self.read(value[ENTIRE], path, old)
             value = {k: v for k, v in value.items() if k is not ENTIRE}
+            if not value:
+                return old
         if self.none and isinstance(value, str) and value.lower() == "none":
             return None
         return self._read(value, path, old)

@@ -50,7 +50,7 @@ def _check_hand(given: Any, old: Any, path: str) -> None:
     if not isinstance(given, Mapping):
         return
     if ENTIRE in given:
-        old = given[ENTIRE]
+        old = None if str(given[ENTIRE]).lower() == "none" else given[ENTIRE]
     both = {n: given[n] for n in HAND if n in given}
     for i, axis in enumerate(AXES):
         if isinstance(given.get(axis), Mapping):

@@ -407,7 +407,7 @@ def _reaches(node: Node, value: Any, *names: str) -> bool:
 
 
 def parameter_names(kind: type[Experiment] | None) -> list[str]:
-    """Names of all that can be set of an experiment: its parameters, and fields of the scenario."""
+    """Names of what can be set: parameters of an experiment, if any, and fields of the scenario."""
     own = parameters(kind) if kind else {}
     return list(dict.fromkeys([*own, *dotted_names(Scenario)]))
 
@@ -425,11 +425,7 @@ def scenario_factory(kind: Callable[P, Experiment]) -> Callable[P, Scenario]:
     assert isinstance(kind, type)
     name = re.sub(r"(?<=.)(?=[A-Z])", "_", kind.__name__).lower()
     refused = "a value is out of its bounds, or the path out of reach."
-    return function_of(kind, name, _scenario_of, refused)
-
-
-def _scenario_of(experiment: Experiment) -> Scenario:
-    return experiment.scenario()
+    return function_of(kind, name, kind.scenario, refused)
 
 
 constant_cut = scenario_factory(ConstantCut)

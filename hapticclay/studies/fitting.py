@@ -19,10 +19,11 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from ..arguments import checked, named
+from ..display import fields_of, table_of
 from ..errors import Bound, ParameterError, choice
 from ..model.constants import AXES
 from ..model.flow import N_MAX, N_MIN, Flow
-from ..results import Result, fields_of, figure_of
+from ..results import Result, figure_of
 from ..simulation.record import Record
 from .flow_models import (
     FLOW_LAWS,
@@ -194,10 +195,7 @@ class Fitted(Result):
         interval = f"{100.0 * self.level:g} % interval"
         head = ("law", "AICc", "weight", "left [N]", "parameter", "fitted", interval)
         return {
-            "parameters": {
-                name: [getattr(p, name) for p in self.parameters]
-                for name in ("name", "unit", "value", "low", "high")
-            },
+            "parameters": table_of(("name", "unit", "value", "low", "high"), self.parameters),
             "samples": {
                 "time [s]": self.t,
                 "velocity [m/s]": self.v,
@@ -206,7 +204,7 @@ class Fitted(Result):
                 f"half the {100 * self.level:g} % band [N]": self.band(self.v),
                 "residual [N]": self.residuals,
             },
-            "candidates": dict(zip(head, zip(*rows, strict=True), strict=True)),
+            "candidates": table_of(head, rows),
         }
 
     def remarks(self) -> list[str]:

@@ -83,7 +83,7 @@ class Design(Result):
         margins: stability margins of the loop.
     """
 
-    drawn_by = "hapticclay.views.result_plots:design_plot"
+    drawn_by = "hapticclay.views.theory_plots:design_plot"
 
     compensator: Compensator
     K: float

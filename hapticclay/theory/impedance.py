@@ -43,7 +43,7 @@ class Impedance(Result):
         rendered: Ze, the desired impedance [N.s/m], complex, shape (n,).
     """
 
-    drawn_by = "hapticclay.views.result_plots:effective_parts_plot"
+    drawn_by = "hapticclay.views.impedance_plots:effective_parts_plot"
 
     omega: np.ndarray
     Z: np.ndarray
