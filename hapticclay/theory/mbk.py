@@ -169,13 +169,6 @@ def renderable(wall: VirtualWall, plane: str = "mass-damper", n: int = 41) -> Re
 # ---- the arm: an admittance --------------------------------------------------------------------
 
 
-def rendering(loop: Loop, M: float, B: float, K: float = 0.0) -> Loop:
-    """The loop whose compensator is the admittance 1/(M s^2 + B s + K)."""
-    M = number("M", M, 1e-6, 1e6, unit="kg")
-    B, K = number("B", B, 0.0, unit="N.s/m"), number("K", K, 0.0, unit="N/m")
-    return replace(loop, compensator=Compensator((1.0,), (1.0, B / M, K / M)), K=1.0 / M)
-
-
 @checked
 def least_mass(
     loop: Loop, decay: float, box: Box | None = None, samples: int = 24

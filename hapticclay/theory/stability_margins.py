@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -211,22 +211,13 @@ def margins(loop: Loop, *, at: str = "compensator") -> Margins:
     n, d = (p.trim() for p in _opened(loop, at, rational))
     if not roots.hurwitz(n + d):
         return NO_MARGINS
-    factor, omega = np.array(roots.crossings(d, n)).reshape(-1, 2).T
-    more, more_at = _extreme(factor, omega, factor > 1.0, np.argmin, math.inf)
-    less, less_at = _extreme(factor, omega, (factor > 0.0) & (factor < 1.0), np.argmax, 0.0)
-    omega, lag = exact_roots.unit_crossings(n, d)
-    every = lag > -1.0
-    turn = np.minimum(lag, 2.0 * np.pi - lag)
-    phase, phase_at = _extreme(turn, omega, every, np.argmin, math.inf)
-    delay, delay_at = _extreme(lag / omega, omega, every, np.argmin, math.inf)
-    if n.degree() == d.degree() and abs(n.coef[-1]) >= abs(d.coef[-1]):
-        delay, delay_at = 0.0, math.inf  # L does not roll off: any delay makes it encircle -1
+    factors, crossed = roots.crossings(d, n), exact_roots.unit_crossings(n, d)
+    rolls_off = n.degree() < d.degree() or abs(n.coef[-1]) < abs(d.coef[-1])
     n, d = exact_roots.approximate(n), exact_roots.approximate(d)
     worst, disk_at = roots.peak_ratio(d - n, d + n)
-    disk = 2.0 / worst
-    return Margins(
-        True, (less, more), phase, delay, disk, (less_at, more_at), phase_at, delay_at, disk_at
-    )
+    found = _margins(factors, *crossed, (2.0 / worst, disk_at))
+    # where L does not roll off, any delay makes it encircle -1
+    return found if rolls_off else replace(found, delay=0.0, delay_omega=math.inf)
 
 
 def _is_timed(loop: Loop, at: str) -> bool:
@@ -252,20 +243,10 @@ def _response_margins(family: gain_crossings.LoopFamily, K: float) -> Margins:
     if not family.stable(K):
         return NO_MARGINS
     found = [*gain_crossings.gain_crossings(family), (family.most, math.inf)]
-    factor, omega = np.array(found).T / [[K or 1e-300], [1.0]]
-    more, more_at = _extreme(factor, omega, (factor > 1.0) & (factor < np.inf), np.argmin, math.inf)
-    less, less_at = _extreme(factor, omega, factor < 1.0, np.argmax, 0.0)
+    factors = [(crossing / (K or 1e-300), omega) for crossing, omega in found]
     omega = np.array(gain_crossings.unit_crossings(family, K) if K else [])
     lag = np.angle(-family.h(omega)) + np.pi if len(omega) else omega
-    every = lag > -1.0
-    turn = np.minimum(lag, 2.0 * np.pi - lag)
-    phase, phase_at = _extreme(turn, omega, every, np.argmin, math.inf)
-    delay, delay_at = _extreme(lag / omega, omega, every, np.argmin, math.inf)
-
-    disk, disk_at = _response_disk(family, K, [w for _, w in found])
-    return Margins(
-        True, (less, more), phase, delay, disk, (less_at, more_at), phase_at, delay_at, disk_at
-    )
+    return _margins(factors, omega, lag, _response_disk(family, K, [w for _, w in found]))
 
 
 def _response_disk(
@@ -294,14 +275,28 @@ def _response_disk(
     return 2.0 * least, at
 
 
-def _extreme(
-    value: np.ndarray, omega: np.ndarray, mask: np.ndarray, pick: Callable, none: float
-) -> tuple[float, float]:
-    """The value that `pick` selects within the mask, and its omega; (none, nan) if it is empty."""
-    if not np.any(mask):
-        return none, math.nan
-    i = np.flatnonzero(mask)[pick(value[mask])]
-    return float(value[i]), float(omega[i])
+def _margins(
+    factors: Sequence[tuple[float, float]],
+    omega: np.ndarray,
+    lag: np.ndarray,
+    disk: tuple[float, float],
+) -> Margins:
+    """Margins of a stable loop.
+
+    They follow from the factors on the gain at which a pole crosses, with their frequencies; the
+    frequencies at which |L| = 1, with the phase ahead of -1; and the disk margin.
+    """
+    none = math.inf, math.nan
+    more = min((x for x in factors if 1.0 < x[0] < math.inf), default=none)
+    less = max((x for x in factors if 0.0 < x[0] < 1.0), default=(0.0, math.nan))
+    turns = zip(np.minimum(lag, 2.0 * np.pi - lag).tolist(), omega.tolist(), strict=True)
+    phase, phase_at = min(turns, default=none)
+    delays = zip((lag / omega).tolist(), omega.tolist(), strict=True)
+    delay, delay_at = min(delays, default=none)
+    return Margins(
+        True, (less[0], more[0]), phase, delay, disk[0], (less[1], more[1]), phase_at, delay_at,
+        disk[1],
+    )  # fmt: skip
 
 
 @of_loop("K", "b", "operator", timing=True)
