@@ -15,7 +15,7 @@ import numpy as np
 from ..arguments import checked
 from ..errors import Bound, ParameterError
 from ..kernel.engine import warnings_caught
-from ..scene.plausible import warn_of
+from ..scene.plausible import warn_implausible
 from ..scene.scenario import Scenario
 from . import record
 from .engines import engine_for
@@ -125,7 +125,7 @@ def checked_scenarios(scenarios: Iterable[Any], seen: set[Any]) -> Iterator[Scen
         scene = id(s.clay), s.origin, s.arm, s.operator
         if len(seen) < WARNED and scene not in seen:
             seen.add(scene)
-            warn_of(s)
+            warn_implausible(s)
         if s.controller is not None:
             s.controller.function()  # imported here, not in a thread
         yield s

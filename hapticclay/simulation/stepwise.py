@@ -17,7 +17,7 @@ from ..kernel.engine import warnings_caught
 from ..model.hardware import JOINTS
 from ..model.operator import Operator
 from ..model.sampled_controller import Controller
-from ..scene.plausible import warn_of
+from ..scene.plausible import warn_implausible
 from ..scene.scenario import Scenario
 from . import record
 from .engines import engine_for
@@ -108,7 +108,7 @@ class Simulation:
     def _begin(self, scenario: Scenario) -> None:
         place = scenario.clay, scenario.origin, scenario.arm, scenario.operators
         if place != self._warned:  # warn of clay out of reach and the like once
-            warn_of(scenario)
+            warn_implausible(scenario)
             self._warned = place
         kept = self._kept() | {"keep_for_monitor": True}
         self._run = Run(scenario, 1, self._maker, self._workspace, **kept)
