@@ -637,7 +637,7 @@ def test_another_kind_of_unit_is_refused(text, unit):
 def test_every_unit_of_a_bound_is_known():
     for kind in (hc.Scenario, *EXPERIMENTS.values()):
         for field in leaves(kind):
-            unit = field.bound.unit
+            unit = field.unit
             if unit.endswith("^n"):  # of a consistency, which depends on n
                 assert units.parse_unit(unit) is None
                 continue
