@@ -1,0 +1,390 @@
+"""Which gain, rate and delay an arm's joints carry: exact limits of their sampled loop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arguments import checked, named
+from ..arms.joint_law import JointPD, checked_law
+from ..arms.mechanism import Linear
+from ..arms.mjcf_arm import MjcfArm
+from ..errors import number
+from ..results import Result, Tables
+from . import joint_crossings, roots
+from .joint_families import Families, Limit
+from .joint_loop import JointLoop, grid
+
+LATEST = 2.0  # [s] largest added delay that is looked for
+SLOWEST = 1.0  # [s] largest control sample that is looked for
+PERIODS = 120  # control samples tried, evenly in their logarithm
+STEP = 1e-4  # relative step of differences
+ROUNDS = 30  # of the search for a delay
+IGNORED = "joint friction, encoder counts, torque limits, backlash and elastic links: left out"
+
+
+@named
+@dataclass(frozen=True, repr=False, eq=False)
+class JointLimits(Result):
+    """What the joints of an arm carry at a pose, all coupled.
+
+    A pair (least, largest) is the interval of a gain around the present one in which the loop is
+    stable, the others as they are; of an unstable loop the nearest such interval, NaN if there is
+    none.
+
+    Attributes:
+        names: joints, shape (n,).
+        stiffness: present Kp [N.m/rad], shape (n,).
+        damping: present Kd [N.m.s/rad], shape (n,).
+        Ts: control sample [s].
+        delay: from a sample to its torque [s].
+        radius: largest eigenvalue of the map over a sample: below 1 the loop is stable.
+        frequency: of that motion [Hz].
+        joint: joint that moves most in it.
+        scale: largest factor of all Kp; NaN if no factor is stable.
+        buzz: frequency at that factor [Hz].
+        Kp: least and largest Kp of each joint [N.m/rad], shape (n, 2).
+        Kp_buzz: frequency at the largest [Hz], shape (n,); NaN without one.
+        Kd: least and largest Kd of each joint [N.m.s/rad], shape (n, 2).
+        Kd_scale: least and largest factor of all Kd.
+        delay_left: delay that may be added [s]; 0 if the loop is unstable; inf for more than 2 s.
+        slowest_rate: lowest rate up to the present one down to which the loop is stable [Hz].
+        friction_slope: largest slope of a friction fed forward at rest, Fc k + Fv, of each joint
+            [N.m.s/rad], shape (n,).
+        Kp_change: change of the largest Kp of each joint with its rotor inertia
+            [N.m/rad/(kg.m^2)], its damping [1/s] and the delay [N.m/rad/s], shape (n, 3).
+        scale_change: change of the factor with these of each joint [1/(kg.m^2), rad/(N.m.s)],
+            shape (n, 2).
+        scale_per_delay: change of the factor with the delay [1/s].
+        assumed: what the verdict rests on, and what it leaves out, a sentence each.
+    """
+
+    drawn_by = "hapticclay.views.joint_plots:limits_plot"
+
+    names: tuple[str, ...]
+    stiffness: np.ndarray
+    damping: np.ndarray
+    Ts: float
+    delay: float
+    radius: float
+    frequency: float
+    joint: str
+    scale: float
+    buzz: float
+    Kp: np.ndarray
+    Kp_buzz: np.ndarray
+    Kd: np.ndarray
+    Kd_scale: tuple[float, float]
+    delay_left: float
+    slowest_rate: float
+    friction_slope: np.ndarray
+    Kp_change: np.ndarray
+    scale_change: np.ndarray
+    scale_per_delay: float
+    assumed: tuple[str, ...] = ()
+
+    @property
+    def stable(self) -> bool:
+        """Whether the present gains are stable."""
+        return self.radius < 1.0
+
+    def headline(self) -> str:
+        """The verdict in one line."""
+        at = f"{1.0 / self.Ts:.4g} Hz, {1e3 * self.delay:.3g} ms late"
+        if not self.stable:
+            told = (
+                f"unstable at {at}: radius {self.radius:.4g}, {self.frequency:.4g} Hz, {self.joint}"
+            )
+            return told + f"; {self._way_back()}"
+        more = (
+            "any factor"
+            if math.isinf(self.scale)
+            else f"{self.scale:.4g} times ({self.buzz:.3g} Hz)"
+        )
+        left = "any" if math.isinf(self.delay_left) else f"{1e3 * self.delay_left:.3g} ms"
+        return f"stable at {at}: all Kp up to {more}, delay left {left}, {self.joint} first"
+
+    def _way_back(self) -> str:
+        if math.isnan(self.scale):
+            return "no common factor of Kp is stable"
+        return f"all Kp times {self.scale:.4g} or less would be stable"
+
+    def tables(self) -> Tables:
+        """Gains and limits of each joint; how the limits move; the whole arm."""
+        joints = {
+            "joint": self.names,
+            "Kp [N.m/rad]": self.stiffness,
+            "least Kp [N.m/rad]": self.Kp[:, 0],
+            "largest Kp [N.m/rad]": self.Kp[:, 1],
+            "buzz [Hz]": self.Kp_buzz,
+            "Kd [N.m.s/rad]": self.damping,
+            "least Kd [N.m.s/rad]": self.Kd[:, 0],
+            "largest Kd [N.m.s/rad]": self.Kd[:, 1],
+            "friction slope [N.m.s/rad]": self.friction_slope,
+        }
+        moves = {
+            "joint": self.names,
+            "largest Kp per rotor inertia [1/s^2]": self.Kp_change[:, 0],
+            "largest Kp per damping [1/s]": self.Kp_change[:, 1],
+            "largest Kp per delay [N.m/rad/s]": self.Kp_change[:, 2],
+            "factor per rotor inertia [1/(kg.m^2)]": self.scale_change[:, 0],
+            "factor per damping [rad/(N.m.s)]": self.scale_change[:, 1],
+        }
+        arm: dict[str, Any] = {
+            "radius": self.radius,
+            "frequency [Hz]": self.frequency,
+            "joint": self.joint,
+            "largest factor of all Kp": self.scale,
+            "buzz [Hz]": self.buzz,
+            "least factor of all Kd": self.Kd_scale[0],
+            "largest factor of all Kd": self.Kd_scale[1],
+            "delay left [s]": self.delay_left,
+            "lowest rate [Hz]": self.slowest_rate,
+            "factor per delay [1/s]": self.scale_per_delay,
+        }
+        return {"joints": joints, "sensitivity": moves, "arm": {k: [v] for k, v in arm.items()}}
+
+
+def joint_loop(
+    linear: Linear,
+    law: JointPD,
+    Ts: float,
+    delay: float,
+    compensated: bool,
+    gains: tuple[np.ndarray, np.ndarray] | None = None,
+) -> JointLoop:
+    """The loop of an arm at a pose under a law; what a drive does acts between samples.
+
+    Gains, if given, replace Kp and Kd of the law, and may be negative.
+    """
+    stiffness, damping = (np.diag(x) for x in gains or (law.Kp, law.Kd))
+    held, drive = (1.0, 0.0) if law.runs == "host" else (0.0, 1.0)
+    forward = linear.gravity_stiffness * float(compensated)
+    return JointLoop(
+        linear.inertia,
+        linear.damping + drive * damping,
+        linear.stiffness + linear.gravity_stiffness + drive * stiffness,
+        held * stiffness - forward,
+        held * damping - np.diag(law.slopes),
+        Ts,
+        delay,
+        law.velocity,
+        law.cutoff,
+    )
+
+
+@checked
+def joint_limits(arm: MjcfArm, law: JointPD, Ts: float, delay: float = 0.0) -> JointLimits:
+    """Exact limits of gains, delay and rate of an arm's joints, at its pose.
+
+    The arm is linear about its pose: M(q), damping and gravity as the engine has them, constraints
+    as rigid. The host's torques act `delay` after the sample and are held for Ts.
+
+    Args:
+        arm: the arm at its pose.
+        law: gains of the joints, and where they act.
+        Ts: control sample [s], 1e-6 to 1.
+        delay: from a sample to the torque computed from it [s], 0 to 10.
+
+    Raises:
+        ParameterError: the law has another number of joints, or a value is out of its bounds.
+    """
+    study = _Study(arm, law, Ts, delay)
+    loop, joints = study.loop, range(len(law))
+    families = Families(
+        loop,
+        lambda Kp, Kd: study.remade(gains=(Kp, Kd)),
+        {"Kp": np.array(law.Kp), "Kd": np.array(law.Kd)},
+        law.runs == "host",
+    )
+    Kp, Kd = ([families.limit(kind, j) for j in joints] for kind in ("Kp", "Kd"))
+    scale, Kd_scale = families.limit("Kp"), families.limit("Kd")
+    radius, frequency, mover = worst_motion(loop)
+    slopes = np.array(law.slopes) + np.array(law.Kd) - np.array([x.free_low for x in Kd])
+    return JointLimits(
+        arm.names,
+        np.array(law.Kp),
+        np.array(law.Kd),
+        loop.Ts,
+        loop.delay,
+        radius,
+        frequency,
+        arm.names[mover],
+        scale.high,
+        _frequency(scale, loop),
+        _ends(Kp),
+        np.array([_frequency(x, loop) for x in Kp]),
+        _ends(Kd),
+        (Kd_scale.low, Kd_scale.high),
+        delay_left(loop),
+        slowest_rate(study),
+        slopes,
+        *study.changes(families, Kp, scale),
+        study.assumed(),
+    )
+
+
+def _ends(limits: Sequence[Limit]) -> np.ndarray:
+    return np.array([[x.low, x.high] for x in limits])
+
+
+def _frequency(limit: Limit, loop: JointLoop) -> float:
+    return limit.theta / (2.0 * math.pi * loop.Ts)
+
+
+class _Study:
+    """An arm at its pose under a law, remade with other numbers."""
+
+    def __init__(self, arm: MjcfArm, law: JointPD, Ts: float, delay: float):
+        self.Ts = number("Ts", Ts, 1e-6, 1.0, unit="s")
+        self.delay = number("delay", delay, 0.0, 10.0, unit="s")
+        self.arm, self.law = arm, checked_law(law, arm.names)
+        self.compensated = arm.gravity == "compensated" if law.gravity is None else law.gravity
+        self.linear = arm.linear()
+        self.loop = self.remade()
+
+    def remade(self, **changes: Any) -> JointLoop:
+        """The loop with another linear arm, law, Ts or delay."""
+        now = {name: getattr(self, name) for name in ("linear", "law", "Ts", "delay")} | changes
+        return joint_loop(**now, compensated=self.compensated)
+
+    def changes(
+        self, families: Families, Kp: Sequence[Limit], scale: Limit
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """How the largest Kp and the factor change with rotor inertia, damping and delay."""
+        n = len(self.law)
+        of_joint, of_all = np.full((n, 3), math.nan), np.full((n, 2), math.nan)
+        late = [self.remade(delay=self.delay + i * STEP * self.Ts) for i in (0, 1, 2)]
+        every = families._weights("Kp", None)
+        held = self.law.runs == "host"
+        for j in range(n) if held else ():
+            unit = np.eye(n)[j]
+            for k, name in enumerate(("inertia", "damping")):
+                size = STEP * max(getattr(self.linear, name)[j, j], 1e-6)
+                sides = [self._nudged(name, j, sign * size) for sign in (1.0, -1.0)]
+                of_joint[j, k] = _slope(families, unit, Kp[j].theta, sides, 2.0 * size)
+                of_all[j, k] = _slope(families, every, scale.theta, sides, 2.0 * size)
+            of_joint[j, 2] = _slope(families, unit, Kp[j].theta, late, STEP * self.Ts)
+        per_delay = _slope(families, every, scale.theta, late, STEP * self.Ts) if held else math.nan
+        return of_joint, of_all, per_delay
+
+    def _nudged(self, name: str, j: int, by: float) -> JointLoop:
+        matrix = getattr(self.linear, name).copy()
+        matrix[j, j] += by
+        return self.remade(linear=self.linear._replace(**{name: matrix}))
+
+    def assumed(self) -> tuple[str, ...]:
+        """What the verdict rests on, a sentence each."""
+        gravity = "fed forward from the measured pose" if self.compensated else "acts"
+        return (*self.arm.notes, f"gravity: {gravity}", IGNORED)
+
+
+def _slope(
+    families: Families,
+    weights: np.ndarray,
+    theta: float,
+    loops: Sequence[JointLoop],
+    step: float,
+) -> float:
+    """Change of a limit per change of a number: two loops on its sides, or three from it on.
+
+    At the limit -1/change is a real eigenvalue x of the response at theta. A number a moves theta
+    so that x stays real: dx/da = Re x_a - Re x_theta Im x_a/Im x_theta.
+    """
+    if not 0.0 < theta <= math.pi:
+        return math.nan
+    turn = min(1e-6 * theta, 0.5 * (math.pi - theta))
+    here = families.response("Kp", weights)(np.array([theta]))
+    x = _real_eigenvalue(here, None)
+    found = [
+        _real_eigenvalue(families.response("Kp", weights, loop)(np.array([theta])), x)
+        for loop in loops
+    ]
+    if len(found) == 2:
+        by = (found[0] - found[1]) / step
+    else:
+        by = (4.0 * found[1] - 3.0 * found[0] - found[2]) / (2.0 * step)
+    if turn:
+        sides = families.response("Kp", weights)(np.array([theta + turn, theta - turn]))
+        right, left = (_real_eigenvalue(side[None], x) for side in sides)
+        along = (right - left) / (2.0 * turn)
+        by = by.real - along.real * by.imag / along.imag
+    return float(np.real(by) / x.real**2)
+
+
+def _real_eigenvalue(matrices: np.ndarray, near: complex | None) -> complex:
+    """The eigenvalue nearest to another one, or the most nearly real one."""
+    values = np.linalg.eigvals(matrices)[0]
+    if near is None:
+        return complex(values[np.argmin(np.abs(values.imag) / np.abs(values))])
+    return complex(values[np.argmin(np.abs(values - near))])
+
+
+# ---- present motion, delay and rate --------------------------------------------------------------
+
+
+def worst_motion(loop: JointLoop) -> tuple[float, float, int]:
+    """Size of the largest eigenvalue, its frequency [Hz], and the joint that moves most in it."""
+    values, vectors = np.linalg.eig(loop.map())
+    size = np.abs(loop.eigenvalues()[0])
+    i = int(np.argmin(np.abs(np.abs(values) - size)))
+    frequency = abs(np.angle(values[i])) / (2.0 * math.pi * loop.Ts)
+    energy = np.abs(vectors[: loop.n, i]) * np.sqrt(np.diag(loop.inertia))
+    return float(size), float(frequency), int(energy.argmax())
+
+
+def delay_left(loop: JointLoop) -> float:
+    """Delay that may be added to a stable loop [s]; 0 for an unstable one, inf for more than 2 s.
+
+    With whole samples more of delay, a crossing is where an eigenvalue of the open loop has size 1
+    and turns into -1. The share of a sample moves it little, so a few rounds find it.
+    """
+    if not loop.stable():
+        return 0.0
+    total = loop.delay
+    for turn in range(ROUNDS):
+        more = samples_left(loop.with_delay(total), 0.5 if turn else 0.0) * loop.Ts
+        if math.isinf(more) or total + more - loop.delay > LATEST:
+            return math.inf
+        total += more
+        if abs(more) <= 1e-12 * (total + loop.Ts):
+            break
+    return max(0.0, total - loop.delay)
+
+
+def samples_left(loop: JointLoop, before: float = 0.0) -> float:
+    """Whole samples of delay, as a real number, until the first crossing; inf for none.
+
+    Args:
+        loop: the loop.
+        before: how far a crossing may lie before the present delay [samples].
+    """
+
+    def opened(angles: np.ndarray) -> np.ndarray:
+        q, v = loop.open_responses(angles)
+        return -(loop.position @ q + loop.rate @ v)
+
+    theta, x = joint_crossings.zeros(opened, grid(loop), lambda values: np.log(np.abs(values)))
+    late = np.angle(x)[:, None] / theta[:, None] + np.arange(-1, 3) * 2.0 * math.pi / theta[:, None]
+    late = late[late >= -before]
+    return float(late.min(initial=math.inf))
+
+
+def slowest_rate(study: _Study) -> float:
+    """Lowest rate down to which a stable loop stays so, at the same delay [Hz]; NaN if unstable."""
+    if not study.loop.stable():
+        return math.nan
+
+    def stable(Ts: float) -> bool:
+        return study.remade(Ts=Ts).stable()
+
+    low = study.Ts
+    for high in np.geomspace(study.Ts, SLOWEST, PERIODS)[1:].tolist():
+        if not stable(high):
+            return 1.0 / roots.bisect(stable, low, high, 1e-9)[0]
+        low = high
+    return 1.0 / SLOWEST
