@@ -16,7 +16,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import named
-from ..errors import Bound, check_fields
+from ..errors import Bound
+from ..fields import check_fields
 from .constants import L1, L2, S
 
 Columns = tuple[float, float, float, float]

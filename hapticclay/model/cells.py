@@ -10,7 +10,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, number, numbers_of, pair, table_of
+from ..errors import Bound, ParameterError, number, numbers_of, pair, table_of
+from ..fields import check_fields
 from ..formulas.constants import B_MAX
 from .constants import AXES
 from .flow import Consistency, FlowIndex, YieldForce

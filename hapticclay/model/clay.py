@@ -11,7 +11,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, number
+from ..errors import Bound, ParameterError, number
+from ..fields import check_fields
 from ..formulas.constants import B_MAX
 from ..units import is_quantity
 from . import flow, groove, spring

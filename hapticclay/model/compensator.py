@@ -11,7 +11,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..arguments import named
-from ..errors import Bound, ParameterError, check_fields
+from ..errors import Bound, ParameterError
+from ..fields import check_fields
 from ..formulas.compensator import ORDER
 from .constants import C_DEN, C_NUM
 

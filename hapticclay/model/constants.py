@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from ..arguments import named
-from ..errors import Bound, check_fields
-
-AXES = ("x", "y")
+from ..errors import Bound
+from ..fields import AXES as AXES
+from ..fields import check_fields
 
 
 @named

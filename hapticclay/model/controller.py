@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import named
-from ..errors import check_fields
+from ..fields import check_fields
 from .compensator import Compensator
 from .constants import G, S, SecondOrder
 from .traits import Trait

@@ -8,7 +8,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import named
-from ..errors import Bound, check_fields
+from ..errors import Bound
+from ..fields import check_fields
 from ..formulas.constants import B_MAX
 from .traits import LEAST, LEFT_OUT, Column, Hold, Law, Told, multiplied, told_pair, told_values
 

@@ -10,7 +10,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields
+from ..errors import Bound, ParameterError
+from ..fields import check_fields
 from ..formulas.constants import B_MAX
 from .constants import AXES
 from .flow import FY_MAX

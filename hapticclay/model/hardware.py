@@ -9,11 +9,11 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from ..arguments import named
-from ..errors import Bound, ParameterError, check_fields
+from ..errors import Bound, ParameterError
+from ..fields import JOINTS, check_fields
 from .traits import LEFT_OUT, YES, Refusal, Told, Trait, present, told_values
 
 STIFF = 1e12  # [N/m, N.s/m] upper bound of a coupling
-JOINTS = ("shoulder", "elbow")
 
 
 @named

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, choice
+from ..errors import Bound, ParameterError, choice
+from ..fields import check_fields
 from ..formulas.constants import B_MAX
 from .constants import B_CONSTANT
 from .flow import Flow, FlowIndex

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from ..arguments import named
-from ..errors import Bound, check_fields
+from ..errors import Bound
+from ..fields import check_fields
 from ..formulas.constants import B_MAX
 from .traits import Trait
 

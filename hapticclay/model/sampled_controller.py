@@ -9,9 +9,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, cast
 
-from ..arguments import function_name, named
+from ..arguments import named
 from ..display import one_line
-from ..errors import Bound, ParameterError, check_fields
+from ..errors import Bound, ParameterError
+from ..fields import check_fields, function_name
 from .traits import NO, Refusal, Trait
 
 # floats that loop and law share: time [s], joint angles [rad] and rates [rad/s] as

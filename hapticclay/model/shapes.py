@@ -9,7 +9,8 @@ from typing import Annotated
 import numpy as np
 
 from ..arguments import named
-from ..errors import Bound, check_fields, number
+from ..errors import Bound, number
+from ..fields import check_fields
 from . import pieces
 from .signals import Signal
 

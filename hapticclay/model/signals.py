@@ -15,7 +15,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import named
-from ..errors import Bound, ParameterError, check_fields, integer, numbers_of
+from ..errors import Bound, ParameterError, integer, numbers_of
+from ..fields import check_fields
 from . import pieces
 from .traits import LEFT_OUT, Trait
 

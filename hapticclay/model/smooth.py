@@ -10,7 +10,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, pair
+from ..errors import Bound, ParameterError, pair
+from ..fields import check_fields
 from ..formulas.constants import B_MAX
 from ..formulas.smooth import smooth_damping
 from .cells import CellLaw, outline, pixels

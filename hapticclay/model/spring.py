@@ -10,7 +10,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import named
-from ..errors import Bound, ParameterError, check_fields
+from ..errors import Bound, ParameterError
+from ..fields import check_fields
 from .traits import LEFT_OUT, Law, Refusal, Told, told_pair, told_values
 
 STIFFNESS_MAX = 1e9  # [N/m]

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from ..arguments import named
-from ..errors import Bound, check_fields
+from ..errors import Bound
+from ..fields import check_fields
 
 WIDTH_MIN = 4e-3  # [m] two of the largest cells of a picture's map (studies/removal.py)
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Annotated, NamedTuple
 
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, choice, number
+from ..errors import Bound, ParameterError, choice, number
+from ..fields import check_fields
 from ..model.operator import Operator
 from ..scene.scenario import Scenario
 from ..simulation.record import Record

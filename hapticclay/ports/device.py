@@ -12,7 +12,8 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..columns import Sheet, unreadable
-from ..errors import Bound, ParameterError, check_fields, number
+from ..errors import Bound, ParameterError, number
+from ..fields import check_fields
 from ..model.constants import TS
 from ..scene.scenario import Scenario
 from ..simulation.record import Record

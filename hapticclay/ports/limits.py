@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from ..arguments import named
-from ..errors import Bound, check_fields
+from ..errors import Bound
+from ..fields import check_fields
 from .commands import NOTHING, Vector, shortening
 
 PATIENCE = 0.05  # [s] after which a sample counts as lost

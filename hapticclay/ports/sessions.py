@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, Protocol
 
 from ..arguments import named
-from ..errors import Bound, ParameterError, check_fields
+from ..errors import Bound, ParameterError
+from ..fields import check_fields
 from ..scene.scenario import Scenario
 from .buttons import ButtonScript
 from .commands import IDLE, Command, Pair

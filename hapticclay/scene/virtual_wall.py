@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, choice, number
+from ..errors import Bound, ParameterError, choice, number
+from ..fields import check_fields, make_part
 from ..formulas.constants import B_MAX
 from ..model.arm import Arm
 from ..model.hardware import Hardware
@@ -19,7 +20,6 @@ from ..model.signals import Signal
 from ..model.spring import STIFFNESS_MAX
 from .changes import nested
 from .files import read_settings, write_part
-from .given_values import make_part
 from .scenario import Scenario
 
 LEVER = 0.24  # [m] link 1, which is the device: its motions are much smaller

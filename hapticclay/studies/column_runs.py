@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import hashlib
-import json
 import multiprocessing
 import os
 from collections.abc import Callable, Mapping
@@ -16,12 +14,13 @@ import numpy as np
 
 from ..arguments import checked
 from ..errors import integer
-from ..files import versions
+from ..fields import plain_data
 from ..model.constants import AXES
-from ..scene.plain_data import plain_data
 from ..scene.scenario import Scenario
 from ..simulation.column_batch import Columns, simulate_columns
-from . import sweep
+from .store import Plan
+from .store_runs import run_plan
+from .sweep_rows import RESULT_COLUMNS
 
 SCHEMA = "hapticclay-columns-1"
 CHUNK = 10_000  # runs per file: one or two seconds of short runs
@@ -64,25 +63,29 @@ def run_columns(
         ConnectionError: the connection to the scheduler is lost.
         FileNotFoundError: the folder, or a file in it, was removed while the runs were made.
     """
-    plan, folder, done = ColumnRuns(base, columns, chunk), Path(out), 0
-    with sweep.claimed(plan, folder) as (_, todo):
-        results = sweep.run_chunks(plan, folder, todo, workers, scheduler)
-        with contextlib.closing(results):
-            for n in results:
-                done += n
-                if progress:
-                    progress(n)
-    return done
+    plan = ColumnRuns(base, columns, chunk)
+    return run_plan(plan, Path(out), workers, scheduler, progress)
 
 
-class ColumnRuns:
-    """Runs as `sweep` stores them, see sweep.Stored.
+class ColumnRuns(Plan):
+    """Runs of a scenario with columns of numbers in place of some fields.
 
     Args:
         base: as in `run_columns`.
         columns: as in `run_columns`.
         chunk: as in `run_columns`.
     """
+
+    notes = {
+        **{name: RESULT_COLUMNS[name] for name in ("run", "status", "axis", "end_time")},
+        "steps": ("", "engine steps made"),
+        "p_x": ("m", "position at the end"),
+        "v_x": ("m/s", "velocity at the end"),
+        "fh_x": ("N", "force of the operator at the end"),
+        "fe_x": ("N", "resisting force of the clay at the end"),
+        "b_x": ("N.s/m", "damping of the clay at the end"),
+        "energy_residual": RESULT_COLUMNS["energy_residual"],
+    }
 
     def __init__(self, base: Scenario, columns: Mapping[str, Any], chunk: int):
         self.chunk = integer("chunk", chunk, 1, 1_000_000)
@@ -92,18 +95,8 @@ class ColumnRuns:
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
 
-    @property
-    def chunks(self) -> int:
-        """Number of files."""
-        return -(-len(self) // self.chunk)
-
-    def chunk_runs(self, number: int) -> range:
-        """The runs of one file."""
-        return range(number * self.chunk, min((number + 1) * self.chunk, len(self)))
-
-    def chunk_rows(self, number: int) -> list[dict[str, Any]]:
-        """Makes the runs of one file, one row per run."""
-        runs = self.chunk_runs(number)
+    def rows(self, runs: range, late: Callable[[], bool]) -> list[dict[str, Any]]:
+        """Makes the runs of a file."""
         part = {name: x[runs.start : runs.stop] for name, x in self.columns.items()}
         # a worker is one of several processes, one per core
         threads = None if multiprocessing.parent_process() is None else 1
@@ -128,11 +121,6 @@ class ColumnRuns:
         for x in self.columns.values():
             values.update(x.tobytes())
         return values.hexdigest()
-
-    def digest(self) -> str:
-        """Fingerprint of the runs and of the hapticclay release."""
-        text = json.dumps({**self.described(), "release": versions()["hapticclay"]}, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
 
 
 def table_of_ends(made: np.ndarray) -> dict[str, list[Any]]:

@@ -10,7 +10,9 @@ from typing import Literal, get_args
 import numpy as np
 
 from ..arguments import named
-from ..errors import ParameterError, check_fields, choice, number_in
+from ..errors import ParameterError, choice, number_in
+from ..fields import check_fields
+from ..scene.changes import split_words
 
 LawName = Literal["normal", "log-normal", "uniform", "log-uniform"]
 LAWS = get_args(LawName)
@@ -160,13 +162,8 @@ def _normal_share(z: np.ndarray) -> np.ndarray:
 
 def parse_laws(text: str, unit_of: Callable[[str], str] = lambda _: "") -> dict[str, Distribution]:
     """Reads "delay=uniform:0:1e-3 pose.x=normal:0:0.02"."""
-    out: dict[str, Distribution] = {}
     if not isinstance(text, str):
         raise ParameterError("vary", text, "must be a text such as delay=uniform:0:1e-3")
-    for word in text.split():
-        name, equals, law = word.partition("=")
-        if not equals or not name or name in out:
-            bound = "must be name=law:number:number, as in delay=uniform:0:1e-3, each name once"
-            raise ParameterError("vary", word, bound)
-        out[name] = Distribution.parse(name, law, unit_of(name))
-    return out
+    how = "must be name=law:number:number, as in delay=uniform:0:1e-3, each name once"
+    laws = split_words("vary", text.split(), how).items()
+    return {name: Distribution.parse(name, law, unit_of(name)) for name, law in laws}

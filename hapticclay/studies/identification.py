@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import checked, named
+from ..arguments import checked, function_of, named
 from ..errors import ParameterError, choice, flag, integer, number, numbers_of, pair
 from ..files import versions
 from ..formulas import arm as arm_law
@@ -25,7 +25,6 @@ from ..model.constants import AXES, L1, L2, TS, G, S
 from ..model.operator import Operator
 from ..model.signals import Multisine
 from ..results import Result
-from ..scene.fields import function_of
 from ..scene.scenario import Control, Scenario
 from ..simulation.record import Record
 from ..simulation.simulate import simulate

@@ -10,7 +10,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, choice, integer, number, numbers_of
+from ..errors import Bound, ParameterError, choice, integer, number, numbers_of
+from ..fields import check_fields
 from ..model.operator import Operator
 from ..results import Result
 from ..scene.virtual_wall import VirtualWall

@@ -16,7 +16,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, integer, number, numbers_of
+from ..errors import Bound, ParameterError, integer, number, numbers_of
+from ..fields import check_fields
 from ..formulas import hardware
 from ..model.samples import Samples
 from ..model.spring import STIFFNESS_MAX

@@ -15,7 +15,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, integer, number
+from ..errors import Bound, ParameterError, integer, number
+from ..fields import check_fields
 from ..results import Result
 
 NORMAL = NormalDist()

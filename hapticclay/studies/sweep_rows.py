@@ -4,25 +4,19 @@ from __future__ import annotations
 
 import math
 import re
-import time
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from ..errors import ParameterError
 from ..model.constants import AXES
 from ..scene.experiments import parameter_unit
 from ..simulation.record import Record
-from ..simulation.simulate import simulate
 from ..theory.pose_limits import PoseLimits
-from .sampling import Sweep
 
 CROSSINGS_KEPT = 3  # crossings that have columns of their own
-CHUNK_TIME = 1.5  # least time of a file in one process [s], if no chunk was given: a kill loses it
-PROBES = 20  # runs used for an estimate ...
-PROBE_TIME = 5.0  # ... or fewer after this time [s]
-NO_INDEX: dict[str, Any] = {"index_columns": [], "column_indexes": [], "columns": []}  # of pandas
-RESULT_COLUMNS = {  # unit, what it is; crossing1 and x stand for their likes
+Notes = Mapping[str, tuple[str, str]]  # unit and description; crossing1 and x stand for their likes
+RESULT_COLUMNS: Notes = {
     "run": ("", "number of the run"),
     "status": ("", "how it ended; refused if a parameter was out of bounds"),
     "axis": ("", "the unstable axis, empty for none"),
@@ -38,10 +32,10 @@ RESULT_COLUMNS = {  # unit, what it is; crossing1 and x stand for their likes
 }
 
 
-def column_told(name: str) -> tuple[str, str]:
-    """Unit and description of a column of the data set, "" if it has none."""
+def column_note(name: str, notes: Notes = RESULT_COLUMNS) -> tuple[str, str]:
+    """Unit and description of a column of the data set, "" for no unit."""
     like = re.sub("_y$", "_x", re.sub(r"^crossing\d$", "crossing1", name))
-    return RESULT_COLUMNS.get(like) or (parameter_unit(name), "parameter of the run")
+    return notes.get(like) or (parameter_unit(name), "parameter of the run")
 
 
 def result_row(
@@ -88,24 +82,3 @@ def _least_limit(r: Record, axis: str, stretch: dict[str, Any] | None) -> float:
     rows = (r.t >= stretch["from_s"]) & (r.t <= stretch["to_s"])
     low, high = r.p[rows].min(axis=0), r.p[rows].max(axis=0)
     return limits.least(i, (low[0], low[1]), (high[0], high[1])).K
-
-
-def run_point(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:
-    """Makes one run of a sweep and returns its row."""
-    names = list(sweep.vary)
-    try:
-        scenario = sweep.run_scenario(point)
-        return result_row(index, names, point, simulate(scenario))
-    except ParameterError as error:
-        return result_row(index, names, point, None, str(error))
-
-
-def probed(sweep: Sweep, patience: float) -> tuple[list[dict[str, Any]], float]:
-    """Rows of random runs, and their total time [s]."""
-    rows, spent, begin = [], 0.0, time.perf_counter()
-    for i in np.random.default_rng(0).integers(0, len(sweep), PROBES).tolist():
-        rows.append(run_point(sweep, i, sweep.points(i, i + 1)[0]))
-        spent = time.perf_counter() - begin
-        if spent > patience:
-            break
-    return rows, spent

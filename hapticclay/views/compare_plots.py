@@ -12,7 +12,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..model.constants import AXES
-from ..scene.virtual_wall import VirtualWall
 from ..studies.comparison import Compared, Comparison
 from ..theory import stability_margins, wall_limits
 from ..theory.gain_limits import gain_limit
@@ -37,7 +36,7 @@ BAND = 2.0 * math.pi * np.geomspace(0.1, 100.0, 400)  # [rad/s]
 
 def compare_figures(found: Comparison) -> dict[str, tuple[str, shown.Figure]]:
     """Returns the figures of a comparison by name, each with a title."""
-    if isinstance(found[0].subject, VirtualWall):
+    if found[0].loop is None:
         plots: dict[str, tuple[str, Callable[[Comparison], Figure]]] = {
             "zwidth": ("Walls that are stable, by runs and exact", wall_region_plot),
             "passivity": ("Damping to spare over frequency", spare_plot),
@@ -61,8 +60,7 @@ def compare_figures(found: Comparison) -> dict[str, tuple[str, shown.Figure]]:
 
 def main_overlay(found: Comparison) -> Figure:
     """Plots the main difference between the files: stable walls, or velocity over position."""
-    walls = isinstance(found[0].subject, VirtualWall)
-    return wall_region_plot(found) if walls else velocity_overlay(found)
+    return velocity_overlay(found) if found[0].loop else wall_region_plot(found)
 
 
 def _overlay(
@@ -119,19 +117,17 @@ def gain_overlay(found: Comparison) -> Figure:
 
 def _shown_band(x: Compared) -> np.ndarray:
     """Frequencies [rad/s]; for a wall below half of its sampling frequency."""
-    if isinstance(x.subject, VirtualWall):
-        return BAND[BAND < 0.95 * math.pi / x.subject.Ts]
-    return BAND
+    return BAND[BAND < 0.95 * 2.0 * math.pi * x.top]
 
 
 def spare_plot(found: Comparison) -> Figure:
     """Plots the excess damping: passivity index of a sampled wall, Re Z of an arm."""
 
     def spare(x: Compared) -> tuple[np.ndarray, np.ndarray]:
-        if isinstance(x.subject, VirtualWall):
-            edge = math.pi / x.subject.Ts
+        if x.loop is None:
+            edge = math.pi / x.wall.Ts
             omega = np.geomspace(1e-3 * edge, edge * (1.0 - 1e-9), 400)
-            return omega / (2.0 * math.pi), wall_limits.passivity_index(x.subject, omega)
+            return omega / (2.0 * math.pi), wall_limits.passivity_index(x.wall, omega)
         omega = _shown_band(x)
         return omega / (2.0 * math.pi), x.impedance(omega).damping
 
@@ -191,8 +187,8 @@ def transparency_overlay(found: Comparison) -> Figure:
 
 def wall_region_plot(found: Comparison) -> Figure:
     """Plots the walls that each device renders stably, by runs and by theory, and its own wall."""
-    walls = [x.subject for x in found if isinstance(x.subject, VirtualWall)]
-    return regions_plot([replace(x.region, name=x.name) for x in found if x.region], walls)
+    regions = [replace(x.region, name=x.name) for x in found if x.region]
+    return regions_plot(regions, [x.wall for x in found])
 
 
 def push_plot(found: Comparison) -> Figure:

@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..scene.virtual_wall import VirtualWall
-from ..studies.impedance import MeasuredImpedance, Subject
+from ..studies.impedance import MeasuredImpedance
 from ..studies.mbk import ArmMBK, Border, DeviceMBK
+from ..studies.wall import Subject, as_wall
 from ..theory.mbk import PLANES
 from .style import (
     BLACK,
@@ -56,8 +56,8 @@ def impedance_plot(found: MeasuredImpedance) -> Figure:
         figure = Figure(figsize=figure_size(1, 1.0 + 1.7 * len(shown)))
         axes = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
         for ax, (name, label, dots, curve) in zip(axes, shown, strict=True):
-            value = rendered_part(found.subject, name)
-            if value is not None:
+            value = as_wall(found.subject).rendered(name)
+            if value:
                 look: Any = dict(color=BLACK, lw=stroke(0.8), ls=(0, (5, 3)), label="rendered")
                 ax.axhline(value, **look)
             ax.plot(fine, curve, color=BLUE, label="computed")
@@ -194,29 +194,9 @@ def least_mass_plot(found: ArmMBK) -> Figure:
     return figure
 
 
-def rendered_part(subject: Subject, part: str) -> float | None:
-    """Rendered value of a part of a wall or clay, beside the effective one; None if unknown."""
-    letters = {"stiffness": "K", "damping": "B", "mass": "M"}
-    if not isinstance(subject, VirtualWall):
-        letters = {"stiffness": "k", "damping": "b"}
-    value = getattr(subject, letters[part]) if part in letters else 0.0
-    return value or None
-
-
 def _subject_name(subject: Subject) -> tuple[str, ...]:
-    how = "" if subject.Ts is None else f"sampled every {1e3 * subject.Ts:g} ms"
-    late = f"{1e3 * subject.delay:g} ms late" if subject.delay else ""
-    hand = hand_name(subject.operator)
-    if isinstance(subject, VirtualWall):
-        parts = (("K", "N/m"), ("B", "N.s/m"), ("M", "kg"))
-        wall = [f"{n} = {getattr(subject, n):g} {u}" for n, u in parts if getattr(subject, n)]
-        words = [*(wall or ["no wall"]), f"device {subject.device.mass:g} kg", hand, how, late]
-    else:
-        clay = f"b = {subject.b:g} N.s/m" + (f", k = {subject.k:g} N/m" if subject.k else "")
-        words = [f"{subject.axis} axis", clay, f"gain {subject.K:g}", hand]
-        words += [how or "continuous time", late]
-        words += [f"{subject.render} clay"] if subject.Ts else []
-    return tuple(unit_text(x) for x in words if x)
+    words = as_wall(subject).felt_phrases(hand_name(subject.operator))
+    return tuple(unit_text(x) for x in words)
 
 
 def _dots(color: str = BLUE, mark: str = "o") -> Any:

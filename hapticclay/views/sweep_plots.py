@@ -14,7 +14,7 @@ from matplotlib.path import Path
 
 from ..errors import ParameterError, choice
 from ..model.constants import AXES
-from ..studies.sweep_rows import column_told
+from ..studies.sweep_rows import column_note
 from .style import (
     BLACK,
     BLUE,
@@ -253,7 +253,7 @@ def _draw_points(ax: Axes, data: Mapped, look: dict[str, Any]) -> tuple[Any, lis
 
 
 def _column_label(name: str) -> str:
-    unit = column_told(name)[0]
+    unit = column_note(name)[0]
     return name.replace("_", " ") + (f" [{unit}]" if unit else "")
 
 

@@ -13,6 +13,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 
 from ..scene.virtual_wall import VirtualWall
+from ..studies.wall import as_wall
 from ..studies.zwidth import BY_GROWTH, ZRegion, ZWidth
 from .style import (
     BLACK,
@@ -107,7 +108,8 @@ def _draw_region(ax: Axes, r: ZRegion) -> None:
     for limit in r.limits:
         look = dict(LIMIT_LOOKS[limit.name.split(" ")[0]])
         if limit.name.startswith("exact"):
-            label = limit.name if r.linear else f"linear loop, {_left_out(r)} left out"
+            left_out = ", ".join(as_wall(r.wall).left_out)
+            label = limit.name if r.linear else f"linear loop, {left_out} left out"
             label = label.partition(",")[0] + " alone" if narrow() and not r.linear else label
         else:  # one column has no room for the kind beside two names
             label = limit.name + ("" if narrow() else KIND_WORDS[limit.kind])
@@ -222,37 +224,12 @@ def _set_axes(ax: Axes, regions: Sequence[ZRegion], walls: Sequence[VirtualWall]
     plain_ticks(ax.yaxis)
 
 
-def _left_out(r: ZRegion) -> str:
-    """Effects that the linear loop neglects."""
-    assert isinstance(r.wall, VirtualWall)
-    d = r.wall.device
-    parts = [name for name, x in (("friction", d.friction), ("encoder", d.quantum)) if x]
-    return ", ".join(parts + ["surface"] * r.wall.unilateral)
-
-
 def _device_parts(chart: ZWidth) -> list[str]:
     """Phrases for the title: the parts of the device common to all regions."""
-    w = chart.regions[0].wall
-    told = {"Ts": f"Ts = {1e3 * (w.Ts or 0.0):g} ms"}
-    if w.delay:
-        told["delay"] = f"delay = {1e3 * w.delay:g} ms"
-    if isinstance(w, VirtualWall):
-        d = w.device
-        told = {"mass": f"m = {d.mass:g} kg", "damper": f"b = {d.damper:g} N.s/m"} | told
-        if d.friction:
-            told["friction"] = f"fc = {d.friction:g} N"
-        if d.quantum:
-            told["quantum"] = f"Delta = {1e6 * d.quantum:g} um"
-        if w.velocity_window > 1:
-            told["velocity_window"] = f"window = {w.velocity_window} samples"
-        if w.velocity_filter:
-            told["filter"] = f"filter = {w.velocity_filter:g} Hz"
-        if w.unilateral:
-            told["surface"] = "surface"
-    else:
-        told = {"axis": f"arm, {w.axis} axis", "gain": f"Kc = {w.K:g} 1/kg"} | told
+    wall = as_wall(chart.regions[0].wall)
+    told = wall.phrases()
     parts = [unit_text(text) for name, text in told.items() if name != chart.vary]
-    parts.append(hand_name(w.operator))
+    parts.append(hand_name(wall.subject.operator))
     if any(r.verdict != BY_GROWTH for r in chart.regions):
         parts.append(f"rest within {1e6 * chart.press.still:g} um")
     return parts
