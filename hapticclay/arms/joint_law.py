@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, is_series, numbers_of
+from ..errors import Bound, ParameterError, is_series, numbers_of
+from ..fields import check_fields
 from . import gain_files
 
 MOST_GAIN = 1e9

@@ -26,6 +26,7 @@ class Linear(NamedTuple):
         damping: viscous damping of the joints [N.m.s/rad], shape (n, n).
         stiffness: springs of the joints [N.m/rad], shape (n, n).
         gravity_stiffness: change of the gravity torques with the joints [N.m/rad], shape (n, n).
+        weight_stiffness: the same for a unit mass at the handle [N.m/rad/kg], shape (n, n).
         jacobian: velocity of the handle per joint rate [m], shape (3, n); of no use without handle.
     """
 
@@ -33,6 +34,7 @@ class Linear(NamedTuple):
     damping: np.ndarray
     stiffness: np.ndarray
     gravity_stiffness: np.ndarray
+    weight_stiffness: np.ndarray
     jacobian: np.ndarray
 
 
@@ -76,9 +78,9 @@ class Mechanism:
         self._mujoco.mj_fullM(model, self._data, inertia)
         damping = follow.T @ (model.dof_damping[:, None] * follow)
         jacobian = self._jacobian() @ follow
-        springs, gravity = self._stiffness(q)
+        stiffness = self._stiffness(q)
         self._place(place)
-        return Linear(follow.T @ inertia @ follow, damping, springs, gravity, jacobian)
+        return Linear(follow.T @ inertia @ follow, damping, *stiffness, jacobian)
 
     def static_torque(self, q: np.ndarray) -> np.ndarray:
         """Torque that holds the arm against gravity [N.m], shape (n,)."""
@@ -156,14 +158,14 @@ class Mechanism:
         rows, follow = self._constraints()[0], self._follow()
         return bool(np.abs(rows @ follow).max() > 1e-6 * np.abs(rows).max())
 
-    def _static(self) -> tuple[np.ndarray, np.ndarray]:
-        """Torques that hold springs, and gravity, shapes (n,)."""
-        data, follow = self._data, self._follow()
-        weight = data.qfrc_bias - data.qfrc_gravcomp
-        return -follow.T @ data.qfrc_spring, follow.T @ weight
+    def _static(self) -> np.ndarray:
+        """Torques that hold springs, gravity, and a unit mass at the handle, shape (3, n)."""
+        data, up = self._data, -np.array(self._model.opt.gravity)
+        every = -data.qfrc_spring, data.qfrc_bias - data.qfrc_gravcomp, up @ self._jacobian()
+        return np.array(every) @ self._follow()
 
-    def _stiffness(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Central differences of the static torques, shapes (n, n)."""
+    def _stiffness(self, q: np.ndarray) -> np.ndarray:
+        """Central differences of the static torques, shape (3, n, n)."""
         columns = []
         for j in range(len(self.dofs)):
             sides = []
@@ -171,10 +173,10 @@ class Mechanism:
                 there = np.array(q, float)
                 there[j] += sign * STEP
                 self._at(there)
-                sides.append(np.array(self._static()))
+                sides.append(self._static())
             columns.append((sides[0] - sides[1]) / (2.0 * STEP))
-        springs, gravity = np.stack(columns, axis=2)
-        return 0.5 * (springs + springs.T), 0.5 * (gravity + gravity.T)
+        found = np.stack(columns, axis=2)
+        return 0.5 * (found + found.transpose(0, 2, 1))
 
     def _jacobian(self) -> np.ndarray:
         out = np.zeros((3, self._model.nv))

@@ -16,13 +16,15 @@ from ..arms.mjcf_arm import MjcfArm
 from ..errors import number
 from ..results import Result, Tables
 from . import joint_crossings, roots
-from .joint_families import Families, Limit
+from .joint_families import Circle, Family, Limit
 from .joint_loop import JointLoop, grid
 
 LATEST = 2.0  # [s] largest added delay that is looked for
 SLOWEST = 1.0  # [s] largest control sample that is looked for
 PERIODS = 120  # control samples tried, evenly in their logarithm
 STEP = 1e-4  # relative step of differences
+LEAST = 1e-6  # [kg.m^2 or N.m.s/rad] of a number whose step is relative
+BEYOND = 1e-6  # share beyond a limit at which its motion is looked at
 ROUNDS = 30  # of the search for a delay
 IGNORED = "joint friction, encoder counts, torque limits, backlash and elastic links: left out"
 
@@ -193,18 +195,14 @@ def joint_limits(arm: MjcfArm, law: JointPD, Ts: float, delay: float = 0.0) -> J
     Raises:
         ParameterError: the law has another number of joints, or a value is out of its bounds.
     """
-    study = _Study(arm, law, Ts, delay)
+    study = Study(arm, law, Ts, delay)
     loop, joints = study.loop, range(len(law))
-    families = Families(
-        loop,
-        lambda Kp, Kd: study.remade(gains=(Kp, Kd)),
-        {"Kp": np.array(law.Kp), "Kd": np.array(law.Kd)},
-        law.runs == "host",
-    )
-    Kp, Kd = ([families.limit(kind, j) for j in joints] for kind in ("Kp", "Kd"))
-    scale, Kd_scale = families.limit("Kp"), families.limit("Kd")
-    radius, frequency, mover = worst_motion(loop)
-    slopes = np.array(law.slopes) + np.array(law.Kd) - np.array([x.free_low for x in Kd])
+    Kp = [study.family("Kp", j) for j in joints]
+    all_Kp = study.family("Kp")
+    of_Kp, scale = [x.limit() for x in Kp], all_Kp.limit()
+    of_Kd, of_all_Kd = [study.family("Kd", j).limit() for j in joints], study.family("Kd").limit()
+    radius, frequency, _ = worst_motion(loop)
+    slopes = np.array(law.slopes) + np.array(law.Kd) - np.array([x.free_low for x in of_Kd])
     return JointLimits(
         arm.names,
         np.array(law.Kp),
@@ -213,17 +211,17 @@ def joint_limits(arm: MjcfArm, law: JointPD, Ts: float, delay: float = 0.0) -> J
         loop.delay,
         radius,
         frequency,
-        arm.names[mover],
+        arm.names[first_joint(all_Kp, scale)],
         scale.high,
         _frequency(scale, loop),
-        _ends(Kp),
-        np.array([_frequency(x, loop) for x in Kp]),
-        _ends(Kd),
-        (Kd_scale.low, Kd_scale.high),
+        _ends(of_Kp),
+        np.array([_frequency(x, loop) for x in of_Kp]),
+        _ends(of_Kd),
+        (of_all_Kd.low, of_all_Kd.high),
         delay_left(loop),
         slowest_rate(study),
         slopes,
-        *study.changes(families, Kp, scale),
+        *study.changes(list(zip(Kp, of_Kp, strict=True)), (all_Kp, scale)),
         study.assumed(),
     )
 
@@ -236,41 +234,63 @@ def _frequency(limit: Limit, loop: JointLoop) -> float:
     return limit.theta / (2.0 * math.pi * loop.Ts)
 
 
-class _Study:
+class Study:
     """An arm at its pose under a law, remade with other numbers."""
 
-    def __init__(self, arm: MjcfArm, law: JointPD, Ts: float, delay: float):
+    def __init__(
+        self,
+        arm: MjcfArm,
+        law: JointPD,
+        Ts: float,
+        delay: float,
+        q: Sequence[float] | np.ndarray | None = None,
+    ):
         self.Ts = number("Ts", Ts, 1e-6, 1.0, unit="s")
         self.delay = number("delay", delay, 0.0, 10.0, unit="s")
         self.arm, self.law = arm, checked_law(law, arm.names)
         self.compensated = arm.gravity == "compensated" if law.gravity is None else law.gravity
-        self.linear = arm.linear()
+        self.linear = arm.linear(q)
         self.loop = self.remade()
+        self.circle = Circle(self.loop)
 
     def remade(self, **changes: Any) -> JointLoop:
-        """The loop with another linear arm, law, Ts or delay."""
+        """The loop with another linear arm, law, gains, Ts or delay."""
         now = {name: getattr(self, name) for name in ("linear", "law", "Ts", "delay")} | changes
         return joint_loop(**now, compensated=self.compensated)
 
+    def family(self, kind: str, joint: int | None = None) -> Family:
+        """Loops of other gains Kp or Kd of a joint; of a common factor of all joints for None."""
+        gains = np.array([self.law.Kp, self.law.Kd])
+        i, unit = ("Kp", "Kd").index(kind), np.eye(len(self.law))
+        used = slice(None) if joint is None else slice(joint, joint + 1)
+        weights = gains[i] if joint is None else unit[joint]
+
+        def changed(u: float) -> JointLoop:
+            now = gains.copy()
+            now[i] += u * weights
+            return self.remade(gains=(now[0], now[1]))
+
+        left, right = (weights[:, None] * unit)[:, used], unit[:, used]
+        present = 1.0 if joint is None else float(gains[i, joint])
+        of, held = ("position", "rate")[i], self.law.runs == "host"
+        return Family(self.circle, of, left, right, present, changed, held)  # type: ignore[arg-type]
+
     def changes(
-        self, families: Families, Kp: Sequence[Limit], scale: Limit
+        self, Kp: Sequence[tuple[Family, Limit]], common: tuple[Family, Limit]
     ) -> tuple[np.ndarray, np.ndarray, float]:
         """How the largest Kp and the factor change with rotor inertia, damping and delay."""
         n = len(self.law)
         of_joint, of_all = np.full((n, 3), math.nan), np.full((n, 2), math.nan)
-        late = [self.remade(delay=self.delay + i * STEP * self.Ts) for i in (0, 1, 2)]
-        every = families._weights("Kp", None)
-        held = self.law.runs == "host"
-        for j in range(n) if held else ():
-            unit = np.eye(n)[j]
+        step = STEP * self.Ts
+        late = [self.remade(delay=self.delay + i * step) for i in (0, 1, 2)]
+        for j, one in enumerate(Kp):
             for k, name in enumerate(("inertia", "damping")):
-                size = STEP * max(getattr(self.linear, name)[j, j], 1e-6)
+                size = STEP * max(getattr(self.linear, name)[j, j], LEAST)
                 sides = [self._nudged(name, j, sign * size) for sign in (1.0, -1.0)]
-                of_joint[j, k] = _slope(families, unit, Kp[j].theta, sides, 2.0 * size)
-                of_all[j, k] = _slope(families, every, scale.theta, sides, 2.0 * size)
-            of_joint[j, 2] = _slope(families, unit, Kp[j].theta, late, STEP * self.Ts)
-        per_delay = _slope(families, every, scale.theta, late, STEP * self.Ts) if held else math.nan
-        return of_joint, of_all, per_delay
+                of_joint[j, k] = limit_slope(*one, sides, 2.0 * size)
+                of_all[j, k] = limit_slope(*common, sides, 2.0 * size)
+            of_joint[j, 2] = limit_slope(*one, late, step)
+        return of_joint, of_all, limit_slope(*common, late, step)
 
     def _nudged(self, name: str, j: int, by: float) -> JointLoop:
         matrix = getattr(self.linear, name).copy()
@@ -283,44 +303,37 @@ class _Study:
         return (*self.arm.notes, f"gravity: {gravity}", IGNORED)
 
 
-def _slope(
-    families: Families,
-    weights: np.ndarray,
-    theta: float,
-    loops: Sequence[JointLoop],
-    step: float,
-) -> float:
-    """Change of a limit per change of a number: two loops on its sides, or three from it on.
+def limit_slope(family: Family, limit: Limit, loops: Sequence[JointLoop], step: float) -> float:
+    """Change of the upper limit of a held gain per change of a number a of the loop.
 
-    At the limit -1/change is a real eigenvalue x of the response at theta. A number a moves theta
-    so that x stays real: dx/da = Re x_a - Re x_theta Im x_a/Im x_theta.
+    At the limit an eigenvalue x = -1/u of the response is real. A change of a moves theta so that
+    it stays real: dx/da = Re x_a - Re x_theta Im x_a/Im x_theta, and du/da = dx/da / x^2.
+
+    Args:
+        family: loops of the gain.
+        limit: its limits.
+        loops: loops at a + step/2 and a - step/2, or at a, a + step and a + 2 step.
+        step: step of a.
     """
-    if not 0.0 < theta <= math.pi:
+    theta, pi = limit.theta, math.pi
+    if not family.held or not 0.0 < theta <= pi:
         return math.nan
-    turn = min(1e-6 * theta, 0.5 * (math.pi - theta))
-    here = families.response("Kp", weights)(np.array([theta]))
-    x = _real_eigenvalue(here, None)
-    found = [
-        _real_eigenvalue(families.response("Kp", weights, loop)(np.array([theta])), x)
-        for loop in loops
-    ]
-    if len(found) == 2:
-        by = (found[0] - found[1]) / step
-    else:
-        by = (4.0 * found[1] - 3.0 * found[0] - found[2]) / (2.0 * step)
+    here, u = np.array([theta]), limit.high - family.present
+    x = _eigenvalue(family.response(here)[0], -1.0 / u)
+    found = [_eigenvalue(family.response(here, loop)[0], x) for loop in loops]
+    weights = (1.0, -1.0) if len(found) == 2 else (-1.5, 2.0, -0.5)
+    by = sum(w * y for w, y in zip(weights, found, strict=True)) / step
+    turn = min(1e-6 * theta, 0.5 * (pi - theta))
     if turn:
-        sides = families.response("Kp", weights)(np.array([theta + turn, theta - turn]))
-        right, left = (_real_eigenvalue(side[None], x) for side in sides)
+        around = family.response(np.array([theta + turn, theta - turn]))
+        right, left = (_eigenvalue(matrix, x) for matrix in around)
         along = (right - left) / (2.0 * turn)
         by = by.real - along.real * by.imag / along.imag
     return float(np.real(by) / x.real**2)
 
 
-def _real_eigenvalue(matrices: np.ndarray, near: complex | None) -> complex:
-    """The eigenvalue nearest to another one, or the most nearly real one."""
-    values = np.linalg.eigvals(matrices)[0]
-    if near is None:
-        return complex(values[np.argmin(np.abs(values.imag) / np.abs(values))])
+def _eigenvalue(matrix: np.ndarray, near: complex) -> complex:
+    values = np.linalg.eigvals(matrix)
     return complex(values[np.argmin(np.abs(values - near))])
 
 
@@ -335,6 +348,13 @@ def worst_motion(loop: JointLoop) -> tuple[float, float, int]:
     frequency = abs(np.angle(values[i])) / (2.0 * math.pi * loop.Ts)
     energy = np.abs(vectors[: loop.n, i]) * np.sqrt(np.diag(loop.inertia))
     return float(size), float(frequency), int(energy.argmax())
+
+
+def first_joint(family: Family, limit: Limit) -> int:
+    """The joint that moves most in an unstable loop, or just beyond the limit of a stable one."""
+    beyond = family.circle.stable and math.isfinite(limit.high)
+    change = (1.0 + BEYOND) * limit.high - family.present if beyond else 0.0
+    return worst_motion(family.changed(change))[2]
 
 
 def delay_left(loop: JointLoop) -> float:
@@ -374,7 +394,7 @@ def samples_left(loop: JointLoop, before: float = 0.0) -> float:
     return float(late.min(initial=math.inf))
 
 
-def slowest_rate(study: _Study) -> float:
+def slowest_rate(study: Study) -> float:
     """Lowest rate down to which a stable loop stays so, at the same delay [Hz]; NaN if unstable."""
     if not study.loop.stable():
         return math.nan

@@ -1,0 +1,159 @@
+"""The stiffest wall that an arm from a file renders at its handle."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..arguments import checked, named
+from ..arms.mechanism import Linear
+from ..arms.mjcf_arm import MjcfArm
+from ..errors import ParameterError, choice, number
+from ..model.operator import NO_HAND, Operator
+from ..results import Result, Tables
+from .joint_families import Circle, Family
+from .joint_limits import IGNORED
+from .joint_loop import JointLoop
+
+AXES = ("x", "y", "z")
+STILL = 1e-9  # [m] least motion of the handle per joint rate
+Axis = Literal["x", "y", "z"]
+
+
+@named
+@dataclass(frozen=True, repr=False, eq=False)
+class WallLimit(Result):
+    """The stiffest wall at the handle of an arm, along one axis of the world.
+
+    Attributes:
+        axis: axis of the wall.
+        K: largest stable stiffness [N/m]; inf for no limit, 0 or NaN if none is stable.
+        low: least stable stiffness [N/m], mostly 0.
+        frequency: frequency of the buzz there [Hz].
+        mass: mass of arm and hand along the axis, as a push on the handle meets it [kg].
+        B: damping of the wall [N.s/m].
+        Ts: control sample [s].
+        delay: from a sample to its torques [s].
+        assumed: what the verdict rests on, and what it leaves out, a sentence each.
+    """
+
+    drawn_by = "hapticclay.views.joint_plots:wall_plot"
+
+    axis: str
+    K: float
+    low: float
+    frequency: float
+    mass: float
+    B: float
+    Ts: float
+    delay: float
+    assumed: tuple[str, ...] = ()
+
+    def headline(self) -> str:
+        """The limit in one line."""
+        at = f"{1.0 / self.Ts:.4g} Hz, {1e3 * self.delay:.3g} ms late"
+        least = f"{self.low:.4g} to " if self.low > 0.0 else "up to "
+        return (
+            f"wall along {self.axis} at {at}, B = {self.B:g} N.s/m: {least}{self.K:.4g} N/m "
+            f"({self.frequency:.3g} Hz, {self.mass:.3g} kg at the handle)"
+        )
+
+    def tables(self) -> Tables:
+        """The limit, and what is felt along the axis."""
+        row = {
+            "axis": self.axis,
+            "largest K [N/m]": self.K,
+            "least K [N/m]": self.low,
+            "buzz [Hz]": self.frequency,
+            "mass [kg]": self.mass,
+            "B [N.s/m]": self.B,
+            "Ts [s]": self.Ts,
+            "delay [s]": self.delay,
+        }
+        return {"wall": {name: [x] for name, x in row.items()}}
+
+
+def held_arm(linear: Linear, operator: Operator) -> Linear:
+    """The arm with a hand at its handle: mass, damper and spring along x, y and z.
+
+    Gravity acts on the mass, too: it is held as the arm's own weight is.
+    """
+    square = linear.jacobian.T @ linear.jacobian
+    return linear._replace(
+        inertia=linear.inertia + operator.mass * square,
+        damping=linear.damping + operator.damper * square,
+        stiffness=linear.stiffness + operator.spring * square,
+        gravity_stiffness=linear.gravity_stiffness + operator.mass * linear.weight_stiffness,
+    )
+
+
+@checked
+def wall_limit(
+    arm: MjcfArm,
+    axis: Axis,
+    B: float,
+    operator: Operator | None,
+    Ts: float,
+    delay: float = 0.0,
+    velocity: Literal["exact", "difference"] = "exact",
+) -> WallLimit:
+    """Exact limit of the stiffness of a wall at the handle of an arm, at its pose.
+
+    The wall pulls with -(K x + B v) along the axis, by torques J' f of the joints, from x = J q and
+    v = J w at the samples. The hand acts at the handle along all axes.
+
+    Args:
+        arm: the arm at its pose; it has a handle.
+        axis: axis of the world along which the wall pushes.
+        B: damping of the wall [N.s/m], 0 to 1e6.
+        operator: the hand; None for none.
+        Ts: control sample [s], 1e-6 to 1.
+        delay: from a sample to the torques computed from it [s], 0 to 10.
+        velocity: how the rate of the joints is had.
+
+    Raises:
+        ParameterError: the arm has no handle, the handle cannot move along the axis, or a value is
+            out of its bounds.
+    """
+    arm.check_handle()
+    axis = choice("axis", axis, AXES)
+    B = number("B", B, 0.0, 1e6, unit="N.s/m")
+    Ts = number("Ts", Ts, 1e-6, 1.0, unit="s")
+    delay = number("delay", delay, 0.0, 10.0, unit="s")
+    choice("velocity", velocity, ("exact", "difference"))
+    linear = held_arm(arm.linear(), operator or NO_HAND)
+    along = linear.jacobian[AXES.index(axis)]
+    if not np.abs(along).max() > STILL:
+        raise ParameterError("axis", axis, "must be one along which the handle can move")
+    forward = linear.gravity_stiffness * float(arm.gravity == "compensated")
+    square = np.outer(along, along)
+    loop = JointLoop(
+        linear.inertia,
+        linear.damping,
+        linear.stiffness + linear.gravity_stiffness,
+        -forward,
+        B * square,
+        Ts,
+        delay,
+        velocity,
+    )
+
+    def stiffer(K: float) -> JointLoop:
+        return loop.feeding(K * square, np.zeros_like(square))
+
+    column = along[:, None]
+    limit = Family(Circle(loop), "position", column, column, 0.0, stiffer).limit()
+    return WallLimit(
+        axis,
+        limit.high,
+        limit.low,
+        limit.theta / (2.0 * math.pi * Ts),
+        float(1.0 / (along @ np.linalg.solve(linear.inertia, along))),
+        B,
+        Ts,
+        delay,
+        (*arm.notes, IGNORED),
+    )
