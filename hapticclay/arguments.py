@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 import functools
 import inspect
 import itertools
 import os
 import re
-import sys
 import types
-from collections import ChainMap
 from collections.abc import Callable, Collection, Mapping
 from typing import (
     Annotated,
@@ -18,13 +18,14 @@ from typing import (
     ParamSpec,
     TypeVar,
     Union,
+    dataclass_transform,
     get_args,
     get_origin,
     get_type_hints,
 )
 
 from .errors import Bound, ParameterError, nearest
-from .fields import CLASS_WORDS, Node, class_of, field_descriptions, node_of
+from .fields import CLASS_WORDS, Node, check_fields, class_of, field_descriptions, node_of
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -66,14 +67,39 @@ def named(made: F) -> F:
     return guarded  # type: ignore[return-value]
 
 
-class SignatureInWords:
-    """The signature of a class, and of each of its subclasses, with units in words."""
+@dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))
+def part(prefix: str = "", **options: Any) -> Callable[[type[T]], type[T]]:
+    """Makes a frozen dataclass, `named`, whose fields are checked by their annotations.
 
-    def __get__(self, instance: Any, owner: type) -> inspect.Signature:
-        init: Any = owner.__init__
-        scopes = [vars(sys.modules[kind.__module__]) for kind in owner.__mro__]
-        told = in_words(inspect.signature(init), ChainMap(*scopes))
-        return told.replace(parameters=list(told.parameters.values())[1:])
+    Its own `__post_init__` follows the check. prefix stands before the fields in errors.
+    """
+
+    def decorate(kind: type[T]) -> type[T]:
+        own = vars(kind).get("__post_init__")
+
+        def __post_init__(self: Any) -> None:
+            check_fields(self, prefix)
+            if own is not None:
+                own(self)
+
+        kind.__post_init__ = __post_init__  # type: ignore[attr-defined]
+        return named(dataclasses.dataclass(frozen=True, **options)(kind))
+
+    return decorate
+
+
+class SignatureInWords:
+    """The signature of a class, and of each of its subclasses, with units: `float [N/m]`."""
+
+    def __get__(self, instance: Any, owner: Any) -> inspect.Signature:
+        _, *parameters = inspect.signature(owner.__init__).parameters.values()
+        with contextlib.suppress(NameError):  # a type that is imported for type checkers alone
+            source = owner if dataclasses.is_dataclass(owner) else owner.__init__
+            hints = get_type_hints(source, include_extras=True)
+            parameters = [
+                p.replace(annotation=_spelled(hints.get(p.name, p.annotation))) for p in parameters
+            ]
+        return inspect.Signature(parameters)
 
 
 class Words(str):
@@ -82,51 +108,15 @@ class Words(str):
     __repr__ = str.__str__
 
 
-def in_words(signature: inspect.Signature, scope: Mapping[str, Any]) -> inspect.Signature:
-    """A signature with units in place of bounds: `float [N/m]`."""
-    return signature.replace(
-        parameters=[
-            p.replace(annotation=unit_in_words(p.annotation, scope))
-            for p in signature.parameters.values()
-        ]
-    )
-
-
-def unit_in_words(hint: Any, scope: Mapping[str, Any]) -> Any:
-    """An annotation with units in place of bounds, and with aliases expanded."""
-    if not isinstance(hint, str):
-        return hint
+def _spelled(hint: Any) -> Words:
+    """A type without modules and bounds, with its unit."""
     unit = ""
-    if found := re.fullmatch(r"Annotated\[(.*), (?:Bound\((.*)\)|(\w+))\]", hint, re.S):
-        hint, inner, name = found.groups()
-        unit = (
-            scope[name].unit if name else "".join(re.findall(r"(?:, |unit=)'([^']+)'", inner)[:1])
-        )
-    units = [unit] if unit else []
-
-    def spelled(match: re.Match[str]) -> str:
-        named_ = scope.get(match[0])
-        if get_origin(named_) is Annotated:
-            units.append(get_args(named_)[1].unit)
-        return _alias_text(named_) or match[0]
-
-    text = re.sub(r"\b(?<!')[A-Z]\w*\b(?!')", spelled, hint)
-    return Words(text + _of_unit(", ".join(dict.fromkeys(filter(None, units)))))
-
-
-def _alias_text(kind: Any) -> str:
-    """The expansion of an alias of a type; "" for anything else."""
-    if get_origin(kind) is Annotated:
-        kind = get_args(kind)[0]
-    elif get_origin(kind) not in (Literal, Union, types.UnionType):
-        return ""
-    if isinstance(kind, type) and not get_args(kind):
-        return kind.__name__
-    return str(kind).replace("typing.", "")
-
-
-def _of_unit(unit: str) -> str:
-    return f" [{unit}]" if unit else ""
+    if get_origin(hint) is Annotated:
+        hint, *notes = get_args(hint)
+        unit = next((n.unit for n in notes if isinstance(n, Bound)), "")
+    plain = isinstance(hint, type) and not get_args(hint)
+    text = hint.__name__ if plain else re.sub(r"\b(?:[a-z_]\w*\.)+(?=\w)", "", str(hint))
+    return Words(f"{text} [{unit}]" if unit else text)
 
 
 def checked(made: F) -> F:

@@ -16,7 +16,6 @@ from ..errors import (
     Bound,
     ParameterError,
     choice,
-    flag,
     integer,
     is_series,
     nearest,
@@ -51,6 +50,7 @@ class Node:
     bound, none, takes_numbers = Bound(), False, False
     words: tuple[str, ...] = ()
     arity: float = 1
+    members: Sequence[Node] = ()  # whose parts are its parts
 
     def wants(self) -> str:
         """What it takes, in words that follow "must be"."""
@@ -58,6 +58,8 @@ class Node:
 
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
         """The value as the field keeps it; owner has the fields that bounds name."""
+        if not self.fits(value):
+            raise ParameterError(field, value, f"must be {self.wants()}")
         return value
 
     def fits(self, value: Any, old: Any = UNSET) -> bool:
@@ -94,11 +96,17 @@ class Node:
 
     def classes(self) -> dict[str, type]:
         """Classes of the parts that it takes, by lower-case name."""
-        return {}
+        return {name: kind for node in self.members for name, kind in node.classes().items()}
 
     def bounds_at(self, names: Sequence[str]) -> list[Bound]:
         """Bounds of the values at a dotted name below; none where there is no such name."""
-        return [] if names else [self.bound]
+        if not names:
+            return [self.bound]
+        return [bound for node, rest in self.below(*names) for bound in node.bounds_at(rest)]
+
+    def below(self, name: str, *rest: str) -> Iterable[tuple[Node, Sequence[str]]]:
+        """Nodes of a name, and the names below each."""
+        return ()
 
     def leaves(self, path: str, default: Any, about: str) -> Iterator[Field]:
         """The fields below it that take numbers or words; itself if it has no parts."""
@@ -189,8 +197,8 @@ class Flag(Node):
     def wants(self) -> str:
         return "True or False"
 
-    def check(self, field: str, value: Any, owner: Any = None) -> Any:
-        return flag(field, value)
+    def fits(self, value: Any, old: Any = UNSET) -> bool:
+        return isinstance(value, bool)
 
     def _read(self, value: Any, path: str, old: Any) -> Any:
         if isinstance(value, float) and value in (0.0, 1.0):
@@ -220,13 +228,8 @@ class Text(Node):
     def wants(self) -> str:
         return "a non-empty string"
 
-    def check(self, field: str, value: Any, owner: Any = None) -> Any:
-        if not isinstance(value, str) or not value:
-            raise ParameterError(field, value, f"must be {self.wants()}")
-        return value
-
     def fits(self, value: Any, old: Any = UNSET) -> bool:
-        return isinstance(value, str)
+        return isinstance(value, str) and value != ""
 
 
 @functools.lru_cache(maxsize=64)
@@ -304,12 +307,9 @@ class Numbers(Node):
         also = AXES if names == JOINTS else ()
         return {x: i for row in (names, also, place_names(len(names))) for i, x in enumerate(row)}
 
-    def bounds_at(self, names: Sequence[str]) -> list[Bound]:
-        if not names:
-            return [self.bound]
-        first, *rest = names
-        found = first.isdecimal() if self.any_length else first in self._places(0)
-        return self.item.bounds_at(rest) if found else []
+    def below(self, name: str, *rest: str) -> Iterable[tuple[Node, Sequence[str]]]:
+        found = name.isdecimal() if self.any_length else name in self._places(0)
+        return [(self.item, rest)] * found
 
 
 CLASS_WORDS: dict[Any, str] = {

@@ -47,11 +47,6 @@ class Part(Node):
     def wants(self) -> str:
         return " or ".join(dict.fromkeys(map(class_words, self.kinds)))
 
-    def check(self, field: str, value: Any, owner: Any = None) -> Any:
-        if not self.fits(value):
-            raise ParameterError(field, value, f"must be {self.wants()}")
-        return value
-
     def fits(self, value: Any, old: Any = UNSET) -> bool:
         if isinstance(value, str | bytes) and str not in self.kinds:  # no list of characters
             return False
@@ -92,7 +87,7 @@ class Part(Node):
             return super().write(value, old, path, units)
         kind, classes, terms = type(value), self.classes(), terms_field(type(value))
         rest = {name: getattr(value, name) for name in nodes_of(kind) if name != terms}
-        if terms and len(classes) > 1 and all(x == default_of(kind, n) for n, x in rest.items()):
+        if terms and len(classes) > 1 and all(x == defaults_of(kind)[n] for n, x in rest.items()):
             old = UNSET if old is UNSET else None
             return nodes_of(kind)[terms].write(getattr(value, terms), old, path, units)
         data = _fields_as_data(value, old, path, units)
@@ -101,16 +96,10 @@ class Part(Node):
             return data
         return {KIND: kind.__name__.lower(), **data}
 
-    def bounds_at(self, names: Sequence[str]) -> list[Bound]:
-        if not names:
-            return [self.bound]
-        first, *rest = names
-        out = []
+    def below(self, name: str, *rest: str) -> Iterable[tuple[Node, Sequence[str]]]:
         for kind in self.classes().values():
-            out += [NO_BOUND] if first == KIND and not rest else []
-            if first in nodes_of(kind):
-                out += nodes_of(kind)[first].bounds_at(rest)
-        return out
+            if node := nodes_of(kind).get(name, Node() if name == KIND else None):
+                yield node, rest
 
     def leaves(self, path: str, default: Any, about: str) -> Iterator[Field]:
         classes = self.classes()
@@ -130,7 +119,7 @@ class Parts(Node):
     arity = math.inf
 
     def __init__(self, item: Node):
-        self.item, self.bound = item, item.bound
+        self.item, self.members, self.bound = item, (item,), item.bound
 
     def wants(self) -> str:
         return f"a sequence, each {self.item.wants()}"
@@ -165,13 +154,8 @@ class Parts(Node):
         old = UNSET if old is UNSET else None
         return [self.item.write(x, old, join_names(path, i), units) for i, x in enumerate(value)]
 
-    def classes(self) -> dict[str, type]:
-        return self.item.classes()
-
-    def bounds_at(self, names: Sequence[str]) -> list[Bound]:
-        if not names:
-            return [self.bound]
-        return self.item.bounds_at(names[1:]) if names[0].isdecimal() else []
+    def below(self, name: str, *rest: str) -> Iterable[tuple[Node, Sequence[str]]]:
+        return [(self.item, rest)] * name.isdecimal()
 
     def leaves(self, path: str, default: Any, about: str) -> Iterator[Field]:
         if not self.classes():
@@ -184,7 +168,7 @@ class Pair(Node):
     """A pair (x, y) of parts; in plain data also one for both axes."""
 
     def __init__(self, items: tuple[Node, Node], alone: bool):
-        self.items, self.alone = items, alone  # alone: in no union with one part for both axes
+        self.members, self.alone = items, alone  # alone: in no union with one part for both axes
 
     def wants(self) -> str:
         return f"a pair (x, y) of {' or '.join(k.__name__ for k in self.classes().values())}"
@@ -192,7 +176,7 @@ class Pair(Node):
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
         if not isinstance(value, tuple | list) or len(value) != 2:
             raise ParameterError(field, value, f"must be {self.wants()}")
-        pairs = zip(AXES, self.items, value, strict=True)
+        pairs = zip(AXES, self.members, value, strict=True)
         return _as_tuple(value, (n.check(f"{field}.{axis}", x, owner) for axis, n, x in pairs))
 
     def fits(self, value: Any, old: Any = UNSET) -> bool:
@@ -215,7 +199,7 @@ class Pair(Node):
         else:
             return (value, value) if self.alone and dataclasses.is_dataclass(value) else value
         out = []
-        for axis, node, x, part in zip(AXES, self.items, given, before, strict=True):
+        for axis, node, x, part in zip(AXES, self.members, given, before, strict=True):
             inner = join_names(path, axis)
             if x is UNSET and part is UNSET:
                 raise ParameterError(path, value, f"lacks {inner}")
@@ -223,20 +207,15 @@ class Pair(Node):
         return tuple(out)
 
     def write(self, value: Any, old: Any, path: str, units: dict[str, str]) -> Any:
-        rows = zip(AXES, self.items, value, _each_axis(old), strict=True)
+        rows = zip(AXES, self.members, value, _each_axis(old), strict=True)
         axes = {a: node.write(x, o, join_names(path, a), units) for a, node, x, o in rows}
         return {a: x for a, x in axes.items() if x != {}} if isinstance(old, tuple) else axes
 
-    def classes(self) -> dict[str, type]:
-        return self.items[0].classes() | self.items[1].classes()
-
-    def bounds_at(self, names: Sequence[str]) -> list[Bound]:
-        if not names:
-            return [self.bound]
-        return self.items[0].bounds_at(names[1:] if names[0] in AXES else names)
+    def below(self, name: str, *rest: str) -> Iterable[tuple[Node, Sequence[str]]]:
+        return [(self.members[0], rest if name in AXES else (name, *rest))]
 
     def leaves(self, path: str, default: Any, about: str) -> Iterator[Field]:
-        for axis, node, part in zip(AXES, self.items, _each_axis(default), strict=True):
+        for axis, node, part in zip(AXES, self.members, _each_axis(default), strict=True):
             yield from node.leaves(join_names(path, axis), part, about)
 
 
@@ -268,13 +247,8 @@ class Either(Node):
     def write(self, value: Any, old: Any, path: str, units: dict[str, str]) -> Any:
         return self.member(value).write(value, old, path, units)
 
-    def classes(self) -> dict[str, type]:
-        return {name: kind for node in self.members for name, kind in node.classes().items()}
-
-    def bounds_at(self, names: Sequence[str]) -> list[Bound]:
-        if not names:
-            return [self.bound]
-        return [bound for node in self.members for bound in node.bounds_at(names)]
+    def below(self, name: str, *rest: str) -> Iterable[tuple[Node, Sequence[str]]]:
+        return [found for node in self.members for found in node.below(name, *rest)]
 
     def leaves(self, path: str, default: Any, about: str) -> Iterator[Field]:
         parts = next((node for node in self.members if isinstance(node, Part)), None)
@@ -369,7 +343,7 @@ def _family(kind: type) -> Iterator[type]:
         yield from _family(sub)
 
 
-def _as_tuple(value: Sequence[Any], items: Iterable[Any]) -> tuple[Any, ...]:
+def _as_tuple(value: Any, items: Iterable[Any]) -> tuple[Any, ...]:
     """The items of a sequence as a tuple; the sequence itself if it is that tuple."""
     made = tuple(items)
     same = isinstance(value, tuple) and all(map(operator.is_, made, value))
@@ -418,13 +392,9 @@ def check_fields(part: Any, prefix: str = "") -> None:
                 object.__setattr__(part, name, checked)
 
 
-def default_of(kind: type, name: str) -> Any:
-    """The default of a field; UNSET if it has none."""
-    return _defaults(kind)[name]
-
-
 @functools.cache
-def _defaults(kind: type) -> dict[str, Any]:
+def defaults_of(kind: type) -> dict[str, Any]:
+    """The defaults of the fields of a dataclass; UNSET for those that have none."""
     return {
         f.name: f.default_factory() if f.default_factory is not UNSET else f.default
         for f in dataclasses.fields(kind)
@@ -435,7 +405,7 @@ def terms_field(kind: type) -> str:
     """The field of a class that needs nothing but a tuple of parts, as a sum; "" for others."""
     name, node = next(iter(nodes_of(kind).items()), ("", None))
     row = isinstance(node, Parts) and node.classes()
-    alone = all(default_of(kind, x) is not UNSET for x in nodes_of(kind) if x != name)
+    alone = all(defaults_of(kind)[x] is not UNSET for x in nodes_of(kind) if x != name)
     return name if row and alone else ""
 
 
@@ -449,7 +419,7 @@ def leaves(kind: type, path: str = "", part: Any = UNSET) -> tuple[Field, ...]:
     out: list[Field] = []
     about = field_descriptions(kind)
     for name, node in nodes_of(kind).items():
-        default = default_of(kind, name) if part is UNSET else getattr(part, name)
+        default = defaults_of(kind)[name] if part is UNSET else getattr(part, name)
         out += node.leaves(join_names(path, name), default, about[name])
     return tuple(out)
 
@@ -490,7 +460,7 @@ def make_part(
 ) -> T:
     """Makes a part from plain data, over the values it starts with."""
     values = merged_values(kind, data, start, path)
-    lacking = [n for n in nodes_of(kind) if n not in values and default_of(kind, n) is UNSET]
+    lacking = [n for n in nodes_of(kind) if n not in values and defaults_of(kind)[n] is UNSET]
     if lacking:
         bound = f"lacks {', '.join(join_names(path, n) for n in lacking)}"
         raise ParameterError(path or kind.__name__.lower(), dict(data), bound)
@@ -512,7 +482,7 @@ def merged_values(
         inner = join_names(path, name)
         if name not in nodes:
             raise no_field(inner, value, dotted_names(kind, path))
-        out[name] = nodes[name].read(value, inner, start.get(name, default_of(kind, name)))
+        out[name] = nodes[name].read(value, inner, start.get(name, defaults_of(kind)[name]))
     return out
 
 
@@ -546,7 +516,7 @@ def _fields_as_data(
     for name, node in nodes_of(kind).items():
         value, old, inner = getattr(part, name), UNSET, join_names(path, name)
         if than is not UNSET:
-            old = getattr(than, name) if type(than) is kind else default_of(kind, name)
+            old = getattr(than, name) if type(than) is kind else defaults_of(kind)[name]
             if type(old) is type(value) and _same(old, value):
                 continue
             old = None if old is UNSET else old

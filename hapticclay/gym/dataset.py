@@ -12,18 +12,19 @@ import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import gymnasium
 import numpy as np
 
 from .. import __version__
-from ..errors import ParameterError, choice, integer, needing, number
-from ..simulation.engines import ENGINES
+from ..arguments import checked
+from ..errors import Bound, ParameterError, choice, integer, needing
 from ..studies import store
 from ..studies.store_runs import run_plan
 from ..studies.sweep_rows import Notes
 from .baselines import BASELINES, at_random, mean_of, returns
+from .environment import Engine
 from .registry import NAMESPACE
 
 BASELINE = {  # the best policy of `BASELINES` that uses only what an agent observes
@@ -114,13 +115,14 @@ class Recording(store.Plan):
         return {name: np.array(x).ravel() for name, x in zip(COLUMNS, columns, strict=True)}
 
 
+@checked
 def record(
     id: str,
     name: str,
-    episodes: int,
-    noise: float = 0.1,
+    episodes: Annotated[int, Bound(1, 100_000)],
+    noise: Annotated[float, Bound(0.0, 1.0)] = 0.1,
     seed: int = 0,
-    engine: str = "auto",
+    engine: Engine = "auto",
     *,
     progress: Callable[[int], None] | None = None,
 ) -> Any:
@@ -131,9 +133,6 @@ def record(
     never interrupted. The data set appears when it is complete.
     """
     choice("id", id, tuple(BASELINE))
-    choice("engine", engine, ENGINES)
-    episodes = integer("episodes", episodes, 1, 100_000)
-    noise = number("noise", noise, 0.0, 1.0)
     seed = integer("seed", seed, 0, SEEDS - episodes)
     target = _target(name)
     with needing("a data set", "minari", "minari"):

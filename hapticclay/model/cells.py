@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from ..arguments import checked, named
+from ..arguments import checked, part
 from ..errors import Bound, ParameterError, number, numbers_of, pair, table_of
-from ..fields import check_fields
 from ..formulas.constants import B_MAX
 from .constants import AXES
 from .flow import Consistency, FlowIndex, YieldForce
@@ -121,8 +119,7 @@ class CellLaw:
         return self.damping[i : k + 1, j : m + 1].ravel().tolist()
 
 
-@named
-@dataclass(frozen=True)
+@part("clay.")
 class Profile(CellLaw):
     """Damping b of one axis as a piecewise constant function of one coordinate.
 
@@ -149,7 +146,6 @@ class Profile(CellLaw):
     springs: tuple[Spring, ...] = ()
 
     def __post_init__(self):
-        check_fields(self, "clay.")
         regions = range(len(self.edges) + 1)
         if self.springs and len(self.springs) != len(regions):
             bound = f"must be {len(regions)} springs, one a region, got {len(self.springs)}"
@@ -197,8 +193,7 @@ class Profile(CellLaw):
         return np.array([values]).T if self.along == "x" else np.array([values])
 
 
-@named
-@dataclass(frozen=True)
+@part("clay.")
 class Grid(CellLaw):
     """Damping b of one axis on a grid of cells, constant in each.
 
@@ -225,7 +220,6 @@ class Grid(CellLaw):
     n: Annotated[tuple[tuple[float, ...], ...], FlowIndex] = ()
 
     def __post_init__(self):
-        check_fields(self, "clay.")
         check_ascending("clay.x_edges", self.x_edges)
         check_ascending("clay.y_edges", self.y_edges)
         shape = len(self.x_edges) + 1, len(self.y_edges) + 1

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import checked, named
+from ..arguments import checked, part
 from ..errors import Bound, ParameterError, pair
-from ..fields import check_fields
 from ..formulas.constants import B_MAX
 from ..formulas.smooth import smooth_damping
 from .cells import CellLaw, outline, pixels
 from .constants import AXES
 
 
-@named
-@dataclass(frozen=True)
+@part("clay.")
 class Smooth(CellLaw):
     """Damping b of one axis that varies smoothly in space, by a cubic B-spline.
 
@@ -39,7 +36,6 @@ class Smooth(CellLaw):
     values: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m")]
 
     def __post_init__(self):
-        check_fields(self, "clay.")
         outline(self.x, self.y, "clay.")
         if not self.values or not self.values[0]:
             raise ParameterError("clay.values", self.values, "must have a node or more each way")

@@ -9,12 +9,11 @@ Coupling: J. E. Colgate, M. C. Stanley, J. M. Brown, IROS 1995.
 from __future__ import annotations
 
 import statistics
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, NamedTuple
 
-from ..arguments import checked, named
+from ..arguments import checked, part
 from ..errors import Bound, ParameterError, choice, number
-from ..fields import check_fields
 from ..model.operator import Operator
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
@@ -30,8 +29,7 @@ SETTLING = 50  # exchanges without force to measure the period of the device
 LONGEST = 3600.0  # [s] longest session
 
 
-@named
-@dataclass(frozen=True)
+@part("coupling.")
 class Coupled:
     """A spring and a damper between the hand of a device and a simulated handle.
 
@@ -46,7 +44,6 @@ class Coupled:
     plane: str = "xy"
 
     def __post_init__(self):
-        check_fields(self, "coupling.")
         choice("coupling.plane", self.plane, tuple(PLANES))
 
     def check(self, Ts: float) -> None:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import checked, named
+from ..arguments import checked, part
 from ..columns import Sheet, unreadable
 from ..errors import Bound, ParameterError, number
-from ..fields import check_fields
 from ..model.constants import TS
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
@@ -25,8 +24,7 @@ LONGEST = 1e5  # [s] longest session
 FASTEST = 100.0  # [m/s] of a hand
 
 
-@named
-@dataclass(frozen=True)
+@part("hand.")
 class Trajectory:
     """Target of the hand over time: straight from point to point, at rest after the last.
 
@@ -40,7 +38,6 @@ class Trajectory:
     points: Annotated[tuple[tuple[float, ...], ...], Bound(-10.0, 10.0, "m")]
 
     def __post_init__(self):
-        check_fields(self, "hand.")
         if not self.t or len(self.t) != len(self.points):
             raise ParameterError("hand.t", self.t, "must have a place for each time")
         if any(len(p) != 2 for p in self.points):

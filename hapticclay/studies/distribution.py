@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
-from ..arguments import named
+from ..arguments import part
 from ..errors import ParameterError, choice, number_in
-from ..fields import check_fields
 from ..scene.changes import split_words
 
 LawName = Literal["normal", "log-normal", "uniform", "log-uniform"]
@@ -19,8 +17,7 @@ LAWS = get_args(LawName)
 SIDES = ("mean", "standard deviation", "low", "high")
 
 
-@named
-@dataclass(frozen=True)
+@part("distribution.")
 class Distribution:
     """Distribution of a random number. Both numbers have the unit of the parameter.
 
@@ -36,7 +33,6 @@ class Distribution:
     second: float
 
     def __post_init__(self):
-        check_fields(self, "distribution.")
         if self.law.startswith("log") and self.first <= 0.0:
             name = SIDES[0] if self.law == "log-normal" else SIDES[2]
             raise ParameterError(f"distribution {name}", self.first, f"must be > 0 ({self.law})")

@@ -9,9 +9,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import checked, named
+from ..arguments import checked, named, part
 from ..errors import Bound, ParameterError, choice, integer, number, numbers_of
-from ..fields import check_fields
 from ..model.operator import Operator
 from ..results import Result
 from ..scene.virtual_wall import VirtualWall
@@ -254,8 +253,7 @@ class Band(Result):
         return {"band": rows, "hands": hands}
 
 
-@named
-@dataclass(frozen=True)
+@part("draw.")
 class Draw:
     """Number of hands in a band, and their seed.
 
@@ -266,9 +264,6 @@ class Draw:
 
     hands: Annotated[int, Bound(2, MOST_HANDS)] = 200
     seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
-
-    def __post_init__(self):
-        check_fields(self, "draw.")
 
 
 @checked

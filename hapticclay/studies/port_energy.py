@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import checked, named
+from ..arguments import checked, part
 from ..errors import Bound, ParameterError, integer, number, numbers_of
-from ..fields import check_fields
 from ..formulas import hardware
 from ..model.samples import Samples
 from ..model.spring import STIFFNESS_MAX
@@ -43,8 +42,7 @@ K_SHARE = 2e-4  # relative accuracy of limits
 FILTER_TIMES = 12.0  # time constants of the filter before energy is counted
 
 
-@named
-@dataclass(frozen=True)
+@part("path.")
 class Path:
     """A path that a hand imposes on the device: a periodic polygon through the samples.
 
@@ -58,7 +56,6 @@ class Path:
     middles: Annotated[tuple[float, ...], Bound(-0.1, 0.1, "m")] = ()
 
     def __post_init__(self):
-        check_fields(self, "path.")
         if len(self.places) < 2:
             raise ParameterError("path.places", self.places, "must be two places or more")
         if self.middles and len(self.middles) != len(self.places):

@@ -14,9 +14,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import checked, named
+from ..arguments import checked, named, part
 from ..errors import Bound, ParameterError, integer, number
-from ..fields import check_fields
 from ..results import Result
 
 NORMAL = NormalDist()
@@ -26,8 +25,7 @@ MOST_LEVEL = 1e6
 Stimulus = Callable[[float], float]
 
 
-@named
-@dataclass(frozen=True)
+@part("observer.")
 class Observer:
     """A simulated observer that answers at random with a known psychometric function.
 
@@ -42,9 +40,6 @@ class Observer:
     threshold: Annotated[float, Bound(0.0, MOST_LEVEL, above=True)] = 0.08
     spread: Annotated[float, Bound(0.0, MOST_LEVEL, above=True)] = 0.03
     lapse: Annotated[float, Bound(0.0, 0.5)] = 0.0
-
-    def __post_init__(self):
-        check_fields(self, "observer.")
 
     def notices(self, x: float) -> float:
         """Probability that a difference is noticed.
@@ -70,8 +65,7 @@ class Observer:
         return self.threshold + self.spread * NORMAL.inv_cdf((share - half) / (1.0 - self.lapse))
 
 
-@named
-@dataclass(frozen=True)
+@part("staircase.")
 class Staircase:
     """A staircase: the difference falls after several hits in a row, and rises after a miss.
 
@@ -92,7 +86,6 @@ class Staircase:
     skipped: Annotated[int, Bound(0, 9_999)] = 4
 
     def __post_init__(self):
-        check_fields(self, "staircase.")
         integer("staircase.skipped", self.skipped, 0, self.reversals - 1)
 
     @property

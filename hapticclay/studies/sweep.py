@@ -37,7 +37,7 @@ class Sweep(store.Plan):
     """Runs of one experiment, or of a scenario file, over a space of its numbers.
 
     A number is a parameter of the experiment, as on the command line, or any field of the scenario
-    by dotted name (`scene/fields.py`): "servo.x.G.damping", "gain.x", "compensator.den.1". A pair
+    by dotted name: "servo.x.G.damping", "gain.x", "compensator.den.1". A pair
     without axis gets the value on both axes. "operator.mass" adds an arm at the handle.
 
     Attributes:

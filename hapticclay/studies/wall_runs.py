@@ -5,14 +5,12 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import checked, named
+from ..arguments import checked, part
 from ..errors import Bound
-from ..fields import check_fields
 from ..model.spring import STIFFNESS_MAX
 from ..scene.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch
@@ -37,8 +35,7 @@ def unshown(share: float) -> None:
     """Ignores the progress."""
 
 
-@named
-@dataclass(frozen=True)
+@part("press.")
 class Press:
     """The push that tests a wall with a nonlinear loop, and the criterion of rest.
 
@@ -54,9 +51,6 @@ class Press:
     force: Annotated[float, Bound(0.0, 1e3, "N")] = 1.0
     speed: Annotated[float, Bound(0.0, 1.0, "m/s")] = boundary.LARGE_PUSH
     still: Annotated[float, Bound(1e-9, 1e-2, "m")] = 1e-6
-
-    def __post_init__(self):
-        check_fields(self, "press.")
 
 
 PRESS = Press()
