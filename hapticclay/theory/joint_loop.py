@@ -138,7 +138,7 @@ class JointLoop:
 
     def radius(self) -> float:
         """Largest size of an eigenvalue: below 1 the loop is stable."""
-        return float(np.abs(self.eigenvalues()[0]))
+        return float(np.abs(self.eigenvalues()).max(initial=0.0))
 
     def stable(self) -> bool:
         """Whether all motion but rest decays."""

@@ -51,7 +51,7 @@ class OverPoses(Result):
 
     @property
     def worst(self) -> int:
-        """Number of the pose with the least factor, or with the largest radius if one is unstable."""
+        """Number of the pose with the least factor; with the largest radius if one is unstable."""
         unstable = self.radius >= 1.0
         return int(self.radius.argmax() if unstable.any() else np.nanargmin(self.scale))
 

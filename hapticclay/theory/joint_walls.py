@@ -14,11 +14,13 @@ from ..arms.mjcf_arm import MjcfArm
 from ..errors import ParameterError, choice, number
 from ..model.operator import NO_HAND, Operator
 from ..results import Result, Tables
-from .joint_families import Circle, Family
+from .joint_families import Circle, Family, Limit
 from .joint_limits import IGNORED
 from .joint_loop import JointLoop
 
 AXES = ("x", "y", "z")
+LINE = 40  # dampings of the line of limits
+MOST_B = 2.2  # of mass/(Ts + delay): no wall is stable at more damping
 STILL = 1e-9  # [m] least motion of the handle per joint rate
 Axis = Literal["x", "y", "z"]
 
@@ -37,6 +39,8 @@ class WallLimit(Result):
         B: damping of the wall [N.s/m].
         Ts: control sample [s].
         delay: from a sample to its torques [s].
+        line_B: dampings from 0 to that at which no wall is stable [N.s/m].
+        line_K: largest stable stiffness at them [N/m]: the Z-width of the arm along the axis.
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
     """
 
@@ -50,6 +54,8 @@ class WallLimit(Result):
     B: float
     Ts: float
     delay: float
+    line_B: np.ndarray
+    line_K: np.ndarray
     assumed: tuple[str, ...] = ()
 
     def headline(self) -> str:
@@ -73,7 +79,8 @@ class WallLimit(Result):
             "Ts [s]": self.Ts,
             "delay [s]": self.delay,
         }
-        return {"wall": {name: [x] for name, x in row.items()}}
+        line = {"B [N.s/m]": self.line_B, "largest K [N/m]": self.line_K}
+        return {"wall": {name: [x] for name, x in row.items()}, "line": line}
 
 
 def held_arm(linear: Linear, operator: Operator) -> Linear:
@@ -129,31 +136,42 @@ def wall_limit(
     if not np.abs(along).max() > STILL:
         raise ParameterError("axis", axis, "must be one along which the handle can move")
     forward = linear.gravity_stiffness * float(arm.gravity == "compensated")
-    square = np.outer(along, along)
+    still = np.zeros_like(linear.inertia)
     loop = JointLoop(
         linear.inertia,
         linear.damping,
         linear.stiffness + linear.gravity_stiffness,
         -forward,
-        B * square,
+        still,
         Ts,
         delay,
         velocity,
     )
-
-    def stiffer(K: float) -> JointLoop:
-        return loop.feeding(K * square, np.zeros_like(square))
-
-    column = along[:, None]
-    limit = Family(Circle(loop), "position", column, column, 0.0, stiffer).limit()
+    mass = float(1.0 / (along @ np.linalg.solve(linear.inertia, along)))
+    limit = _limit(loop, along, B)
+    line_B = np.linspace(0.0, max(MOST_B * mass / (Ts + delay), 1.2 * B), LINE)
+    line_K = np.array([_limit(loop, along, b).high for b in line_B.tolist()])
     return WallLimit(
         axis,
         limit.high,
         limit.low,
         limit.theta / (2.0 * math.pi * Ts),
-        float(1.0 / (along @ np.linalg.solve(linear.inertia, along))),
+        mass,
         B,
         Ts,
         delay,
+        line_B,
+        np.nan_to_num(line_K, nan=0.0, posinf=math.inf),
         (*arm.notes, IGNORED),
     )
+
+
+def _limit(loop: JointLoop, along: np.ndarray, B: float) -> Limit:
+    """Stable stiffness of a wall with damping B [N/m]."""
+    square, column = np.outer(along, along), along[:, None]
+    damped = loop.feeding(0.0 * square, B * square)
+
+    def stiffer(K: float) -> JointLoop:
+        return damped.feeding(K * square, 0.0 * square)
+
+    return Family(Circle(damped), "position", column, column, 0.0, stiffer).limit()
