@@ -19,12 +19,13 @@ if TYPE_CHECKING:
 
 LIGHTEST = 1e-12  # [kg.m^2] least eigenvalue of M of a mechanism with an inverse
 TIED = 1e-6  # [rad or m] chains of a file that are open by more are closed, and it is noted
-BOUNDS = {  # least, largest, unit
-    "pose": (-1e3, 1e3, "rad or m"),
-    "armature": (0.0, 1e3, "kg.m^2"),
-    "damping": (0.0, 1e6, "N.m.s/rad"),
-    "friction": (0.0, 1e6, "N.m"),
+BOUNDS = {  # least and largest value, units at a hinge and at a slide
+    "pose": (-1e3, 1e3, "rad", "m"),
+    "armature": (0.0, 1e3, "kg.m^2", "kg"),
+    "damping": (0.0, 1e6, "N.m.s/rad", "N.s/m"),
+    "friction": (0.0, 1e6, "N.m", "N"),
 }
+SLIDE = 2  # MuJoCo's number of a joint that slides
 IN_MODEL = {  # fields of the model with a value per degree of freedom
     "armature": "dof_armature",
     "damping": "dof_damping",
@@ -69,7 +70,7 @@ def load(arm: MjcfArm) -> Loaded:
     fields: dict[str, Any] = {"joints": names, "site": None if site is None else _name(model, site)}
     for field, of in IN_MODEL.items():
         values = getattr(model, of)
-        values[dofs] = per_joint(field, getattr(arm, field), names, values[dofs])
+        values[dofs] = _per_joint(model, field, getattr(arm, field), joints, values[dofs])
         fields[field] = tuple(values[dofs].tolist())
     mechanism = Mechanism(model, dofs, site, pose)
     _check_mechanism(mechanism, names)
@@ -220,28 +221,26 @@ def _driven(model: Any, chain: list[int]) -> list[int]:
 # ---- values --------------------------------------------------------------------------------------
 
 
-def per_joint(
-    field: str, given: Any, names: Sequence[str], old: Sequence[float] | np.ndarray
+def _per_joint(
+    model: Any, field: str, given: Any, joints: Sequence[int], old: np.ndarray
 ) -> list[float]:
-    """A value for each joint: given by name, or one for each; `old` for those not given.
-
-    Raises:
-        ParameterError: there is no such joint, the count is wrong, or a value is out of bounds.
-    """
-    low, high, unit = BOUNDS[field]
+    """A value for each joint: given by name, or one for each; `old` for those not given."""
+    names = [model.joint(j).name for j in joints]
     if given is None:
-        return [float(x) for x in old]
-    if isinstance(given, Mapping):
+        pairs: dict[int, Any] = {}
+    elif isinstance(given, Mapping):
         pairs = {names.index(full_name(field, word, names)): x for word, x in given.items()}
-    else:
-        if not is_series(given) or len(list(given)) != len(names):
-            bound = f"must be a number for each joint ({', '.join(names)}), or by name"
-            raise ParameterError(field, given, bound)
+    elif is_series(given) and len(list(given)) == len(names):
         pairs = dict(enumerate(given))
-    return [
-        number(f"{field}[{name}]", pairs[i], low, high, unit=unit) if i in pairs else float(old[i])
-        for i, name in enumerate(names)
-    ]
+    else:
+        bound = f"must be a number for each joint ({', '.join(names)}), or by name"
+        raise ParameterError(field, given, bound)
+    low, high, *units = BOUNDS[field]
+    out = [float(x) for x in old]
+    for i, x in pairs.items():
+        unit = units[int(model.jnt_type[joints[i]]) == SLIDE]
+        out[i] = number(f"{field}[{names[i]}]", x, low, high, unit=unit)
+    return out
 
 
 def full_name(field: str, word: Any, names: Sequence[str]) -> str:
@@ -264,11 +263,8 @@ def _pose(model: Any, given: Any, joints: list[int]) -> np.ndarray:
     keys = {model.key(i).name: i for i in range(model.nkey)}
     if "home" in keys:
         start = np.array(model.key_qpos[keys["home"]], float)
-    names = [model.joint(j).name for j in range(model.njnt)]
-    if isinstance(given, Mapping):
-        return np.array(per_joint("pose", given, names, start))
-    own = per_joint("pose", given, [names[j] for j in joints], start[joints])
-    start[joints] = own
+    which = range(model.njnt) if isinstance(given, Mapping) else joints
+    start[which] = _per_joint(model, "pose", given, which, start[which])
     return start
 
 

@@ -44,7 +44,9 @@ def _intervals(ax: Axes, present: np.ndarray, limits: np.ndarray, label: str) ->
     for i, (a, b) in enumerate(np.clip(limits, low, high).tolist()):
         ax.barh(i, b - a, left=a, height=0.5, color=BLUE, alpha=0.35)
     inside = (limits[:, 0] <= present) & (present < limits[:, 1])
-    ax.scatter(present, range(len(present)), color=[BLACK if x else VERMILION for x in inside], zorder=3)
+    ax.scatter(
+        present, range(len(present)), color=[BLACK if x else VERMILION for x in inside], zorder=3
+    )
     ax.set(xscale="log", xlim=(low, high), xlabel=unit_text(label))
 
 
