@@ -68,7 +68,7 @@ def test_the_map_is_that_of_pieces_of_motion(seed):
 @given(seed=st.integers(0, 10**6))
 @settings(max_examples=40, deadline=None)
 def test_the_other_map_turns_unstable_at_each_limit(seed):
-    """The upper end of each interval: the radius passes 1 there, exact to 1e-6 of the gain."""
+    """The upper end of each interval: the radius passes 1 within 1e-5 of the gain."""
     linear, law, Ts, delay = drawn(seed)
     loop = joint_loop(linear, law, Ts, delay, False)
     e = np.eye(len(law))
@@ -85,11 +85,11 @@ def test_the_other_map_turns_unstable_at_each_limit(seed):
             limit = Family(Circle(loop), of, column, column, gains[j], changed).limit()
             if not math.isfinite(limit.high) or limit.high <= 1e-6:
                 continue
-            for share, stable in ((1.0 - 1e-6, True), (1.0 + 1e-6, False)):
+            for share, stable in ((1.0 - 1e-5, True), (1.0 + 1e-5, False)):
                 now = np.array(gains)
                 now[j] = limit.high * share
                 size = other_radius(linear, law, Ts, delay, **{kind: now})
-                assert bool(size < 1.0 + 1e-10) is stable, (kind, j, limit, size)
+                assert bool(size < 1.0 + 1e-11) is stable, (kind, j, limit, size)
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.5e-3, 2e-3])
