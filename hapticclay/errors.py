@@ -259,13 +259,14 @@ def pair(
     return x, y
 
 
-def choice(field: str, value: object, valid: Sequence[str]) -> str:
-    """Returns value if it is one of the valid names."""
+def choice(field: str, value: object, valid: Sequence[str], wants: str = "") -> str:
+    """Returns value if it is one of the valid names; wants: what else is valid, with them."""
     if isinstance(value, str) and value in valid:
         return value
     near = nearest(value, valid) if isinstance(value, str) else []
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise ParameterError(field, value, f"must be one of {', '.join(valid)}{hint}")
+    wants = wants or f"one of {', '.join(valid)}"
+    raise ParameterError(field, value, f"must be {wants}{hint}")
 
 
 @dataclass(frozen=True)
@@ -291,7 +292,8 @@ class Bound:
         low, high = self.low, self.high
         limits = [f"{'>' if self.above else '>='} {_spelled(low)}"] * (low != -math.inf)
         limits += [f"<= {high:g}"] * (high < math.inf)
-        words = ["a finite number", " and ".join(limits), self.unit]
+        unit = self.unit if limits or not self.unit else f"in {self.unit}"
+        words = ["a finite number", " and ".join(limits), unit]
         return " ".join(filter(None, words))
 
     def integer_words(self) -> str:

@@ -6,12 +6,11 @@ import math
 import textwrap
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated, Any
-
-import tyro
+from typing import Any
 
 from ..errors import ParameterError
 from ..fields import UNSET, Field, Node, dotted_names, leaves, no_field
+from .options import Loose
 
 WIDTH = 96  # of the text
 
@@ -29,7 +28,7 @@ class FieldsCommand:
             an experiment, such as constant, prints its parameters.
     """
 
-    names: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
+    names: Loose[tuple[str, ...]] = ()
 
     def __call__(self) -> int:
         from ..scene.experiments import EXPERIMENTS, parameters

@@ -7,14 +7,13 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
-import tyro
-
-from ..errors import ParameterError
+from ..errors import Bound, ParameterError
 from ..files import writable
 from . import console
 from .device_options import DeviceOptions
+from .options import RecordWord
 from .run import deliver
 from .unused import FIGURE_WORDS, Unused, undrawn
 
@@ -52,7 +51,7 @@ class ViewCommand:
             paper's arm at rest.
         tool_width: Width of the tool [m].
         tool_depth: Depth of the cut [m].
-        out: Folder for record.npz, summary.json and the plots.
+        out: Folder for record.npz, summary.json and the plots; by default out/view/EXPERIMENT.
         every: Keep every n-th sample in the record.
         plots: Draw the plots.
         web: Show the session in a browser; no display is needed on this machine.
@@ -64,13 +63,11 @@ class ViewCommand:
             localhost:9870, for PlotJuggler.
     """
 
-    scenario: Annotated[Any, tyro.conf.arg(constructor_factory=console.scenario_words)]
+    scenario: RecordWord
     stiffness: float = 10.0
-    tool_width: float = field(default_factory=tool_size("width"))
-    tool_depth: float = field(default_factory=tool_size("depth"))
-    out: Annotated[
-        Path | None, tyro.conf.arg(help_behavior_hint="(default: out/view/EXPERIMENT)")
-    ] = None
+    tool_width: Annotated[float, Bound(unit="m")] = field(default_factory=tool_size("width"))
+    tool_depth: Annotated[float, Bound(unit="m")] = field(default_factory=tool_size("depth"))
+    out: Path | None = None
     every: int = 10
     plots: bool = True
     web: bool = False

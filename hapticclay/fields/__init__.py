@@ -11,18 +11,18 @@ or number for both axes, parts by index, a start from the values there are.
 """
 
 from .nodes import AXES as AXES
-from .nodes import CLASS_WORDS as CLASS_WORDS
 from .nodes import ENTIRE as ENTIRE
 from .nodes import JOINTS as JOINTS
 from .nodes import KIND as KIND
 from .nodes import UNSET as UNSET
+from .nodes import Axis as Axis
 from .nodes import Field as Field
 from .nodes import Node as Node
+from .nodes import Seed as Seed
 from .nodes import function_name as function_name
 from .nodes import join_names as join_names
 from .nodes import no_field as no_field
 from .tree import check_fields as check_fields
-from .tree import class_of as class_of
 from .tree import dotted_names as dotted_names
 from .tree import field_descriptions as field_descriptions
 from .tree import field_unit as field_unit

@@ -10,7 +10,7 @@ import os
 import pkgutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from ..errors import (
     Bound,
@@ -27,6 +27,8 @@ from ..errors import (
 from ..units import is_quantity
 
 AXES = ("x", "y")
+Axis = Literal["x", "y"]
+Seed = Annotated[int, Bound(0, 2**32 - 1)]
 JOINTS = ("shoulder", "elbow")  # also named x and y
 KIND = "kind"  # key of the class, for a field of several classes
 ENTIRE = None  # key of the value of a whole field, besides those of its entries
@@ -146,7 +148,7 @@ class Field(NamedTuple):
 
 def limits(bound: Bound, owner: Any) -> dict[str, Any]:
     """Arguments of `number`; owner has the field that the bound names."""
-    low = getattr(owner, bound.low) if isinstance(bound.low, str) else bound.low
+    low = getattr(owner, bound.low, -math.inf) if isinstance(bound.low, str) else bound.low
     return {"low": low, "high": bound.high, "above": bound.above, "unit": bound.unit}
 
 
@@ -223,13 +225,16 @@ class Word(Node):
 
 
 class Text(Node):
-    """A text that is not empty."""
+    """A text, which may be empty where the default is."""
+
+    def __init__(self, empty: bool = False):
+        self.empty = empty
 
     def wants(self) -> str:
-        return "a non-empty string"
+        return "a string" if self.empty else "a non-empty string"
 
     def fits(self, value: Any, old: Any = UNSET) -> bool:
-        return isinstance(value, str) and value != ""
+        return isinstance(value, str) and (self.empty or value != "")
 
 
 @functools.lru_cache(maxsize=64)

@@ -239,7 +239,10 @@ class Either(Node):
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
         if value is None and self.none:
             return None
-        return self.member(value).check(field, value, owner)
+        member = self.member(value)
+        if isinstance(member, Word) and self.takes_numbers:
+            return choice(field, value, self.words, self.wants())
+        return member.check(field, value, owner)
 
     def _read(self, value: Any, path: str, old: Any) -> Any:
         return self.member(value, old).read(value, path, old)
@@ -263,14 +266,17 @@ class Either(Node):
 PLAIN = {float: Number, int: Whole}
 
 
-def node_of(hint: Any, bound: Bound = NO_BOUND) -> Node:
-    """The node of a type hint, whose numbers have a bound."""
+def node_of(hint: Any, bound: Bound | None = NO_BOUND) -> Node:
+    """The node of a type hint, whose numbers have a bound.
+
+    Without one, numbers, texts, tuples and arrays may be anything, as a function checks them.
+    """
     node = _node_of(hint, bound)
     node.hint = get_args(hint)[0] if get_origin(hint) is Annotated else hint
     return node
 
 
-def _node_of(hint: Any, bound: Bound) -> Node:
+def _node_of(hint: Any, bound: Bound | None) -> Node:
     origin, args = get_origin(hint), get_args(hint)
     if origin is Annotated:
         inner, *notes = args
@@ -279,18 +285,20 @@ def _node_of(hint: Any, bound: Bound) -> Node:
         return _union_node(args, bound)
     if origin is Literal:
         return Word(args)
+    if hint is bool:
+        return Flag()
+    kind = class_of(hint)
+    if kind not in (None, str):
+        return Part((kind,))
+    if bound is None or hint is Any or hint is object:
+        return Node()
     if origin is tuple:
         return _tuple_node(args, bound)
     if hint in PLAIN:
         return PLAIN[hint](bound)
-    if hint in (bool, str):
-        return Flag() if hint is bool else Text()
-    if hint is Any or hint is object:
-        return Node()
-    kind = class_of(hint)
-    if kind is None:
-        raise TypeError(f"{hint}: no check for fields of this type")
-    return Part((kind,))
+    if hint is str:
+        return Text()
+    raise TypeError(f"{hint}: no check for fields of this type")
 
 
 def class_of(hint: Any) -> Any:
@@ -303,13 +311,15 @@ def class_of(hint: Any) -> Any:
     return kind if known else None
 
 
-def _union_node(args: tuple[Any, ...], bound: Bound) -> Node:
+def _union_node(args: tuple[Any, ...], bound: Bound | None) -> Node:
     """Members from the most special to the one that takes the rest; their classes are one."""
     none, pathlike = type(None) in args, any(class_of(x) is os.PathLike for x in args)
     classes = [class_of(x) for x in args if x is not str or pathlike]
     if all(classes) and (len(classes) == len(args)) and set(classes) != {bool, type(None)}:
         return Part(tuple(classes))
     nodes = [node_of(x, bound) for x in args if x is not type(None)]
+    if any(type(node) is Node for node in nodes):
+        return Node()
     kinds = tuple(k for node in nodes if isinstance(node, Part) for k in node.kinds)
     members = [node for node in nodes if not isinstance(node, Part)]
     if kinds:
@@ -319,7 +329,7 @@ def _union_node(args: tuple[Any, ...], bound: Bound) -> Node:
             node.alone = False
     order = (Pair, Parts, Word, Numbers, Part, Flag, Text, Number, Node)
     members.sort(key=lambda node: next(i for i, k in enumerate(order) if isinstance(node, k)))
-    return Either(members, none, bound)
+    return Either(members, none, bound or NO_BOUND)
 
 
 def _tuple_node(args: tuple[Any, ...], bound: Bound) -> Node:
@@ -361,7 +371,10 @@ def _each_axis(value: Any) -> tuple[Any, Any]:
 def nodes_of(kind: type) -> dict[str, Node]:
     """The types of the fields of a dataclass by name."""
     hints = get_type_hints(kind, include_extras=True)
-    return {field.name: node_of(hints[field.name]) for field in dataclasses.fields(kind)}
+    return {
+        field.name: Text(empty=True) if field.default == "" else node_of(hints[field.name])
+        for field in dataclasses.fields(kind)
+    }
 
 
 @functools.cache

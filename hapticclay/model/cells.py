@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Sequence
-from typing import Annotated, Any, Literal
+from collections.abc import Callable, Iterable
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..arguments import checked, part
-from ..errors import Bound, ParameterError, number, numbers_of, pair, table_of
+from ..errors import Bound, ParameterError, numbers_of
+from ..fields import Axis
 from ..formulas.constants import B_MAX
 from .constants import AXES
 from .flow import Consistency, FlowIndex, YieldForce
@@ -19,6 +20,11 @@ from .traits import (
 )
 
 OPTIONAL = ("growth", "Fy", "K", "n")  # further values of each region or cell
+Edges = Annotated[tuple[float, ...], Bound(unit="m")]
+Span = Annotated[tuple[float, float], Bound(unit="m")]
+Image = Annotated[tuple[tuple[float, ...], ...], Bound(0.0, 1.0)]
+BlackWhite = Annotated[tuple[float, float], Bound(0.0, B_MAX, "N.s/m", names=("black", "white"))]
+Outside = Annotated[float, Bound(0.0, B_MAX, "N.s/m")]
 
 
 class CellLaw:
@@ -138,7 +144,7 @@ class Profile(CellLaw):
 
     edges: Annotated[tuple[float, ...], Bound(unit="m")]
     values: Annotated[tuple[float, ...], Bound(0.0, B_MAX, "N.s/m")]
-    along: Literal["x", "y"] = "x"
+    along: Axis = "x"
     growth: Annotated[tuple[float, ...], Bound(0.0, B_MAX, "N.s/m per s")] = ()
     Fy: Annotated[tuple[float, ...], YieldForce] = ()
     K: Annotated[tuple[float, ...], Consistency] = ()
@@ -211,8 +217,8 @@ class Grid(CellLaw):
         n: flow index of each cell, as values, 0.05 to 4; empty for 1, and without K.
     """
 
-    x_edges: Annotated[tuple[float, ...], Bound(unit="m")]
-    y_edges: Annotated[tuple[float, ...], Bound(unit="m")]
+    x_edges: Edges
+    y_edges: Edges
     values: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m")]
     growth: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m per s")] = ()
     Fy: Annotated[tuple[tuple[float, ...], ...], YieldForce] = ()
@@ -266,9 +272,9 @@ class Grid(CellLaw):
     def of_function(
         cls,
         b: Callable[[float, float], float],
-        x_edges: Sequence[float],
-        y_edges: Sequence[float],
-        outside: float = 0.0,
+        x_edges: Edges,
+        y_edges: Edges,
+        outside: Outside = 0.0,
     ) -> Grid:
         """Makes a grid with the values of a function at the centres of its cells.
 
@@ -282,27 +288,23 @@ class Grid(CellLaw):
             ParameterError: there are fewer than two borders, or a value of the function is out of
                 bounds.
         """
-        names = ("clay.x_edges", x_edges), ("clay.y_edges", y_edges)
-        x, y = (
-            numbers_of(field, edges, [str(i) for i in range(len(edges))], unit="m")
-            for field, edges in names
-        )
-        for field, edges in names:
+        both = {"clay.x_edges": x_edges, "clay.y_edges": y_edges}
+        for field, edges in both.items():
             if len(edges) < 2:
                 raise ParameterError(field, edges, "must have at least two edges per axis")
-        middles = [[0.5 * (a + b) for a, b in zip(e, e[1:], strict=False)] for e in (x, y)]
+        middles = [[0.5 * (a + b) for a, b in zip(e, e[1:], strict=False)] for e in both.values()]
         inner = [[b(at, across) for across in middles[1]] for at in middles[0]]
-        return cls(x, y, _framed(inner, outside))
+        return cls(x_edges, y_edges, _framed(inner, outside))
 
     @classmethod
     @checked
     def of_image(
         cls,
-        image: Any,
-        x: tuple[float, float],
-        y: tuple[float, float],
-        b: tuple[float, float],
-        outside: float = 0.0,
+        image: Image,
+        x: Span,
+        y: Span,
+        b: BlackWhite,
+        outside: Outside = 0.0,
     ) -> Grid:
         """Makes a grid with one cell per pixel of an image; see also `gray_image`.
 
@@ -318,10 +320,10 @@ class Grid(CellLaw):
             ParameterError: the image is not a table of numbers from 0 to 1, or another argument
                 is out of bounds.
         """
-        (x0, x1), (y0, y1) = outline(x, y)
+        check_outline(x, y)
         inner = pixels(image, b)
         columns, rows = inner.shape
-        edges = np.linspace(x0, x1, columns + 1), np.linspace(y0, y1, rows + 1)
+        edges = np.linspace(*x, columns + 1), np.linspace(*y, rows + 1)
         along_x, along_y = (tuple(e.tolist()) for e in edges)
         return cls(along_x, along_y, _framed(inner, outside))
 
@@ -343,20 +345,15 @@ def _leave_out(law: Profile | Grid) -> None:
         object.__setattr__(law, "n", ())
 
 
-def outline(
-    x: tuple[float, float], y: tuple[float, float], prefix: str = ""
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Checks and returns the outline along x and along y [m]."""
-    spans = pair(f"{prefix}x", x, unit="m"), pair(f"{prefix}y", y, unit="m")
-    for field, span in zip(AXES, spans, strict=True):
-        check_ascending(prefix + field, span)
-    return spans
+def check_outline(x: tuple[float, float], y: tuple[float, float], prefix: str = "") -> None:
+    """Refuses an outline [m] that does not ascend."""
+    check_ascending(f"{prefix}x", x)
+    check_ascending(f"{prefix}y", y)
 
 
-def pixels(image: Any, b: tuple[float, float]) -> np.ndarray:
+def pixels(image: tuple[tuple[float, ...], ...], b: tuple[float, float]) -> np.ndarray:
     """Damping of the pixels of an image [N.s/m], starting at the lowest x and y, x first."""
-    gray = np.array(table_of("image", image, 0.0, 1.0))
-    black, white = pair("b", b, 0.0, B_MAX, unit="N.s/m")
+    gray, (black, white) = np.array(image), b
     if not gray.size:
         raise ParameterError("image", image, "must have pixels")
     return ((1.0 - gray) * black + gray * white)[::-1].T
@@ -364,8 +361,7 @@ def pixels(image: Any, b: tuple[float, float]) -> np.ndarray:
 
 def _framed(inner: Any, outside: float) -> Any:
     """Values of cells, surrounded by the values of the outer cells."""
-    value = number("outside", outside, 0.0, B_MAX, unit="N.s/m")
-    return np.pad(np.asarray(inner), 1, constant_values=value)
+    return np.pad(np.asarray(inner), 1, constant_values=outside)
 
 
 def check_ascending(field: str, edges: tuple[float, ...]) -> None:

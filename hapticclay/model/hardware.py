@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arguments import part
 from ..errors import Bound, ParameterError
-from ..fields import JOINTS
+from ..fields import JOINTS, Seed
 from .traits import LEFT_OUT, YES, Refusal, Told, Trait, present, told_values
 
 STIFF = 1e12  # [N/m, N.s/m] upper bound of a coupling
@@ -79,7 +79,7 @@ class Hardware:
     friction: Annotated[tuple[float, float], Bound(0.0, 1e6, "N.m", names=JOINTS)] = (0.0, 0.0)
     passivity: bool = False
     coupling: Coupling | None = None
-    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
+    seed: Seed = 0
 
     def __post_init__(self):
         if self.velocity == "exact" and (

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..arguments import part
 from ..errors import Bound, ParameterError, integer
+from ..fields import Seed
 from . import pieces
 from .traits import LEFT_OUT, Trait
 
@@ -236,7 +237,7 @@ class Multisine(Signal):
     high: Annotated[float, Bound("low", 1e6, "Hz")] = 2.0
     period: Annotated[float, Bound(1e-3, 1e5, "s")] = 20.0
     lines: Annotated[int | None, Bound(1, MOST_LINES)] = None
-    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
+    seed: Seed = 0
 
     def __post_init__(self):
         first = math.ceil(self.low * self.period - 1e-9)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arguments import checked, part
 from ..columns import Sheet, unreadable
-from ..errors import Bound, ParameterError, number
+from ..errors import Bound, ParameterError
 from ..model.constants import TS
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
@@ -193,8 +193,6 @@ def replace_scenario(record: Record, scenario: Scenario) -> Record:
 
 def device_scenario(scenario: Scenario, period: float | None, clay: bool) -> tuple[Scenario, int]:
     """The scenario of a device, and the number of control samples per period."""
-    if period is not None:
-        period = number("period", period, 1e-5, 1.0, unit="s")
     Ts = scenario.Ts
     if Ts is None and period is not None:
         Ts = period / math.ceil(period / TS - 1e-9)

@@ -20,8 +20,10 @@ from ..arguments import checked, function_of, named
 from ..errors import Bound, ParameterError
 from ..fields import (
     ENTIRE,
+    Axis,
     Field,
     Node,
+    Seed,
     check_fields,
     dotted_names,
     field_descriptions,
@@ -308,9 +310,9 @@ class StabilityTest(Experiment):
 
     gain: Annotated[float, Bound(0.0, 1e6, "1/kg", above=True)] = GAINS_FIG11[1]
     b: Damping = B_STABILITY
-    axis: Literal["x", "y"] = "x"
+    axis: Axis = "x"
     rms: Annotated[float, Bound(0.0, 1e6, "N")] = 1.0
-    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
+    seed: Seed = 0
     _: dataclasses.KW_ONLY
     operator: Operator | None = Operator()
     t_max: Duration = 20.0

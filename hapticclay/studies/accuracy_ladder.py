@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import ParameterError
-from ..files import versions
+from ..results import Result, fields_of, figure_of
 from ..scene.scenario import Scenario
 from ..simulation.asked_error import METHODS, choices
 from ..simulation.engines import engine_for
@@ -24,7 +24,6 @@ from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..simulation.step_comparison import ROUNDING_LEFT, Trace, compare_positions, compare_times
 
-LADDER_SCHEMA = "hapticclay-accuracy-1"
 TOP = 0.02  # [s] longest step; the others are halves of halves of it
 RUNGS, QUICK_RUNGS = 9, 6  # steps of the fast integrator, down to 0.08 ms, 0.6 ms
 ACCURATE_FROM = 2  # halvings at which the accurate integrator begins: 5 ms
@@ -37,6 +36,10 @@ BRIEF, REPEATS = 0.3, 3  # [s] runs that take less are timed so often; the media
 CLEAR = 3.0  # an error so many times that of the reference is one of the setting
 ASKED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)  # [s], [m] cheapest settings are named for
 SAMPLED = "sampled, Ts = dt"
+CHEAPEST = {  # tables of the fastest settings, by unit of the error
+    "s": "Cheapest setting by error in the times of the border crossings",
+    "m": "Cheapest setting by error in the position",
+}
 
 
 @dataclass(frozen=True)
@@ -65,8 +68,8 @@ class Setting:
         return self.time if unit == "s" else self.position
 
 
-@dataclass(frozen=True)
-class Ladder:
+@dataclass(frozen=True, repr=False)
+class Ladder(Result):
     """Errors of one scenario at many settings.
 
     Attributes:
@@ -78,6 +81,19 @@ class Ladder:
         simulated: simulated time of the reference [s].
         notes: remarks for the reader.
     """
+
+    drawn_by = "hapticclay.views.accuracy_plots:accuracy_plot"
+    written_as = "accuracy"
+    printed = dict.fromkeys(CHEAPEST.values(), ())
+    formats = {
+        "requested error [s]": ".0e",
+        "requested error [m]": ".0e",
+        "error of border times [s]": ".1e",
+        "error of position [m]": ".1e",
+        "dt [s]": ".3g",
+        "run time [s]": ".2g",
+    }
+    summary_units = {"dt": "s", "time": "s", "position": "m", "wall": "s", "simulated_time": "s"}
 
     scenario: Scenario
     engine: str
@@ -115,7 +131,7 @@ class Ladder:
         return out
 
     def tables(self) -> dict[str, dict[str, list]]:
-        """Returns what a figure of the ladder shows: errors and run time of each setting."""
+        """Errors and run time of each setting; the fastest setting for each requested error."""
         settings = {
             "method": [x.series for x in self.settings],
             "dt [s]": [x.dt for x in self.settings],
@@ -124,28 +140,55 @@ class Ladder:
             "run time [s]": [x.wall for x in self.settings],
             "status": [x.status for x in self.settings],
         }
-        return {"settings": settings}
+        return {"settings": settings} | {CHEAPEST[u]: self._cheapest_table(u) for u in self.units()}
 
-    def summary(self) -> dict[str, Any]:
-        """Everything, ready for JSON."""
+    def _cheapest_table(self, unit: str) -> dict[str, list]:
+        found = self.cheapest(unit)
         return {
-            "schema": LADDER_SCHEMA,
-            "scenario": dataclasses.asdict(self.scenario),
+            f"requested error [{unit}]": list(found),
+            "integrator": [x.series for x in found.values()],
+            "dt [s]": [x.dt for x in found.values()],
+            f"error [{unit}]": [self.error_text(x, unit) for x in found.values()],
+            "run time [s]": [x.wall for x in found.values()],
+        }
+
+    def error_text(self, setting: Setting, unit: str) -> str:
+        """The error of a setting; "<" where it does not clearly exceed that of the reference."""
+        error = setting.error(unit)
+        if error is None:
+            return "-"
+        least = CLEAR * (self.left[unit] or 0.0)
+        return f"{error:.1e}" if self.shown(setting, unit) else f"< {least:.1e}"
+
+    def remarks(self) -> list[str]:
+        """The reference, its error, and notes."""
+        left = [f"{e:.1e} {u}" for u, e in self.left.items() if e and u in self.units()]
+        within = f", good to {' and '.join(left)}" if left else ""
+        return [f"Errors are against the {self.reference}{within}.", *self.notes]
+
+    def headline(self) -> str:
+        """Settings and their reference, in one line."""
+        return f"{len(self.settings)} settings of {self.scenario.name}: {self.remarks()[0]}"
+
+    def figures(self) -> dict[str, Any]:
+        """Error over run time."""
+        shown = {"settings": self.tables()["settings"]}
+        return {"accuracy": figure_of(self, tables=shown)}
+
+    def contents(self) -> dict[str, Any]:
+        """Everything."""
+        return {
+            "scenario": self.scenario,
             "engine": self.engine,
             "reference": self.reference,
             "reference_error": self.left,
             "simulated_time": self.simulated,
-            "settings": [dataclasses.asdict(x) for x in self.settings],
+            "settings": self.settings,
             "cheapest": {
-                unit: [
-                    {"asked": asked, **dataclasses.asdict(x)}
-                    for asked, x in self.cheapest(unit).items()
-                ]
+                unit: [{"asked": e, **fields_of(x)} for e, x in self.cheapest(unit).items()]
                 for unit in self.units()
             },
-            "notes": list(self.notes),
-            "units": {"dt": "s", "time": "s", "position": "m", "wall": "s", "simulated_time": "s"},
-            "versions": versions(),
+            "notes": self.notes,
         }
 
 

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import multiprocessing
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..arguments import checked
-from ..errors import integer
+from ..errors import Bound
 from ..fields import plain_data
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
+from ..simulation.batch import SUMMARY
 from ..simulation.column_batch import Columns, simulate_columns
 from .store import Plan
 from .store_runs import run_plan
 from .sweep_rows import RESULT_COLUMNS
+from .workers import batch_threads
 
 SCHEMA = "hapticclay-columns-1"
 CHUNK = 10_000  # runs per file: one or two seconds of short runs
@@ -33,8 +34,8 @@ def run_columns(
     columns: Mapping[str, Any],
     out: str | os.PathLike[str],
     *,
-    chunk: int = CHUNK,
-    workers: int | None = None,
+    chunk: Annotated[int, Bound(1, 1_000_000)] = CHUNK,
+    workers: Annotated[int | None, Bound(1, 1024)] = None,
     scheduler: str | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> int:
@@ -88,32 +89,30 @@ class ColumnRuns(Plan):
     }
 
     def __init__(self, base: Scenario, columns: Mapping[str, Any], chunk: int):
-        self.chunk = integer("chunk", chunk, 1, 1_000_000)
-        drawn = Columns(base, columns)  # refuses bad ones
-        self.base, self.columns = base, drawn.columns
+        self.chunk, self.base = chunk, base
+        self.columns = Columns(base, columns).columns  # refuses bad ones
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
 
     def rows(self, runs: range, late: Callable[[], bool]) -> list[dict[str, Any]]:
         """Makes the runs of a file."""
-        part = {name: x[runs.start : runs.stop] for name, x in self.columns.items()}
-        # a worker is one of several processes, one per core
-        threads = None if multiprocessing.parent_process() is None else 1
-        made = table_of_ends(simulate_columns(self.base, part, threads=threads))
-        table = {"run": list(runs), **{name: x.tolist() for name, x in part.items()}, **made}
-        return [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
+        columns = self._values(runs)
+        return _rows(runs, columns, simulate_columns(self.base, columns, threads=batch_threads()))
 
     def blank_row(self) -> dict[str, Any]:
         """A row, for the types of its columns."""
-        ends = {f"{name}_{axis}": 0.0 for name in ENDS for axis in AXES}
-        first = {"run": 0, **dict.fromkeys(self.columns, 0.0), "status": "", "axis": ""}
-        return {**first, "end_time": 0.0, "steps": 0, **ends, "energy_residual": 0.0}
+        return _rows(range(1), self._values(range(1)), np.zeros(1, SUMMARY))[0]
+
+    def _values(self, runs: range) -> dict[str, np.ndarray]:
+        return {name: x[runs.start : runs.stop] for name, x in self.columns.items()}
 
     def described(self) -> dict[str, Any]:
         """The runs as plain data; the columns by their names and a fingerprint."""
-        told = {"base": plain_data(self.base), "columns": list(self.columns), "runs": len(self)}
-        return {"schema": SCHEMA, **told, "chunk": self.chunk, "values": self._fingerprint}
+        return {
+            "schema": SCHEMA, "base": plain_data(self.base), "columns": list(self.columns),
+            "runs": len(self), "chunk": self.chunk, "values": self._fingerprint,
+        }  # fmt: skip
 
     @functools.cached_property
     def _fingerprint(self) -> str:
@@ -123,13 +122,14 @@ class ColumnRuns(Plan):
         return values.hexdigest()
 
 
-def table_of_ends(made: np.ndarray) -> dict[str, list[Any]]:
-    """Columns of summaries."""
+def _rows(runs: range, columns: Mapping[str, np.ndarray], made: np.ndarray) -> list[dict[str, Any]]:
+    """Rows of the data set, of summaries."""
     through = np.where(made["throughput"] > 0.0, made["throughput"], np.nan)
-    out = {
-        "status": made["code"], "axis": made["axis"], "end_time": made["time"],
-        "steps": made["steps"],
+    table = {
+        "run": np.array(runs), **columns, "status": made["code"], "axis": made["axis"],
+        "end_time": made["time"], "steps": made["steps"],
+        **{f"{name}_{axis}": made[name][:, i] for name in ENDS for i, axis in enumerate(AXES)},
+        "energy_residual": np.abs(made["residual"]) / through,
     }  # fmt: skip
-    out |= {f"{name}_{axis}": made[name][:, i] for name in ENDS for i, axis in enumerate(AXES)}
-    out |= {"energy_residual": np.abs(made["residual"]) / through}
-    return {name: x.tolist() for name, x in out.items()}
+    values = zip(*(x.tolist() for x in table.values()), strict=True)
+    return [dict(zip(table, row, strict=True)) for row in values]

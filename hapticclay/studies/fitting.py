@@ -14,16 +14,15 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import ParameterError, choice, number, numbers_of
-from ..files import versions
+from ..errors import Bound, ParameterError, choice
 from ..model.constants import AXES
 from ..model.flow import N_MAX, N_MIN, Flow
-from ..results import Result
+from ..results import Result, fields_of, figure_of
 from ..simulation.record import Record
 from .flow_models import (
     FLOW_LAWS,
@@ -61,7 +60,6 @@ from .trajectory import (
     correlation_time,
 )
 
-FIT_SCHEMA = "hapticclay-fit-1"
 LEAST_INDEPENDENT = 10  # ... of which so many are independent
 FEW_SLIDING = 300
 NARROW = 3.0  # ratio of speeds below which n is hardly identifiable
@@ -121,6 +119,19 @@ class Fitted(Result):
     """
 
     drawn_by = "hapticclay.views.fit_plots:fit_plot"
+    written_as = "fit"
+    printed = {"candidates": ()}
+    formats = {"AICc": ".1f", "weight": ".3f", "left [N]": ".3g", "fitted": ".6g"}
+    summary_units = {
+        "parameters": FLOW_UNITS,
+        "speed": "m/s",
+        "force_noise": "N",
+        "position_noise": "m",
+        "spacing": "s",
+        "correlation": "samples",
+        "position_outliers": "s",
+        "force_outliers": "s",
+    }
 
     law: str
     parameters: tuple[FlowParameter, ...]
@@ -171,59 +182,64 @@ class Fitted(Result):
         return quantile * np.sqrt(np.einsum("ij,jk,ik->i", J, self.covariance, J))
 
     def tables(self) -> dict[str, dict[str, Any]]:
-        """Returns the numbers of the figure: samples, and the law over the velocity."""
-        law = [self.flow.force(v) for v in self.v]
+        """The numbers of the figure, and the candidates: the chosen one, then the most likely."""
+        rows = []
+        for c in sorted(self.candidates, key=lambda c: (c.law != self.law, c.aicc)):
+            first = [c.law, c.aicc, c.weight, c.deviation]
+            for p in self.parameters if c.law == self.law else c.parameters:
+                name = f"{p.name} [{p.unit}]" if p.unit else p.name
+                span = "" if math.isnan(p.low) else f"{p.low:.6g} to {p.high:.6g}"
+                rows.append([*first, name, p.value, span])
+                first = [None] * len(first)
+        interval = f"{100.0 * self.level:g} % interval"
+        head = ("law", "AICc", "weight", "left [N]", "parameter", "fitted", interval)
         return {
             "parameters": {
-                "name": [p.name for p in self.parameters],
-                "unit": [p.unit for p in self.parameters],
-                "value": [p.value for p in self.parameters],
-                "low": [p.low for p in self.parameters],
-                "high": [p.high for p in self.parameters],
+                name: [getattr(p, name) for p in self.parameters]
+                for name in ("name", "unit", "value", "low", "high")
             },
             "samples": {
                 "time [s]": self.t,
                 "velocity [m/s]": self.v,
                 "force [N]": self.f,
-                "force of the law [N]": law,
+                "force of the law [N]": [self.flow.force(v) for v in self.v],
                 f"half the {100 * self.level:g} % band [N]": self.band(self.v),
                 "residual [N]": self.residuals,
             },
+            "candidates": dict(zip(head, zip(*rows, strict=True), strict=True)),
         }
 
-    def summary(self) -> dict[str, Any]:
-        """The result without the samples, ready for JSON."""
+    def remarks(self) -> list[str]:
+        """Sliding samples, noise and warnings."""
+        low, high = (1e3 * x for x in self.speed)
+        line = (
+            f"{self.law}: {len(self.v)} of {self.samples} samples slide, at {low:.3g} to "
+            f"{high:.3g} mm/s; noise {self.force_noise:.3g} N"
+        )
+        if self.position_noise:
+            line += f", {1e6 * self.position_noise:.3g} um"
+        return [line, *(f"warning: {x}" for x in self.warnings)]
+
+    def figures(self) -> dict[str, Any]:
+        """The law and its samples."""
+        tables = self.tables()
+        shown = {name: tables[name] for name in ("samples", "parameters")}  # fit.csv: samples
+        return {"fit": figure_of(self, tables=shown)}
+
+    @property
+    def speed(self) -> tuple[float, float]:
+        """Least and largest speed of the sliding samples [m/s]."""
         speed = np.abs(self.v)
-        return {
-            "schema": FIT_SCHEMA,
-            "source": self.source,
-            "axis": self.axis,
-            "law": self.law,
-            "level": self.level,
-            "parameters": [dataclasses.asdict(p) for p in self.parameters],
-            "candidates": [dataclasses.asdict(c) for c in self.candidates],
-            "samples": self.samples,
-            "sliding": len(self.v),
-            "correlation": self.correlation,
-            "speed": [float(speed.min()), float(speed.max())],
-            "force_noise": self.force_noise,
-            "position_noise": self.position_noise,
-            "spacing": self.spacing,
-            "position_outliers": list(self.position_outliers),
-            "force_outliers": list(self.force_outliers),
-            "warnings": list(self.warnings),
-            "units": {
-                "parameters": FLOW_UNITS,
-                "speed": "m/s",
-                "force_noise": "N",
-                "position_noise": "m",
-                "spacing": "s",
-                "correlation": "samples",
-                "position_outliers": "s",
-                "force_outliers": "s",
-            },
-            "versions": versions(),
-        }
+        return float(speed.min()), float(speed.max())
+
+    def contents(self) -> dict[str, Any]:
+        """All but the sliding samples."""
+        data = fields_of(self, "t", "v", "f", "covariance")
+        return {**data, "sliding": len(self.v), "speed": self.speed}
+
+
+Level = Annotated[float, Bound(0.5, 0.999)]
+Span = Annotated[tuple[float, float] | None, Bound(names=("low", "high"))]
 
 
 @checked
@@ -231,10 +247,10 @@ def fit_flow(
     data: Measurement | Record | str | os.PathLike[str],
     axis: str | None = None,
     laws: Sequence[str] | str = tuple(FLOW_LAWS),
-    level: float = 0.95,
+    level: Level = 0.95,
     *,
-    time: tuple[float, float] | None = None,
-    place: tuple[float, float] | None = None,
+    time: Span = None,
+    place: Span = None,
 ) -> Fitted:
     """Fits a law of resistance, f = (Fy + K |v|^n) v/|v| + b v, and selects its terms.
 
@@ -257,7 +273,6 @@ def fit_flow(
             the samples of a Record lie in clays of several laws, or in elastic or rotated clay.
     """
     names = _law_names(laws)
-    level = number("level", level, 0.5, 0.999)
     if isinstance(data, Measurement):
         axis = choice("axis", "x" if axis is None else axis, AXES)
         t, p, v, f = data.t, data.output, None, data.input
@@ -272,7 +287,7 @@ def fit_flow(
         t = record.t
     for name, span, x in (("time", time, t), ("place", place, p)):
         if span is not None:
-            low, high = numbers_of(name, span, ("low", "high"))
+            low, high = span
             if not low < high:
                 raise ParameterError(name, (low, high), "must ascend")
             inside = inside & (low <= x) & (x <= high)

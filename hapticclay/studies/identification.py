@@ -10,28 +10,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import KW_ONLY, asdict, dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import KW_ONLY, dataclass, replace
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from ..arguments import checked, function_of, named
-from ..errors import ParameterError, choice, flag, integer, number, numbers_of, pair
-from ..files import versions
+from ..arguments import function_of, named, part
+from ..errors import Bound, ParameterError, integer, numbers_of
+from ..fields import Axis, Seed
 from ..formulas import arm as arm_law
 from ..model import arm
 from ..model.arm import Arm
 from ..model.constants import AXES, L1, L2, TS, G, S
 from ..model.operator import Operator
 from ..model.signals import Multisine
-from ..results import Result
-from ..scene.scenario import Control, Scenario
+from ..results import Result, fields_of
+from ..scene.scenario import Control, Position, Scenario
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 
-IDENTIFICATION_SCHEMA = "hapticclay-identify-1"
+RESPONSE_UNITS = {"G": "m/m", "S": "m/N", "Th": "N/m"}
 NOMINAL_POSE = (L2, L1)  # world position of the handle where the elbow is square [m]
-BLOCK_KINDS = ("G", "S", "Th")
+Block = Literal["G", "S", "Th"]
+BLOCK_KINDS = get_args(Block)
 COEFFICIENT_NAMES = {
     "G": ("gain", "damping", "stiffness"),
     "S": ("gain", "damping", "stiffness"),
@@ -58,8 +59,12 @@ NOISE_ROUNDS = 3  # of a fit of the noise, each weighted by the one before; two 
 CONFIDENCE = 0.95
 
 
-@named
-@dataclass(frozen=True)
+Band = Annotated[
+    tuple[float, float] | None, Bound(0.0, unit="Hz", above=True, names=("low", "high"))
+]
+
+
+@part("noise.")
 class Noise:
     """Noise of the sensors. The paper prints no figure; these are ours.
 
@@ -68,13 +73,8 @@ class Noise:
         force: rms of the force sensor, white [N].
     """
 
-    encoder_counts: int = 65_536
-    force: float = 0.02
-
-    def __post_init__(self):
-        counts = integer("noise.encoder_counts", self.encoder_counts, 100, 2**40)
-        object.__setattr__(self, "encoder_counts", counts)
-        object.__setattr__(self, "force", number("noise.force", self.force, 0.0, 1e3, unit="N"))
+    encoder_counts: Annotated[int, Bound(100, 2**40)] = 65_536
+    force: Annotated[float, Bound(0.0, 1e3, "N")] = 0.02
 
 
 @named
@@ -145,6 +145,7 @@ class Identified(Result):
     """
 
     drawn_by = "hapticclay.views.identification_plots:identified_plot"
+    written_as = "identify"
 
     what: str
     axis: str
@@ -202,38 +203,24 @@ class Identified(Result):
         """The fitted coefficients, in order."""
         return tuple(c.value for c in self.coefficients)
 
-    def summary(self) -> dict[str, Any]:
-        """Return everything, ready for JSON."""
-        given: dict[str, Any] = {"source": self.source, "estimate": self.estimate}
+    def contents(self) -> dict[str, Any]:
+        """Everything; of the scenario and the source, the one that there is."""
+        data = fields_of(self, "response", "source", "scenario")
         if self.scenario:
-            given = {"scenario": asdict(self.scenario)}
-        return {
-            "schema": IDENTIFICATION_SCHEMA,
-            "what": self.what,
-            "axis": self.axis,
-            "coefficients": [{**asdict(c), "error": c.error} for c in self.coefficients],
-            "frequency": self.frequency.tolist(),
-            "real": self.response.real.tolist(),
-            "imaginary": self.response.imag.tolist(),
-            "deviation": self.deviation.tolist(),
-            "coherence": self.coherence.tolist(),
-            **given,
-            "noise": asdict(self.noise) if self.noise else None,
-            "seed": self.seed,
-            "periods": self.periods,
-            "realisations": self.realisations,
-            "warnings": list(self.warnings),
-            "units": {
-                "frequency": "Hz",
-                "response": {"G": "m/m", "S": "m/N", "Th": "N/m"}[self.what],
-            },
-            "versions": versions(),
+            data["scenario"] = self.scenario
+        else:
+            data |= {"source": self.source, "estimate": self.estimate}
+        return data | {
+            "coefficients": [{**fields_of(c), "error": c.error} for c in self.coefficients],
+            "real": self.response.real,
+            "imaginary": self.response.imag,
+            "units": {"frequency": "Hz", "response": RESPONSE_UNITS[self.what]},
         }
 
 
 def response_tables(results: Sequence[Identified], paper: bool = True) -> dict[str, dict[str, Any]]:
     """Returns the numbers of one block's figure: the response on each axis, and its equations."""
-    unit = {"G": "m/m", "S": "m/N", "Th": "N/m"}[results[0].what]
+    unit = RESPONSE_UNITS[results[0].what]
     out: dict[str, dict[str, Any]] = {}
     for r in results:
         table: dict[str, Any] = {"frequency [Hz]": r.frequency}
@@ -272,8 +259,7 @@ def measured(
     return p, record.fh + rng.normal(0.0, noise.force, record.fh.shape)
 
 
-@checked
-@dataclass(frozen=True)
+@part()
 class Identification:
     """Identify one block of the loop on one axis; the compensator is off (K = 0).
 
@@ -301,19 +287,19 @@ class Identification:
         progress: called after each run with (runs made, runs in all).
     """
 
-    axis: str = "x"
-    what: str = "G"
+    axis: Axis = "x"
+    what: Block = "G"
     _: KW_ONLY
-    origin: tuple[float, float] = NOMINAL_POSE
+    origin: Position = NOMINAL_POSE
     inertia_shaping: bool = False
     noise: Noise | None = None
-    seed: int = 0
-    band: tuple[float, float] | None = None
-    period: float | None = None
-    periods: int = 2
-    realisations: int = REALISATIONS
-    lines: int = MULTISINE_LINES
-    amplitude: float | None = None
+    seed: Seed = 0
+    band: Band = None
+    period: Annotated[float | None, Bound(0.1, 1000.0, "s")] = None
+    periods: Annotated[int, Bound(1, 1000)] = 2
+    realisations: Annotated[int, Bound(1, 1000)] = REALISATIONS
+    lines: Annotated[int, Bound(3, 100_000)] = MULTISINE_LINES
+    amplitude: Annotated[float | None, Bound(0.0, 1.0, "m", above=True)] = None
     control: Control = "continuous"
     dt: float = TS
     progress: Callable[[int, int], None] | None = None
@@ -324,9 +310,9 @@ class Identification:
             name=f"identify {self.what} {self.axis}",
             gain=(0.0, 0.0),
             force=(0.0, 0.0),
-            origin=pair("origin", self.origin, unit="m"),
+            origin=self.origin,
             operator=Operator() if self.what == "Th" else None,
-            inertia_shaping=flag("inertia_shaping", self.inertia_shaping),
+            inertia_shaping=self.inertia_shaping,
             control=self.control,
             dt=self.dt,
             length=None,
@@ -337,17 +323,10 @@ class Identification:
         from scipy.fft import next_fast_len
 
         what, noise = self.what, self.noise
-        i = AXES.index(choice("axis", self.axis, AXES))
-        choice("what", what, BLOCK_KINDS)
-        if not isinstance(noise, Noise | None):
-            raise ParameterError("noise", noise, "must be a Noise or None")
-        seed = integer("seed", self.seed, 0, 2**32 - 1)
-        realisations = integer("realisations", self.realisations, 1, 1000)
+        i, seed, realisations = AXES.index(self.axis), self.seed, self.realisations
         periods = integer("periods", self.periods, 1 if realisations > 1 else 2, 1000)
         size = AMPLITUDE[what] if self.amplitude is None else self.amplitude
-        size = number("amplitude", size, 0.0, 1.0, above=True, unit="m")
         length = PERIOD[what] if self.period is None else self.period
-        length = number("period", length, 0.1, 1000.0, unit="s")
         base = self.scenario()
         n = int(next_fast_len(math.ceil(length / base.dt - 1e-9)))  # type: ignore[arg-type]
         gain = (
@@ -403,7 +382,6 @@ def _multisine(
 ) -> Multisine:
     """A multisine with the requested lines, or as many as fit into the period, at least three."""
     low, high = numbers_of("band", band, ("low", "high"), 0.0, limit, above=True, unit="Hz")
-    lines = integer("lines", lines, 3, 100_000)
     most = math.floor(high * period + 1e-9) - math.ceil(low * period - 1e-9) + 1
     if most < 3:
         bound = f"must contain at least 3 multiples of 1/period = {1.0 / period:.4g} Hz"

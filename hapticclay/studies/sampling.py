@@ -16,7 +16,6 @@ from ..errors import ParameterError, number_in
 from ..scene.changes import named_values, split_words
 from ..scene.experiments import parameter_unit
 
-DESIGNS = ("grid", "lhs", "sobol")
 RANGE_PATTERN = r"(?P<low>[^:]+):(?P<high>[^:]+?)(:(?P<n>\d+))?\s*(?P<log>log)?"
 MOST_RUNS = 10_000_000
 
@@ -54,29 +53,17 @@ class Range:
             ParameterError: it is none of these.
         """
         bound = 'must be like "1:1000:50log", "0.2:2:20", "0.2:2" or "1,2,5", from low to high'
-        items = (
-            text if isinstance(text, list | tuple) else None if isinstance(text, str) else [text]
-        )
         try:
-            if items is None:
-                found = re.fullmatch(RANGE_PATTERN, str(text).strip())
-                if found:
-                    low, high, n = (
-                        number_in(field, found["low"], unit),
-                        number_in(field, found["high"], unit),
-                        int(found["n"]) if found["n"] else None,
-                    )
-                    finite = math.isfinite(low) and math.isfinite(high)
-                    if (
-                        not finite
-                        or n == 0
-                        or (found["log"] and low <= 0.0)
-                        or (n != 1 and low >= high)
-                    ):
-                        raise ValueError
-                    return cls(low, high, n, bool(found["log"]))
-                items = str(text).split(",")
-            values = tuple(number_in(field, x, unit) for x in items)  # type: ignore[union-attr]
+            if isinstance(text, str) and (found := re.fullmatch(RANGE_PATTERN, text.strip())):
+                low, high = (number_in(field, found[end], unit) for end in ("low", "high"))
+                n, log = found["n"] and int(found["n"]), bool(found["log"])
+                finite = math.isfinite(low) and math.isfinite(high)
+                if not finite or n == 0 or (log and low <= 0.0) or (n != 1 and low >= high):
+                    raise ValueError
+                return cls(low, high, n, log)
+            items = text.split(",") if isinstance(text, str) else text
+            items = items if isinstance(items, list | tuple) else [items]
+            values = tuple(number_in(field, x, unit) for x in items)
             if not values or not all(map(math.isfinite, values)):
                 raise ValueError
         except ParameterError:  # of a unit
@@ -90,11 +77,7 @@ class Range:
         if self.values:
             return np.array(self.values)
         assert self.n
-        return (
-            np.geomspace(self.low, self.high, self.n)
-            if self.log
-            else np.linspace(self.low, self.high, self.n)
-        )
+        return (np.geomspace if self.log else np.linspace)(self.low, self.high, self.n)
 
     def spread(self, u: np.ndarray) -> np.ndarray:
         """Samples of the unit interval spread over the range.

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..arguments import checked, named, part
 from ..errors import Bound, ParameterError, integer, number
+from ..fields import Seed
 from ..results import Result
 
 NORMAL = NormalDist()
@@ -146,7 +147,7 @@ class StaircaseRun(Result):
 
 @checked
 def run_staircase(
-    staircase: Staircase, observer: Observer, seed: int = 0, stimulus: Stimulus | None = None
+    staircase: Staircase, observer: Observer, seed: Seed = 0, stimulus: Stimulus | None = None
 ) -> StaircaseRun:
     """Run a staircase on a simulated observer.
 
@@ -160,7 +161,7 @@ def run_staircase(
         ParameterError: it does not turn often enough within 100000 trials, or stimulus returns no
             difference.
     """
-    rng = np.random.default_rng(integer("seed", seed, 0, 2**32 - 1))
+    rng = np.random.default_rng(seed)
     s, level, row, direction = staircase, staircase.start, 0, 0
     levels: list[float] = []
     noticed: list[bool] = []
@@ -186,7 +187,10 @@ def run_staircase(
 
 @checked
 def staircase_mean(
-    staircase: Staircase, observer: Observer, runs: int = 100, seed: int = 0
+    staircase: Staircase,
+    observer: Observer,
+    runs: Annotated[int, Bound(2, 100_000)] = 100,
+    seed: Annotated[int, Bound(0, 2**31)] = 0,
 ) -> tuple[float, float]:
     """Mean estimate of many staircases, and its standard error.
 
@@ -196,6 +200,5 @@ def staircase_mean(
         runs: number of staircases, 2 to 100000.
         seed: seed of the first, 0 to 2^31.
     """
-    runs, seed = integer("runs", runs, 2, 100_000), integer("seed", seed, 0, 2**31)
     found = [run_staircase(staircase, observer, seed + i).estimate for i in range(runs)]
     return float(np.mean(found)), float(np.std(found, ddof=1) / math.sqrt(runs))

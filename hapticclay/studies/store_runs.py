@@ -16,7 +16,7 @@ from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import Any
 
-from ..errors import ParameterError, integer
+from ..errors import ParameterError
 from ..files import atomic
 from ..simulation.batch import cores
 from . import store
@@ -45,8 +45,6 @@ def run_plan(
     It calls before(plan, missing runs) once the folder is claimed, and progress(number of runs)
     after each file.
     """
-    if workers is not None:
-        integer("workers", workers, 1, 1024)
     if not isinstance(scheduler, str | None):
         raise ParameterError("scheduler", scheduler, "must be the address of a dask scheduler")
     done = 0

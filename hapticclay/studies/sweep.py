@@ -7,14 +7,13 @@ import math
 import os
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from ..arguments import checked, named
-from ..errors import ParameterError, choice, integer
+from ..arguments import checked, part
+from ..errors import Bound, ParameterError, choice, integer
 from ..fields import join_names
 from ..files import MOST_SETTINGS, parse_toml, read_text
 from ..scene.earlier_names import with_present_names
@@ -23,7 +22,7 @@ from ..scene.files import read_settings
 from ..scene.scenario import Scenario
 from ..simulation.simulate import simulate
 from . import store, store_runs
-from .sampling import DESIGNS, MOST_RUNS, Range, unit_samples
+from .sampling import MOST_RUNS, Range, unit_samples
 from .sweep_rows import result_row
 
 SWEEP_SCHEMA = "hapticclay-sweep-2"
@@ -31,8 +30,7 @@ PROBES = 20  # runs used for an estimate ...
 PROBE_TIME = 5.0  # ... or fewer after this time [s]
 
 
-@named
-@dataclass(frozen=True)
+@part()
 class Sweep(store.Plan):
     """Runs of one experiment, or of a scenario file, over a space of its numbers.
 
@@ -56,18 +54,14 @@ class Sweep(store.Plan):
     experiment: str
     vary: dict[str, Range]
     fixed: dict[str, Any] = dataclasses.field(default_factory=dict)
-    design: str = "grid"
-    runs: int | None = None
-    seed: int = 0
-    chunk: int | None = None
+    design: Literal["grid", "lhs", "sobol"] = "grid"
+    runs: Annotated[int | None, Bound(1, MOST_RUNS)] = None
+    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
+    chunk: Annotated[int | None, Bound(1, 100_000)] = None
     scenario: dict[str, Any] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self):
         choice("experiment", self.experiment, tuple(EXPERIMENTS))
-        choice("design", self.design, DESIGNS)
-        integer("seed", self.seed, 0, 2**32 - 1)
-        if self.chunk is not None:
-            integer("chunk", self.chunk, 1, 100_000)
         if not self.vary:
             raise ParameterError("grid", "", "must vary a parameter, as in b=1:1000:50log")
         for name in self.vary.keys() & self.fixed.keys():
@@ -83,7 +77,7 @@ class Sweep(store.Plan):
                     bound = "must have a count, as in 1:1000:50log"
                 given = f"{r.low:g}:{r.high:g}{f':{r.n}' if r.n else ''}"
                 raise ParameterError(name, given, f"{bound} ({self.design})")
-        integer("runs", len(self) if self.runs is None else self.runs, 1, MOST_RUNS)
+        integer("runs", len(self), 1, MOST_RUNS)
         self.run_scenario(self.points(0, 1)[0])  # raises the errors of the first run
 
     def __len__(self) -> int:
@@ -192,7 +186,7 @@ def run_sweep(
     sweep: Sweep,
     out: str | os.PathLike[str],
     *,
-    workers: int | None = None,
+    workers: Annotated[int | None, Bound(1, 1024)] = None,
     scheduler: str | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> int:

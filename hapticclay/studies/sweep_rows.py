@@ -15,6 +15,7 @@ from ..simulation.record import Record
 from ..theory.pose_limits import PoseLimits
 
 CROSSINGS_KEPT = 3  # crossings that have columns of their own
+MEASURED = ("b", "fe_over_v", "speed", "gain_margin")  # columns for each axis
 Notes = Mapping[str, tuple[str, str]]  # unit and description; crossing1 and x stand for their likes
 RESULT_COLUMNS: Notes = {
     "run": ("", "number of the run"),
@@ -42,36 +43,37 @@ def result_row(
     index: int, names: list[str], point: np.ndarray, r: Record | None, refused: str = ""
 ) -> dict[str, Any]:
     """One row of the data set: parameters, outcome and measurements; NaN for none."""
-    nan = math.nan
-    out: dict[str, Any] = {"run": index, **dict(zip(names, point.tolist(), strict=True))}
-    out |= {
-        "status": r.outcome.code if r else "refused",
-        "axis": r.outcome.axis if r else "",
-        "cause": r.outcome.cause if r else refused,
-        "end_time": r.outcome.time if r else nan,
-    }
-    times = [c.time for c in r.crossings] if r else []
-    out |= {f"crossing{k + 1}": times[k] if k < len(times) else nan for k in range(CROSSINGS_KEPT)}
-    for i, axis in enumerate(AXES):
-        deepest = max(r.regions(axis), key=lambda x: x[axis]["b"], default=None) if r else None
-        entry = deepest[axis] if deepest else {}
-        fe = entry.get("steady_fe_over_v") or {}
-        speed = entry.get("steady_speed")
-        out |= {
-            f"b_{axis}": entry.get("b", nan),
-            f"fe_over_v_{axis}": fe.get("mean", nan),
-            f"speed_{axis}": nan if speed is None else speed,
-        }
-        margin = nan
-        clay = r and r.scenario.clay
-        linear = not clay or clay.viscous
-        if r and linear and r.scenario.gain[i] > 0.0:
-            margin = _least_limit(r, axis, deepest) / r.scenario.gain[i]
-        out[f"gain_margin_{axis}"] = margin
-    through = r.energy.get("throughput", 0.0) if r else 0.0
-    out["energy_residual"] = abs(r.energy["residual"]) / through if r and through else nan
-    out["wall_time"] = r.wall_time if r else nan
-    return out
+    crossings = [f"crossing{k + 1}" for k in range(CROSSINGS_KEPT)]
+    measured = [f"{name}_{axis}" for axis in AXES for name in MEASURED]
+    numbers = ["end_time", *crossings, *measured, "energy_residual", "wall_time"]
+    row = {"run": index, **dict(zip(names, point.tolist(), strict=True))}
+    row |= {"status": "refused", "axis": "", "cause": refused, **dict.fromkeys(numbers, math.nan)}
+    if r is None:
+        return row
+    end = r.outcome
+    row |= {"status": end.code, "axis": end.axis, "cause": end.cause, "end_time": end.time}
+    row |= dict(zip(crossings, (c.time for c in r.crossings), strict=False))
+    for axis in AXES:
+        row |= {f"{name}_{axis}": x for name, x in _in_stiffest_clay(r, axis).items()}
+    if through := r.energy.get("throughput", 0.0):
+        row["energy_residual"] = abs(r.energy["residual"]) / through
+    return row | {"wall_time": r.wall_time}
+
+
+def _in_stiffest_clay(r: Record, axis: str) -> dict[str, float]:
+    """Measurements of one axis, in the stiffest clay that the handle met."""
+    gain, clay = r.scenario.gain[AXES.index(axis)], r.scenario.clay
+    stretch = max(r.regions(axis), key=lambda x: x[axis]["b"], default=None)
+    found = {}
+    if stretch:
+        found["b"] = stretch[axis]["b"]
+        if steady := stretch[axis].get("steady_fe_over_v"):
+            found["fe_over_v"] = steady["mean"]
+        if (speed := stretch[axis].get("steady_speed")) is not None:
+            found["speed"] = speed
+    if gain > 0.0 and (not clay or clay.viscous):
+        found["gain_margin"] = _least_limit(r, axis, stretch) / gain
+    return found
 
 
 def _least_limit(r: Record, axis: str, stretch: dict[str, Any] | None) -> float:

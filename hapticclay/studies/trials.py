@@ -5,15 +5,14 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import math
-import multiprocessing
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from dataclasses import field
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from ..arguments import checked
-from ..errors import ParameterError, integer, number
+from ..arguments import part
+from ..errors import Bound, ParameterError, integer
 from ..scene.changes import nested, with_fields
 from ..scene.scenario import Scenario
 from .distribution import Distribution
@@ -23,12 +22,12 @@ from .store import Plan
 from .sweep_rows import RESULT_COLUMNS, Notes
 from .verdicts import Case, judge
 from .wall import Subject, as_wall
+from .workers import batch_threads
 
 SCHEMA = "hapticclay-trials-2"
 
 
-@checked
-@dataclass(frozen=True)
+@part()
 class Trials(Plan):
     """Random runs of a loop or of a virtual wall: fixed parts, varying parts and their laws.
 
@@ -62,10 +61,10 @@ class Trials(Plan):
     vary: dict[str, Distribution] = field(default_factory=dict)
     hands: str | Hands | None = None
     grid: dict[str, Range] = field(default_factory=dict)
-    runs: int = 1000
-    push: float | None = None
-    seed: int = 0
-    chunk: int = 1000
+    runs: Annotated[int, Bound(1, MOST_RUNS)] = 1000
+    push: Annotated[float | None, Bound(1e-9, 1.0, "m/s")] = None
+    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
+    chunk: Annotated[int, Bound(1, 100_000)] = 1000
 
     def __post_init__(self):
         for name, law in self.vary.items():
@@ -82,12 +81,6 @@ class Trials(Plan):
             raise ParameterError("names", self.names, "must each be given once")
         if not self.vary and self.hands is None:
             raise ParameterError("vary", self.vary, "must hold a distribution, or give hands")
-        if self.push is not None:
-            push = number("push", self.push, 1e-9, 1.0, unit="m/s")
-            object.__setattr__(self, "push", push)
-        integer("seed", self.seed, 0, 2**32 - 1)
-        integer("chunk", self.chunk, 1, 100_000)
-        integer("runs", self.runs, 1, MOST_RUNS)
         integer("runs", len(self), 1, MOST_RUNS)
         self.scenario(self.middle(), 0.1)  # refuses an unknown name
 
@@ -157,15 +150,7 @@ class Trials(Plan):
         return self._case(values, t_max).scenario
 
     def _case(self, values: Mapping[str, float], t_max: float) -> Case:
-        """One run, with its loop or wall.
-
-        Args:
-            values: as in `scenario`.
-            t_max: as there.
-
-        Raises:
-            ParameterError: as there.
-        """
+        """One run, with its loop or wall."""
         own, others = self._split(values)
         wall = as_wall(with_fields(self.base, own))
         scenario = wall.trial(t_max, self.push)
@@ -220,9 +205,7 @@ class Trials(Plan):
             late: not called: a chunk is made whole.
         """
         points = self.points(self.part_number(runs))
-        # A worker is one of several processes, one per core.
-        threads = None if multiprocessing.parent_process() is None else 1
-        unstable, longer = self.judge(points, threads)
+        unstable, longer = self.judge(points, batch_threads())
         judged = zip(runs, points.tolist(), unstable.tolist(), longer.tolist(), strict=True)
         names = tuple(self.blank_row())
         return [dict(zip(names, (i, *x, u, more), strict=True)) for i, x, u, more in judged]

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..arguments import checked, named
-from ..display import brief
-from ..errors import integer, number
+from ..errors import Bound
+from ..fields import Seed
 from ..model.constants import AXES, L1, L2
+from ..results import Result, fields_of, figure_of
 from .identification import (
     COEFFICIENT_NAMES,
     NOMINAL_POSE,
@@ -29,8 +30,8 @@ DRIFT_SETTINGS: dict[str, Any] = dict(
 
 
 @named
-@dataclass(frozen=True, eq=False)
-class Drift:
+@dataclass(frozen=True, eq=False, repr=False)
+class Drift(Result):
     """Coefficients fitted over the workspace.
 
     Attributes:
@@ -43,8 +44,11 @@ class Drift:
         mobility: Wxx and Wyy of the bare arm [1/kg], (m, 2): the gain of Sh without shaping.
     """
 
-    def __repr__(self) -> str:
-        return brief(self)
+    drawn_by = "hapticclay.views.workspace_plots:workspace_plot"
+    written_as = "map"
+    printed = {"ranges": ()}
+    formats = {"printed": "g"}
+    summary_units = {"x": "m", "y": "m", "spacing": "m", "mobility": "1/kg"}
 
     x: np.ndarray
     y: np.ndarray
@@ -60,7 +64,19 @@ class Drift:
                 gain = self.coefficients[:, k, DRIFT_BLOCKS.index("S"), i, 0]
                 table[f"gain of Sh along {axis} {way} [1/kg]"] = gain
             table[f"W of the bare arm along {axis} [1/kg]"] = self.mobility[:, i]
-        return {"poses": table}
+        pairs = list(zip(self.ranges()[::2], self.ranges()[1::2], strict=True))
+        ranges = {name: [a[name] for a, _ in pairs] for name in ("what", "axis", "name", "printed")}
+        for k, way in enumerate(("without shaping", "with shaping")):
+            ranges[way] = [f"{x[k]['lowest']:.5g} to {x[k]['highest']:.5g}" for x in pairs]
+        return {"poses": table, "ranges": ranges}
+
+    def headline(self) -> str:
+        """The number of poses."""
+        return f"workspace: {len(self.x)} poses, {100.0 * self.spacing:g} cm apart"
+
+    def figures(self) -> dict[str, Any]:
+        """The gain of Sh over the workspace."""
+        return {"map": figure_of(self, tables={"poses": self.tables()["poses"]})}
 
     def ranges(self) -> list[dict[str, Any]]:
         """Return the range of each coefficient over the poses, and the printed value."""
@@ -80,24 +96,16 @@ class Drift:
             )
         return out
 
-    def summary(self) -> dict[str, Any]:
-        """Return everything, ready for JSON."""
-        return {
-            "x": self.x.tolist(),
-            "y": self.y.tolist(),
-            "spacing": self.spacing,
-            "coefficients": self.coefficients.tolist(),
-            "order": [
-                "pose",
-                "shaping (off, on)",
-                "block (G, S)",
-                "axis (x, y)",
-                "gain, damping, stiffness",
-            ],
-            "mobility": self.mobility.tolist(),
-            "ranges": self.ranges(),
-            "units": {"x": "m", "y": "m", "spacing": "m", "mobility": "1/kg"},
-        }
+    def contents(self) -> dict[str, Any]:
+        """Everything."""
+        order = (
+            "pose",
+            "shaping (off, on)",
+            "block (G, S)",
+            "axis (x, y)",
+            "gain, damping, stiffness",
+        )
+        return {**fields_of(self), "order": order, "ranges": self.ranges()}
 
 
 def poses(spacing: float) -> tuple[np.ndarray, np.ndarray]:
@@ -115,9 +123,12 @@ def poses(spacing: float) -> tuple[np.ndarray, np.ndarray]:
     return x[inside], y[inside]
 
 
+Spacing = Annotated[float, Bound(0.01, 0.3, "m")]
+
+
 @checked
 def drift_map(
-    spacing: float = 0.08, *, seed: int = 0, progress: Callable[[int, int], None] | None = None
+    spacing: Spacing = 0.08, *, seed: Seed = 0, progress: Callable[[int, int], None] | None = None
 ) -> Drift:
     """Identify G and Sh on both axes over the workspace, without and with inertia shaping.
 
@@ -131,8 +142,6 @@ def drift_map(
     Raises:
         ParameterError: a value is out of its bounds.
     """
-    spacing = number("spacing", spacing, 0.01, 0.3, unit="m")
-    seed = integer("seed", seed, 0, 2**32 - 1)
     x, y = poses(spacing)
     out = np.empty((len(x), 2, 2, 2, 3))
     for m, at in enumerate(zip(x.tolist(), y.tolist(), strict=True)):

@@ -371,7 +371,7 @@ def test_maps(tmp_path):
     figure = sweep_plots.sweep_plot(table)
     ax = figure.axes[0]
     assert (
-        ax.get_xlabel() == "b [N.s/m]" and ax.get_xscale() == "log" and ax.get_yscale() == "linear"
+        ax.get_xlabel() == "b [N·s/m]" and ax.get_xscale() == "log" and ax.get_yscale() == "linear"
     )
     shown = {t.get_text() for t in figure.legends[0].get_texts()}
     assert shown == {

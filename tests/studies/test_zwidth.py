@@ -17,7 +17,7 @@ from hapticclay.studies.wall_lines import theoretical_damping, worst_hand
 from hapticclay.studies.wall_runs import Press, come_to_rest, growth_rates, stiffest
 from hapticclay.studies.zwidth import BY_REST, zwidth
 from hapticclay.theory import gain_crossings
-from hapticclay.views.style import unit_text
+from hapticclay.views.captions import unit_text
 from hapticclay.views.wall_plots import zwidth_plot
 from tests.oracles.sampled_wall import sample_map
 

@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 import hapticclay as hc
-from hapticclay.cli import app
-from hapticclay.cli.words import check_words, ordered, with_units
+from hapticclay.cli import app, parser
 from hapticclay.kernel import engine
 from hapticclay.model import constants
 from hapticclay.simulation import record
@@ -79,8 +78,9 @@ def test_a_symptom_page_shows_its_cause_in_a_few_lines(page, tmp_path):
     assert text.index("**Cause.**") < text.index("## Show it") and "](" in text
 
 
-def test_the_groove_page_says_what_it_prints(tmp_path):
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "groove.md").read_text(), re.S)
+@pytest.mark.parametrize("page", ["groove.md", "own_controller.md"])
+def test_the_page_says_line_by_line_what_it_prints(page, tmp_path):
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / page).read_text(), re.S)
     out = printed_by(code, tmp_path)
     assert out.splitlines() == re.findall(r"^# (.*)", code, re.M) != []
 
@@ -355,8 +355,7 @@ def test_a_command_can_be_copied_as_it_stands(page):
     """A shell ends it at its remark; the command line takes its words, and ignores none."""
     for line in commands_in(page.read_text()):
         assert line.isascii(), line
-        words = with_units(ordered(shlex.split(line, comments=True)))
-        check_words(words)
+        parser.read(shlex.split(line, comments=True))
 
 
 @pytest.mark.parametrize("page", TEXTS, ids=[page.stem for page in TEXTS])
