@@ -66,6 +66,8 @@ class JointLimits(Result):
     """
 
     drawn_by = "hapticclay.views.joint_plots:limits_plot"
+    written_as = "limits"
+    printed = {"joints": ()}
 
     names: tuple[str, ...]
     stiffness: np.ndarray
@@ -114,6 +116,28 @@ class JointLimits(Result):
         if math.isnan(self.scale):
             return "no common factor of Kp is stable"
         return f"all Kp times {self.scale:.4g} or less would be stable"
+
+    def remarks(self) -> Sequence[str]:
+        """What to change first, and what the verdict rests on."""
+        return [self.headline(), f"first to change: {self.advice()}", *self.assumed]
+
+    def advice(self) -> str:
+        """The change that gains most, or that brings an unstable loop back."""
+        j = self.names.index(self.joint)
+        if not self.stable:
+            low, high = self.Kp[j]
+            if high > low and high < self.stiffness[j]:
+                return f"Kp of {self.joint}, {self.stiffness[j]:.4g} to {high:.4g} N.m/rad or less"
+            return "delay and rate: no Kp of one joint is stable" if math.isnan(high) else "Kp"
+        if math.isinf(self.scale):
+            return "nothing: no factor of Kp buzzes"
+        if self.delay:
+            left = "any" if math.isinf(self.delay_left) else f"{1e3 * self.delay_left:.3g} ms"
+            shorter = min(self.delay, 1e-3)
+            gain = -shorter * self.scale_per_delay
+            less = f"{1e3 * shorter:.3g} ms less raises the factor of all Kp by {gain:.3g}"
+            return f"delay ({left} left): {less}"
+        return f"rate ({1.0 / self.Ts:.4g} Hz, at least {self.slowest_rate:.4g} Hz needed)"
 
     def tables(self) -> Tables:
         """Gains and limits of each joint; how the limits move; the whole arm."""

@@ -37,6 +37,7 @@ class OverPoses(Result):
     """
 
     drawn_by = "hapticclay.views.joint_plots:poses_plot"
+    written_as = "poses"
 
     names: tuple[str, ...]
     q: np.ndarray

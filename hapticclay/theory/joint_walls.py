@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -45,6 +46,11 @@ class WallLimit(Result):
     """
 
     drawn_by = "hapticclay.views.joint_plots:wall_plot"
+    written_as = "wall"
+
+    def remarks(self) -> Sequence[str]:
+        """What the verdict rests on."""
+        return [self.headline(), *self.assumed]
 
     axis: str
     K: float
