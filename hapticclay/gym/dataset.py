@@ -222,8 +222,8 @@ def _written(plan: Recording, kept: Path, name: str, n: int) -> Any:
         )
         for i in range(WRITTEN, n, WRITTEN):
             made.update_dataset_from_buffer(_buffers(plan, kept, range(i, min(i + WRITTEN, n))))
-        sums = made.storage.apply(minari.EpisodeMetadataCallback())
-        made.storage.update_episode_metadata(sums)
+        metadata = made.storage.apply(minari.EpisodeMetadataCallback())
+        made.storage.update_episode_metadata(metadata)
         _move(Path(beside), folder, name)
     shutil.rmtree(kept)
     return minari.load_dataset(name)

@@ -83,28 +83,16 @@ class Drift(Result):
         out = []
         for j, i, n, k in np.ndindex(2, 2, 3, 2):
             what, axis, values = DRIFT_BLOCKS[j], AXES[i], self.coefficients[:, k, j, i, n]
-            out.append(
-                {
-                    "what": what,
-                    "axis": axis,
-                    "name": COEFFICIENT_NAMES[what][n],
-                    "inertia_shaping": bool(k),
-                    "printed": printed_form(what, axis)[n],
-                    "lowest": float(values.min()),
-                    "highest": float(values.max()),
-                }
-            )
+            name, printed = COEFFICIENT_NAMES[what][n], printed_form(what, axis)[n]
+            row = {"what": what, "axis": axis, "name": name, "inertia_shaping": bool(k)}
+            ends = {"lowest": float(values.min()), "highest": float(values.max())}
+            out.append({**row, "printed": printed, **ends})
         return out
 
     def contents(self) -> dict[str, Any]:
         """Everything."""
-        order = (
-            "pose",
-            "shaping (off, on)",
-            "block (G, S)",
-            "axis (x, y)",
-            "gain, damping, stiffness",
-        )
+        axes = "pose", "shaping (off, on)", "block (G, S)", "axis (x, y)"
+        order = (*axes, "gain, damping, stiffness")
         return {**fields_of(self), "order": order, "ranges": self.ranges()}
 
 
@@ -144,18 +132,12 @@ def drift_map(
     """
     x, y = poses(spacing)
     out = np.empty((len(x), 2, 2, 2, 3))
-    for m, at in enumerate(zip(x.tolist(), y.tolist(), strict=True)):
+    places = list(zip(x.tolist(), y.tolist(), strict=True))
+    for m, at in enumerate(places):
         for k, j, i in np.ndindex(2, 2, 2):
-            found = identify(
-                AXES[i],
-                DRIFT_BLOCKS[j],
-                origin=at,
-                inertia_shaping=bool(k),
-                seed=seed,
-                **DRIFT_SETTINGS,
-            )
-            out[m, k, j, i] = found.values
+            settings = dict(origin=at, inertia_shaping=bool(k), seed=seed, **DRIFT_SETTINGS)
+            out[m, k, j, i] = identify(AXES[i], DRIFT_BLOCKS[j], **settings).values
         if progress:
             progress(m + 1, len(x))
-    w = np.array([endpoint_mobility(*at) for at in zip(x.tolist(), y.tolist(), strict=True)])
+    w = np.array([endpoint_mobility(*at) for at in places])
     return Drift(x, y, spacing, out, w)
