@@ -96,6 +96,8 @@ def compiled(file: Any) -> tuple[Any, str]:
         try:
             spec = file.copy() if isinstance(file, mujoco.MjSpec) else _spec(file)
             model = spec.compile()
+        except ParameterError:
+            raise
         except ValueError as error:
             raise _bad_file(file, one_line(error, 200)) from None
     if caught:

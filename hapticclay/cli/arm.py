@@ -83,11 +83,11 @@ class ArmCommand:
 
     def _answers(self, arm: MjcfArm) -> Any:
         """The limits of the gains, of a wall, and over poses: those that are asked for."""
-        from ..theory import joint_limits, joint_poses, joint_walls
+        from ..theory import joint_gains, joint_poses, joint_walls
 
         if self.gains or self.Kp:
             law = self._law()
-            yield joint_limits.joint_limits(arm, law, self._Ts, self.delay)
+            yield joint_gains.joint_limits(arm, law, self._Ts, self.delay)
             if self.poses:
                 timing = self._Ts, self.delay
                 yield joint_poses.over_poses(arm, law, *timing, self.poses, self.seed)

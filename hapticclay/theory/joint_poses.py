@@ -13,7 +13,7 @@ from ..arms.joint_law import JointPD
 from ..arms.mjcf_arm import MjcfArm
 from ..errors import Bound, ParameterError
 from ..results import Result, Tables
-from .joint_limits import Study, first_joint
+from .joint_gains import Study, first_joint
 
 TRIES = 100  # poses drawn for each one wanted, where a chain cannot be closed at most
 

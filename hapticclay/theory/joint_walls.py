@@ -16,7 +16,7 @@ from ..errors import ParameterError, choice, number
 from ..model.operator import NO_HAND, Operator
 from ..results import Result, Tables
 from .joint_families import Circle, Family, Limit
-from .joint_limits import IGNORED
+from .joint_gains import IGNORED
 from .joint_loop import JointLoop
 
 AXES = ("x", "y", "z")

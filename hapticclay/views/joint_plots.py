@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..theory.joint_limits import JointLimits
+from ..theory.joint_gains import JointLimits
 from ..theory.joint_poses import OverPoses
 from ..theory.joint_walls import WallLimit
 from .style import BLACK, BLUE, VERMILION, figure_size, figure_style, set_title, stroke, unit_text

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.arms.mechanism import Linear
 from hapticclay.theory.joint_families import Circle, Family
-from hapticclay.theory.joint_limits import Study, delay_left, joint_loop
+from hapticclay.theory.joint_gains import Study, delay_left, joint_loop
 from hapticclay.theory.wall_limits import stiffness_band
 from tests.oracles import joints
 
