@@ -67,7 +67,17 @@ class JointLimits(Result):
 
     drawn_by = "hapticclay.views.joint_plots:limits_plot"
     written_as = "limits"
-    printed = {"joints": ()}
+    printed = {
+        "joints": (
+            "joint",
+            "Kp [N.m/rad]",
+            "largest Kp [N.m/rad]",
+            "buzz [Hz]",
+            "Kd [N.m.s/rad]",
+            "least Kd [N.m.s/rad]",
+            "largest Kd [N.m.s/rad]",
+        )
+    }
 
     names: tuple[str, ...]
     stiffness: np.ndarray
