@@ -18,6 +18,7 @@ from ..model.operator import NO_HAND
 from ..scene.scenario import Scenario
 from ..simulation import monitor
 from ..simulation.record import Record
+from ..simulation.run import COLUMNS
 from ..studies.removal import TOOL, Tool, removed
 from ..theory.pose_limits import PoseLimits
 from .clock import FRAME_TIME, LATE_EDGES, Clock
@@ -229,8 +230,8 @@ class Session:
         spring, damper = np.array([(th.spring, th.damper) for th in hands]).T
         hand = self.run.pull.mean(self.t, 0.0) - spring * np.array(p) - damper * np.array(v)
         fe = b[0] * v[0], b[1] * v[1]
-        if self.run.last_rendered:  # of yielding clay, at the last sample
-            fe = tuple(self.run.last_rendered)
+        if self.run.records_force and self.run.last is not None:  # at the last sample
+            fe = tuple(self.run.last[COLUMNS["fe"] :].tolist())
         self.frames.append(Frame(self.t, p, v, fe, tuple(hand.tolist()), self.run.held))
 
     def _within_reach(self, point: tuple[float, float]) -> tuple[float, float]:
