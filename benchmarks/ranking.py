@@ -6,6 +6,7 @@ errors by kind, None where a run failed. A setting is a number, or a text where 
 
 from __future__ import annotations
 
+import itertools
 import statistics
 from typing import Any
 
@@ -86,18 +87,13 @@ def leaders(rows: list[dict], kind: str = "crossing") -> list[dict[str, Any]]:
 
 def who_leads(found: list[dict[str, Any]], unit: str = "s") -> str:
     """One line on which package leads in which span of errors."""
-    spans: list[list[dict[str, Any]]] = []
-    for x in found:
-        if spans and spans[-1][0]["package"] == x["package"]:
-            spans[-1].append(x)
-        else:
-            spans.append([x])
-    told = [
+    spans = [list(run) for _, run in itertools.groupby(found, lambda x: x["package"])]
+    texts = [
         f"{s[0]['package']} at {s[0]['asked']:.0e}"
         + (f" to {s[-1]['asked']:.0e} {unit}" if s[1:] else f" {unit}")
         for s in spans
     ]
-    return "Fastest, by requested error: " + "; ".join(told) + "."
+    return "Fastest, by requested error: " + "; ".join(texts) + "."
 
 
 def table_of_leaders(found: list[dict[str, Any]], unit: str = "s") -> str:

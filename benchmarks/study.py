@@ -141,7 +141,7 @@ def measure(problem: Problem, quick: bool, rounds: int) -> tuple[list[dict[str, 
         quick: two settings of each method alone.
         rounds: how often each setting is run.
     """
-    exact, told = problem.reference()
+    exact, notes = problem.reference()
     jobs = [(m, x) for m in problem.methods() for x in m.settings[: 2 if quick else None]]
     runs = [(f"{m.package} {m.name}", functools.partial(m.solve, x)) for m, x in jobs]
     first, walls = take_turns(runs, rounds)
@@ -157,7 +157,7 @@ def measure(problem: Problem, quick: bool, rounds: int) -> tuple[list[dict[str, 
         }
         for (m, x), r, wall in zip(jobs, first, walls, strict=True)
     ]
-    return rows, told
+    return rows, notes
 
 
 def figure_name(problem: str) -> str:
@@ -179,9 +179,9 @@ def main(
     """
     rows, texts = [], {}
     for x in problems:
-        found, told = measure(x, quick, 2 if quick else 5)
+        found, notes = measure(x, quick, 2 if quick else 5)
         rows += found
-        texts[x.name] = [x.about, told]
+        texts[x.name] = [x.about, notes]
         with files.atomic(out / figure_name(x.name)) as f:
             diagrams.draw(found, x.name, ERRORS).savefig(f, format="png")
     return common.write(out, name, {"omissions": omissions, "texts": texts, "rows": rows})
@@ -196,8 +196,8 @@ def least_errors(rows: list[dict[str, Any]]) -> str:
     for r in rows:
         if r[POSITION] is not None:
             least[r["package"]] = min(r[POSITION], least.get(r["package"], np.inf))
-    told = (f"{package} {common.number(x)} {UNIT}" for package, x in least.items())
-    out = f"Least error with any of the settings: {', '.join(told)}."
+    errors = (f"{package} {common.number(x)} {UNIT}" for package, x in least.items())
+    out = f"Least error with any of the settings: {', '.join(errors)}."
     mine = least.get("hapticclay", np.inf)
     further = [package for package, x in least.items() if x < mine]
     if further:
@@ -230,9 +230,9 @@ def is_of_both(data: dict[str, Any]) -> bool:
 def sections(data: dict[str, Any]) -> list[str]:
     """The paragraphs of a part of the page, a section a problem."""
     text = []
-    for problem, told in data["texts"].items():
+    for problem, notes in data["texts"].items():
         rows = [r for r in data["rows"] if r["problem"] == problem]
-        text += [f"## {problem.capitalize()}", *told]
+        text += [f"## {problem.capitalize()}", *notes]
         text += [f"![work-precision diagram]({figure_name(problem)})", *ranked(rows)]
         single = [r for r in rows if not r["method"].endswith(THROUGHOUT)]
         if len(single) < len(rows):

@@ -59,6 +59,7 @@ def good_values(folder):
         "wall_borders": {"plane": "B-K", "x": 1.0}, "polygon": {"turn": (1, 2)},
         "zigzag": {"amplitude": 1e-4}, "taken_energy": {"path": zigzag},
         "parse_grid": {"text": "b=1:9:2"},
+        "Sweep": {"experiment": "constant", "vary": swept.vary},
         "run_sweep": {"sweep": swept}, "compare_files": {"paths": files},
         "Trials": {"base": wall, "vary": {"K": hc.studies.Distribution("uniform", 1.0, 9.0)}},
         "run_staircase": {"staircase": hc.studies.Staircase(), "observer": hc.studies.Observer()},

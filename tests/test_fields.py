@@ -17,9 +17,19 @@ import pytest
 import hapticclay as hc
 from hapticclay.arguments import argument_nodes
 from hapticclay.errors import Bound, ParameterError
-from hapticclay.fields import check_fields, field_descriptions, nodes_of
-from hapticclay.fields.nodes import Flag, Node, Number, Numbers, Whole
-from hapticclay.fields.tree import Either, Pair, Part, Parts
+from hapticclay.fields import (
+    Either,
+    Flag,
+    Node,
+    Number,
+    Pair,
+    Part,
+    Row,
+    Whole,
+    check_fields,
+    field_descriptions,
+    nodes_of,
+)
 from hapticclay.scene.experiments import EXPERIMENTS, Experiment, parameters
 from tests.good_values import good_values, required
 from tests.public import NAMES
@@ -73,7 +83,7 @@ def wrong_values(node, owner):
     if isinstance(inner, Number):
         yield from (math.nan, True, 1j, [], "1 furlong", *["1"] * (not node.words))
         yield from (x for x, taken in ends_of(node, owner) if not taken)
-    elif isinstance(inner, Numbers):
+    elif isinstance(inner, Row) and inner.takes_numbers:
         yield from (1.0, "x", [None], [[[1.0]]])
         if not inner.any_length:
             yield from ([1.0] * (len(inner.bound.names) + 1), [math.nan] * len(inner.bound.names))
@@ -81,7 +91,7 @@ def wrong_values(node, owner):
                 yield from () if taken else ([x] * len(inner.bound.names),)
     elif isinstance(inner, Flag):
         yield from (1, "true", None)
-    elif isinstance(inner, Part | Parts | Pair):
+    elif isinstance(inner, Part | Row | Pair):
         each = isinstance(inner, Part) and Iterable in inner.kinds
         yield from (1.0, *[[object()], (object(), object())] * (not each))
         yield from () if node.none else (None,)
@@ -111,10 +121,10 @@ def test_a_value_on_a_bound_is_taken_to_the_last_bit(good, name, field):
     inner, unit = inner_type(node), node.bound.unit
     for x, taken in ends_of(node, owner):
         given, wide = x, np.float64(x) if isinstance(x, float) else np.int64(x)
-        if isinstance(inner, Numbers):
+        if isinstance(inner, Row):
             n = 1 if inner.any_length else len(node.bound.names)
             given, wide = ((z,) * n for z in (x, wide))
-            given, wide = ((given,), (wide,)) if inner.rows else (given, wide)
+            given, wide = ((given,), (wide,)) if isinstance(inner.item, Row) else (given, wide)
         if taken:
             assert node.check(field, given, owner) == given
             assert repr(node.check(field, wide, owner)) == repr(given)
@@ -179,7 +189,10 @@ class Mixed:
         (dict(other=3), "part.other = 3: must be an Operator or None"),
         (dict(pair=(0.5, 2.0)), "part.pair[b] = 2.0: must be a finite number >= 0 and <= 1 m"),
         (dict(pair=(0.5,)), "part.pair = (0.5,): must be 2 numbers (a, b), got 1"),
-        (dict(mixed="aut"), "part.mixed = 'aut': must be one of auto; did you mean 'auto'?"),
+        (
+            dict(mixed="aut"),
+            "part.mixed = 'aut': must be a finite number >= 0 or one of auto; did you mean 'auto'?",
+        ),
         (dict(mixed=-1), "part.mixed = -1: must be a finite number >= 0"),
         (dict(mixed=6.0), "part.high = 5.0: must be a finite number >= 6 and <= 9"),
         (dict(on=1), "part.on = 1: must be True or False"),

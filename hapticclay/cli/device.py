@@ -8,7 +8,7 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from ..errors import Bound, ParameterError, number, number_in
 from ..files import writable
@@ -16,6 +16,7 @@ from . import console
 from .device_options import deliver_loops, write_report
 from .options import Loose
 from .run import deliver
+from .unused import Unused
 
 if TYPE_CHECKING:
     from ..ports.device import Trajectory
@@ -85,6 +86,10 @@ class DeviceCommand:
     plots: bool = True
     figures: console.FigureOptions = console.FigureOptions()
 
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("period",), "is for --clock tick: give it too", (), ("clock=tick",)),
+    )
+
     def __call__(self) -> int:
         out = self.out or Path("out", "loop" if self.action == "report" else "device")
         if self.action == "report":
@@ -109,9 +114,6 @@ class DeviceCommand:
         from ..ports.sessions import PORTS, Inverse3
 
         logging.basicConfig(format="hapticclay: %(message)s", level=logging.WARNING)
-        if self.period is not None and self.clock != "tick":
-            bound = "is for --clock tick: leave it out with --clock wall"
-            raise ParameterError("period", self.period, bound)
         shown = Inverse3(
             self.device_id,
             self.grip_id,

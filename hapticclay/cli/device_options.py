@@ -7,10 +7,11 @@ import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from ..errors import Bound, ParameterError
+from ..errors import Bound
 from . import console, walls
+from .unused import Unused
 
 if TYPE_CHECKING:
     from ..live.session import Session
@@ -45,10 +46,13 @@ class DeviceOptions:
     device_rate: Annotated[float, Bound(unit="Hz")] = 1000.0
     coupling: tuple[walls.Spring, walls.Damper] = (300.0, 5.0)
 
-    def __post_init__(self):
-        if self.device and self.device_server:
-            bound = "is for one's own hand: the arm cannot be served beside it"
-            raise ParameterError("device", self.device, bound)
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(
+            ("device",),
+            "is for one's own hand: the arm cannot be served beside it",
+            ("device-server",),
+        ),
+    )
 
     @property
     def given(self) -> bool:

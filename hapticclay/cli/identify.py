@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from ..errors import Bound, ParameterError, choice
 from ..files import writable
 from ..model.constants import AXES
 from . import console
+from .unused import Unused
 
 if TYPE_CHECKING:
     from ..studies.identification import Identified
@@ -22,8 +23,6 @@ QUICK_SIGNALS: dict[str, dict[str, Any]] = {  # period [s], band [Hz]
     "Th": {"periods": 1, "lines": 20, "period": 5.0, "band": (0.15, 3.0)},
 }
 SPACING, QUICK_SPACING = 0.08, 0.2  # of the map's poses [m]
-SIMULATED_ONLY = ("noise", "map", "quick", "seed", "control")
-MEASURED_ONLY = ("what", "columns", "band", "held", "paper")
 
 
 @dataclass(frozen=True)
@@ -72,10 +71,23 @@ class IdentifyCommand:
     paper: bool = False
     figures: console.FigureOptions = console.FigureOptions()
 
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(
+            ("noise", "map", "quick", "seed", "control"),
+            "is for the simulated arm: leave it out with --csv",
+            ("csv",),
+        ),
+        Unused(
+            ("what", "columns", "band", "held", "paper"),
+            "is for measured columns: give --csv FILE too",
+            (),
+            ("csv",),
+        ),
+    )
+
     def __call__(self) -> int:
         from ..studies.identified_blocks import IdentifiedBlocks
 
-        self._check_words()
         if self.csv:
             return self._measured(self.csv)
         writable(self.out)
@@ -84,15 +96,6 @@ class IdentifyCommand:
             drift = self._map(show) if self.map else None
         console.deliver(IdentifiedBlocks(results, drift), self.out, self.figures)
         return 0
-
-    def _check_words(self) -> None:
-        """Refuse options of the simulated arm with a file, and of a file without one."""
-        names, bound = SIMULATED_ONLY, "is for the simulated arm: leave it out with --csv"
-        if not self.csv:
-            names, bound = MEASURED_ONLY, "is for measured columns: give --csv FILE too"
-        for name in names:
-            if (value := getattr(self, name)) != getattr(type(self), name):
-                raise ParameterError(name, value, bound)
 
     def _measured(self, file: Path) -> int:
         from ..studies.identified_blocks import IdentifiedBlocks

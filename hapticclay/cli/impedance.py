@@ -72,9 +72,12 @@ class ImpedanceCommand:
         file = self.source if self.source and is_scenario_file(self.source) else None
         if file and is_wall_file(file):
             return self._wall(file)
-        if self.source is None and self.wall.given.keys() - {"hand"}:
+        of_wall = {name: x for name, x in self.wall.given.items() if name != "hand"}
+        if self.source is None and of_wall:
             return self._wall(None)
-        self.wall.refuse("is for a wall: leave it out beside an experiment or scenario", ("hand",))
+        for name, value in of_wall.items():
+            bound = "is for a wall: leave it out beside an experiment or scenario"
+            raise ParameterError(name, value, bound)
         return self._loop(file)
 
     def _wall(self, file: str | None) -> Subject:

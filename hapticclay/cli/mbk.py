@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from ..errors import Bound, ParameterError
+from ..errors import Bound
 from ..files import writable
 from ..model.constants import TS
 from . import console, walls
 from .options import Loose
+from .unused import Unused
 
 RENDERED_WALL = {"K": 1000.0, "B": 2.0, "device.damper": 0.5}
 
@@ -46,13 +47,20 @@ class MBKCommand:
     wall: walls.WallOptions = walls.WallOptions()
     figures: console.FigureOptions = console.FigureOptions()
 
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("box",), "is for the arm: give --arm too", (), ("arm",)),
+        Unused(
+            ("source", "K", "B", "M", *walls.OF_DEVICE),
+            "is for a bare device: leave it out with --arm",
+            ("arm",),
+        ),
+    )
+
     def __call__(self) -> int:
         writable(self.out)
         columns = (2 if self.quick else 5) if self.columns is None else self.columns
         if self.arm:
             return self._arm(columns)
-        if self.box:
-            raise ParameterError("box", self.box, "is for the arm: give --arm too")
         return self._device(columns)
 
     def _device(self, columns: int) -> int:
@@ -70,10 +78,6 @@ class MBKCommand:
         from ..studies.boundary import PushedLoop
         from ..studies.mbk import HANDS, arm_mbk
 
-        bound = "is for a bare device: leave it out with --arm"
-        self.wall.refuse(bound, but=("Ts", "rate", "delay", "hand"))
-        if self.source:
-            raise ParameterError("source", str(self.source), bound)
         assert self.arm is not None
         box = walls.box_of(self.box) or HANDS
         operator = walls.operator_of(self.wall.hand) or Operator()

@@ -6,7 +6,7 @@ import dataclasses
 import math
 import types
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from pathlib import Path
 from typing import (
     TYPE_CHECKING,
@@ -19,7 +19,6 @@ from typing import (
     get_type_hints,
 )
 
-from ..errors import ParameterError
 from ..fields import UNSET, Node, field_descriptions, node_of, of_words
 
 if TYPE_CHECKING:
@@ -41,13 +40,13 @@ class Verbatim(Node):
     """A text or a path as it was given."""
 
     def __init__(self, kind: type):
-        self.hint = kind
+        self.kind = kind
 
     def wants(self) -> str:
-        return "a path" if self.hint is Path else "a word"
+        return "a path" if self.kind is Path else "a word"
 
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
-        return self.hint(value)
+        return self.kind(value)
 
 
 class Several(Node):
@@ -68,7 +67,7 @@ class Several(Node):
         return tuple(node.check(field, node.read(x, field)) for node, x in pairs)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Option:
     """A word, or words behind a name, that a command takes.
 
@@ -95,39 +94,14 @@ class Option:
         """The name as an error shows it."""
         return self.name if self.note else f"--{self.word}"
 
-    @property
-    def fills_pair(self) -> bool:
-        """Whether one word stands for two: as in --set, for the pairs of an experiment."""
-        return self.part == SCENARIO and self.node.arity == 2
-
-    @property
-    def metavar(self) -> str:
-        """What stands for its words on a help page."""
-        node = self.node.items[0] if isinstance(self.node, Several) else self.node
-        one = "|".join(["NUMBER"] * node.takes_numbers + list(node.words))
-        if isinstance(node, Verbatim):
-            one = "PATH" if node.hint is Path else "TEXT"
-        many = self.node.arity == math.inf
-        return f"{one} ..." if many else " ".join([one] * int(self.node.arity))
-
-    @property
-    def has_default(self) -> bool:
-        """Whether a help page shows a default."""
-        return self.default not in (None, (), False, UNSET)
-
-    def default_text(self, _: Any) -> str:
-        """The default on a help page."""
-        value = self.default() if callable(self.default) else self.default
-        items = value if isinstance(value, tuple) else (value,)
-        return " ".join(f"{x:g}" if isinstance(x, float) else str(x) for x in items)
-
     def value(self, texts: Sequence[str]) -> Any:
         """The value that words stand for."""
         return of_words(self.node, self.label, texts)
 
-    def refused(self, texts: Sequence[str]) -> ParameterError:
-        """The error for words of which the option takes more or less."""
-        return ParameterError(self.label, " ".join(texts), f"must be {self.node.wants()}")
+
+def parts_of(kind: type) -> dict[str, type]:
+    """The dataclasses among the fields of a command, by the names of the fields."""
+    return {name: hint for name, hint in get_type_hints(kind).items() if is_dataclass(hint)}
 
 
 def options_of(kind: type, part: str = "") -> dict[str, Option]:
@@ -135,12 +109,12 @@ def options_of(kind: type, part: str = "") -> dict[str, Option]:
     hints, about = get_type_hints(kind, include_extras=True), field_descriptions(kind)
     out: dict[str, Option] = {}
     for field in dataclasses.fields(kind):
-        name, hint, default = field.name, hints[field.name], field.default
-        if dataclasses.is_dataclass(hint):
+        name, hint = field.name, hints[field.name]
+        if is_dataclass(hint):
             out |= options_of(hint, name)  # type: ignore[arg-type]
             continue
-        if field.default_factory is not UNSET:
-            default = field.default_factory
+        made = field.default_factory
+        default = field.default if made is UNSET else made()
         notes = getattr(hint, "__metadata__", ())
         note = next((x for x in (LOOSE, SCENARIO, RECORD) if x in notes), "")
         node = _option_node(get_args(hint)[0] if note else hint)
@@ -149,7 +123,15 @@ def options_of(kind: type, part: str = "") -> dict[str, Option]:
 
 
 def _option_node(hint: Any) -> Node:
-    """The type of an option in the field tree, where a lack of a value is no word."""
+    """The type of an option, as a node of the field tree."""
+    node = _node_for(hint)
+    node.hint = hint
+    if "none" in node.words:  # a word here, not the lack of a value
+        node.none = False
+    return node
+
+
+def _node_for(hint: Any) -> Node:
     bare, *notes = get_args(hint) if get_origin(hint) is Annotated else (hint,)
     members = get_args(bare) if get_origin(bare) in (Union, types.UnionType) else (bare,)
     kind, *others = (x for x in members if x is not type(None))
@@ -159,10 +141,7 @@ def _option_node(hint: Any) -> Node:
     if items[1:] == (...,) or (items and get_origin(items[0]) is Annotated):
         each = [Annotated[(x, *notes)] if notes else x for x in items if x is not ...]
         return Several([_option_node(x) for x in each], items[-1] is ...)
-    node = node_of(hint)
-    if "none" in node.words:
-        node.none = False
-    return node
+    return node_of(hint)
 
 
 def experiment_options(kind: type[Experiment]) -> dict[str, Option]:

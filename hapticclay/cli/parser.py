@@ -6,17 +6,17 @@ import inspect
 import itertools
 import math
 import os
+import re
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any
 
 import cyclopts
 
 from ..errors import ParameterError, choice, nearest
 from ..fields import UNSET, field_descriptions
-from ..units import is_quantity
 from .commands import COMMANDS, load_command
 from .options import (
     RECORD,
@@ -28,16 +28,17 @@ from .options import (
     Verbatim,
     experiment_options,
     options_of,
+    parts_of,
 )
 from .unused import Unused, refuse_unused
 
-EXPERIMENT, FILE = "experiment", "file"  # and RECORD: what a scenario comes from
+NEGATIVE = re.compile(r"^-(?=\.?\d|inf$|nan$)")  # no option: it gets a space in front
+EXPERIMENT, FILE = "experiment", "file"  # and RECORD: where a scenario comes from
 OF_SAMPLING = Unused(
     ("render",),
     "is of sampled control: give --control sampled too",
     without=("control=sampled", "scenario=file"),
 )
-Given = Mapping[str, tuple[str, ...] | bool]
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class Line:
     options: dict[str, Option]
     origin: str = ""
     source: str = ""
-    values: Mapping[str, Any] = ()  # type: ignore[assignment]
+    values: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def path(self) -> str:
@@ -67,15 +68,15 @@ class Line:
 
     def command(self) -> Any:
         """The command with its options, ready to be called; files are read only now."""
-        parts: dict[str, dict[str, Any]] = {"": {}, SCENARIO: {}}
-        for name, value in self.values.items():
-            parts.setdefault(self.options[name].part, {})[name] = value
-        own, parameters = parts.pop(""), parts.pop(SCENARIO)
-        kinds = get_type_hints(self.kind)
-        made = {part: kinds[part](**values) for part, values in parts.items()}
+        own = self._values("")
+        own |= {part: kind(**self._values(part)) for part, kind in parts_of(self.kind).items()}
         if self.origin:
-            own[SCENARIO] = self._scenario(parameters)
-        return self.kind(**own, **made)
+            own[SCENARIO] = self._scenario(self._values(SCENARIO))
+        return self.kind(**own)
+
+    def _values(self, part: str) -> dict[str, Any]:
+        """What was given of a part of the command."""
+        return {name: x for name, x in self.values.items() if self.options[name].part == part}
 
     def _scenario(self, parameters: dict[str, Any]) -> Any:
         """The scenario, or the record."""
@@ -99,17 +100,18 @@ def read(words: Sequence[str]) -> Line:
     Raises:
         ParameterError: it has a word that its command does not take.
     """
-    line, rest = begun([f" {w}" if w.startswith("-") and is_quantity(w) else w for w in words])
+    line, rest = begun([NEGATIVE.sub(r" \g<0>", word) for word in words])
     try:
         _, bound, _ = app_of(line).parse_args(rest, exit_on_error=False, print_error=False)
     except cyclopts.CycloptsError as error:
         raise _refusal(error, line) from None
-    given = {name: texts for name, texts in bound.arguments.items() if texts != ()}
-    rules = getattr(line.kind, "unused", ())
+    given = {line.options[name]: texts for name, texts in bound.arguments.items() if texts != ()}
+    kinds = (line.kind, *parts_of(line.kind).values())
+    rules = (rule for kind in kinds for rule in getattr(kind, "unused", ()))
     refuse_unused((*rules, OF_SAMPLING), _given_words(line, given))
     values = {
-        name: texts if isinstance(texts, bool) else line.options[name].value(texts)
-        for name, texts in given.items()
+        option.name: texts if isinstance(texts, bool) else option.value(texts)
+        for option, texts in given.items()
     }
     _note_repeats(rest)
     return replace(line, values=values)
@@ -126,42 +128,43 @@ def begun(words: Sequence[str], whole: bool = True) -> tuple[Line, list[str]]:
     if name.startswith("-"):
         raise _refused(f"{name}: no option of hapticclay; see hapticclay --help")
     kind = load_command(choice("command", name, tuple(COMMANDS)))
-    options = options_of(kind)
-    line = Line(name, kind, options)
-    if SCENARIO not in options or (not whole and _first_loose(line, rest) is None):
+    line = Line(name, kind, options_of(kind))
+    at = _first_loose(line.options, rest) if SCENARIO in line.options else None
+    if SCENARIO not in line.options or (at is None and not whole):
         return line, rest
     from ..scene.experiments import EXPERIMENTS
 
-    origin, source, rest = _scenario_of(line, rest)
+    origin, source = _scenario_of(line, rest, at)
     of_scenario = experiment_options(EXPERIMENTS[source]) if origin == EXPERIMENT else {}
     if origin != RECORD:
         of_scenario[SET] = Option(SET, Several([Verbatim(str)], many=True), SET_HELP, (), SCENARIO)
-    own = {name: option for name, option in options.items() if name != SCENARIO}
+    own = {name: option for name, option in line.options.items() if name != SCENARIO}
     return replace(line, options=own | of_scenario, origin=origin, source=source), rest
 
 
-def _scenario_of(line: Line, words: list[str]) -> tuple[str, str, list[str]]:
-    """Where a scenario comes from, the experiment or path, and the words without it."""
+def _scenario_of(line: Line, words: list[str], at: int | None) -> tuple[str, str]:
+    """Where a scenario comes from, and the experiment or path; takes them off the words."""
     from ..scene.experiments import EXPERIMENTS
     from ..scene.files import is_scenario_file
 
     recorded = line.options[SCENARIO].note == RECORD
-    at = _first_loose(line, words)
     if at is None and recorded:
-        return EXPERIMENT, "constant", words
+        return EXPERIMENT, "constant"
     if at is None:
         raise _refused(f"give an experiment or a scenario file: {', '.join(EXPERIMENTS)}")
-    word, rest = words[at], words[:at] + words[at + 1 :]
+    word = words.pop(at)
     if word == FILE or (recorded and word == RECORD):
-        if at == len(rest) or rest[at].startswith("-"):
+        if at == len(words) or words[at].startswith("-"):
             raise _refused(f"give the path of a {word} behind {line.name} {word}")
-        return word, rest[at], rest[:at] + rest[at + 1 :]
+        return word, words.pop(at)
     if is_scenario_file(word):
-        return FILE, word, rest
-    if recorded and word not in EXPERIMENTS and _is_record(word):
-        return RECORD, word, rest
+        return FILE, word
+    suffix = Path(word).suffix.lower()  # a record is a folder or an .npz file, there or not
+    as_record = os.path.isdir(word) or suffix == ".npz" or (os.sep in word and not suffix)
+    if recorded and as_record and word not in EXPERIMENTS:
+        return RECORD, word
     try:
-        return EXPERIMENT, choice(EXPERIMENT, word, tuple(EXPERIMENTS)), rest
+        return EXPERIMENT, choice(EXPERIMENT, word, tuple(EXPERIMENTS))
     except ParameterError as error:
         kinds = "a scenario file, .toml or .json"
         kinds += ", or the folder of a record" if recorded else ""
@@ -171,7 +174,7 @@ def _scenario_of(line: Line, words: list[str]) -> tuple[str, str, list[str]]:
         raise ParameterError(error.field, error.value, f"{error.bound} (or give {kinds})") from None
 
 
-def _first_loose(line: Line, words: list[str]) -> int | None:
+def _first_loose(options: Mapping[str, Option], words: Sequence[str]) -> int | None:
     """Index of the first word that is neither an option nor a value of one.
 
     An option that the command lacks may be one of the experiment, which is not known yet: then as
@@ -180,8 +183,8 @@ def _first_loose(line: Line, words: list[str]) -> int | None:
     from ..scene.experiments import EXPERIMENTS
     from ..scene.files import is_scenario_file
 
-    arity = {f"--{option.word}": option.node.arity for option in line.options.values()}
-    arity |= {f"--no-{option.word}": 0 for option in line.options.values() if not option.node.arity}
+    arity = {f"--{option.word}": option.node.arity for option in options.values()}
+    arity |= {f"--no-{option.word}": 0 for option in options.values() if not option.node.arity}
     left: float = 0
     for i, word in enumerate(words):
         named = word in EXPERIMENTS or (is_scenario_file(word) and "=" not in word)
@@ -193,12 +196,6 @@ def _first_loose(line: Line, words: list[str]) -> int | None:
         else:
             left -= 1
     return None
-
-
-def _is_record(word: str) -> bool:
-    """Whether a word is the path of a record: a folder, or an .npz file, there or not."""
-    suffix = Path(word).suffix.lower()
-    return os.path.isdir(word) or suffix == ".npz" or (os.sep in word and not suffix)
 
 
 # ---- the parser ----------------------------------------------------------------------------------
@@ -244,31 +241,32 @@ def help_text(kind: type) -> str:
 
 def _parameter(option: Option, group: cyclopts.Group) -> inspect.Parameter:
     """An option as a parameter of a function, as cyclopts reads it."""
-    arity, many = option.node.arity, option.node.arity == math.inf
-    settings: dict[str, Any] = {
-        "help": option.about[:1].upper() + option.about[1:],
-        "show_default": option.has_default and option.default_text,
-        "allow_repeating": True,
-    }
-    if arity:
-        settings |= {"converter": _texts, "negative": (), "metavar": option.metavar}
-        settings |= {"n_tokens": -1 if many or option.fills_pair else int(arity)}
-        settings |= {"consume_multiple": (1, 2) if option.fills_pair else 1 if many else None}
-    kind = inspect.Parameter.POSITIONAL_ONLY
+    P, arity, many = inspect.Parameter, option.node.arity, option.node.arity == math.inf
+    kind = P.KEYWORD_ONLY if not option.note else P.VAR_POSITIONAL if many else P.POSITIONAL_ONLY
+    default = None if option.default == () else option.default
+    settings: dict[str, Any] = {"help": option.about[:1].upper() + option.about[1:]}
+    if isinstance(default, tuple):
+        settings["show_default"] = _joined
     if not option.note:
-        kind = inspect.Parameter.KEYWORD_ONLY
-        settings |= {"name": f"--{option.word}", "group": group}
-    elif many:
-        kind = inspect.Parameter.VAR_POSITIONAL
-        settings = {"help": settings["help"]}
-    hint: Any = bool if not arity else str if arity == 1 or option.note else tuple[str, ...]
-    needed = option.default is UNSET or kind == inspect.Parameter.VAR_POSITIONAL
-    return inspect.Parameter(
+        settings |= {"name": f"--{option.word}", "group": group, "allow_repeating": True}
+    if arity and kind != P.VAR_POSITIONAL:
+        settings |= {"converter": _texts, "negative": (), "n_tokens": -1 if many else int(arity)}
+    if not option.note and many:
+        settings["consume_multiple"] = 1
+    if option.part == SCENARIO and arity == 2:  # one number for both axes, as in --set
+        settings |= {"n_tokens": -1, "consume_multiple": (1, 2)}
+    hint = str if kind == P.VAR_POSITIONAL else option.node.hint
+    return P(
         option.name,
         kind,
-        default=inspect.Parameter.empty if needed else None,
+        default=P.empty if default is UNSET or kind == P.VAR_POSITIONAL else default,
         annotation=Annotated[hint, cyclopts.Parameter(**settings)],
     )
+
+
+def _joined(values: tuple[Any, ...]) -> str:
+    """A tuple as it is given on the command line."""
+    return " ".join(map(str, values))
 
 
 def _texts(_: Any, tokens: Sequence[cyclopts.Token]) -> tuple[str, ...]:
@@ -282,41 +280,31 @@ def _refusal(error: cyclopts.CycloptsError, line: Line) -> ParameterError:
     """The error of cyclopts in a line, with the nearest name."""
     if isinstance(error, cyclopts.UnknownOptionError):
         return _unknown(error.token.keyword or error.token.value, line)
-    if isinstance(error, cyclopts.UnusedCliTokensError):
-        return _unexpected((error.unused_tokens or [""])[0], line)
+    if error.unused_tokens and isinstance(error, cyclopts.UnusedCliTokensError):
+        return _unknown(error.unused_tokens[0], line)
     found = error.argument and error.argument.field_info.name
     if found not in line.options:
         return _refused(" ".join(str(error).split()))
     option = line.options[found]
-    if isinstance(error, cyclopts.MissingArgumentError):
-        if option.note:
-            return _refused(f"{line.path} needs {option.word}: {option.node.wants()}")
-        return option.refused(error.tokens_so_far)
     token = getattr(error, "token", None)
-    return option.refused([token.value] if token else [])
+    texts = getattr(error, "tokens_so_far", [token.value] if token else [])
+    if option.note and not texts:
+        return _refused(f"{line.path} needs {option.word}: {option.node.wants()}")
+    return ParameterError(option.label, " ".join(texts), f"must be {option.node.wants()}")
 
 
 def _unknown(word: str, line: Line) -> ParameterError:
-    """The error for an option that the command lacks."""
-    head = word.partition("=")[0]
-    near = nearest(head.lstrip("-").replace("_", "-"), _option_names(line))
+    """The error for an option that the command lacks, or for a word too many."""
+    options = [option for option in line.options.values() if not option.note]
+    names = [o.word for o in options] + [f"no-{o.word}" for o in options if not o.node.arity]
+    head, equals, value = word.partition("=")
+    name = head.lstrip("-").replace("_", "-")
+    if not word.startswith("-"):
+        hint = f"; did you mean --{name} {value}?" if equals and name in names else ""
+        return _refused(f"unexpected argument {word!r} of {line.path}{hint}")
+    near = nearest(name, names)
     hint = f"; did you mean --{near[0]}?" if near else f"; see hapticclay {line.path} --help"
     return _refused(f"{head}: no option of {line.path}{hint}")
-
-
-def _unexpected(word: str, line: Line) -> ParameterError:
-    """The error for a word without a name, of which the command takes no more."""
-    if word.startswith("-"):
-        return _unknown(word, line)
-    name, equals, value = word.partition("=")
-    name = name.replace("_", "-")
-    hint = f"; did you mean --{name} {value}?" if equals and name in _option_names(line) else ""
-    return _refused(f"unexpected argument {word!r} of {line.path}{hint}")
-
-
-def _option_names(line: Line) -> list[str]:
-    options = [option for option in line.options.values() if not option.note]
-    return [o.word for o in options] + [f"no-{o.word}" for o in options if not o.node.arity]
 
 
 def _refused(text: str) -> ParameterError:
@@ -326,15 +314,14 @@ def _refused(text: str) -> ParameterError:
 # ---- what was given ------------------------------------------------------------------------------
 
 
-def _given_words(line: Line, given: Given) -> dict[str, tuple[str, ...]]:
-    """What is given by the names of the command line, with the fields behind --set.
-
-    Refuses a field that an option gives too.
-    """
+def _given_words(
+    line: Line, given: Mapping[Option, tuple[str, ...] | bool]
+) -> dict[str, tuple[str, ...]]:
+    """What is given by its words, with the fields behind --set; refuses one that stands in both."""
     out: dict[str, tuple[str, ...]] = {}
-    for name, texts in given.items():
-        word = line.options[name].word
-        out |= {f"no-{word}": ()} if texts is False else {word: () if texts is True else texts}
+    for option, texts in given.items():
+        word = f"no-{option.word}" if texts is False else option.word
+        out[word] = () if isinstance(texts, bool) else texts
     if line.origin:
         out[SCENARIO] = (line.source if line.origin == EXPERIMENT else line.origin,)
     fields: dict[str, tuple[str, ...]] = {}

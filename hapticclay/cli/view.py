@@ -80,8 +80,14 @@ class ViewCommand:
     unused: ClassVar[tuple[Unused, ...]] = (
         Unused(("force", "muscle", "length", "t-max"), "does not apply to a session: leave it out"),
         Unused(
-            ("stiffness", "every", "out", "plots", "no-plots", "host", "port", *FIGURE_WORDS),
+            ("stiffness", "every", "out", "plots", "no-plots", "host", "port")
+            + ("device", "device-server", *FIGURE_WORDS),
             "is for sessions: leave it out with a record",
+            ("scenario=record",),
+        ),
+        Unused(
+            ("web",),
+            "shows sessions only: make a film of a record with hapticclay video",
             ("scenario=record",),
         ),
         Unused(("host", "port"), "is of the page: give --web too", (), ("web",)),
@@ -98,7 +104,6 @@ class ViewCommand:
 
         tool = Tool(self.tool_width, self.tool_depth)
         if isinstance(self.scenario, Record):
-            self._refuse_sessions_options()
             replay(self.scenario, tool, self.stream)
             return 0
         writable(self.out or Path("out/view"))
@@ -113,14 +118,6 @@ class ViewCommand:
         deliver(record, out, figures, paced=True)
         self.devices.deliver(session, out, figures)
         return 0
-
-    def _refuse_sessions_options(self) -> None:
-        """Refuses options that are not for a record."""
-        if self.web:
-            bound = "shows sessions only: make a film of a record with hapticclay video"
-            raise ParameterError("web", True, bound)
-        if self.devices.given:
-            raise ParameterError("device", True, "is for sessions: leave it out with a record")
 
     def _play(self, session: Session) -> None:
         """Plays a session until its window or page is closed."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from ..errors import Bound, ParameterError
+from ..errors import Bound
+from .unused import Unused
 
 if TYPE_CHECKING:
     from ..scene.virtual_wall import VirtualWall
@@ -25,6 +26,8 @@ WALL_FIELDS = {  # dotted names of options, where the two differ
     "quantum": "device.quantum",
     "filter": "velocity_filter",
 }
+OF_DEVICE = ("mass", "damper", "friction", "quantum", "velocity", "velocity-window", "filter")
+OF_DEVICE += ("unilateral",)  # options for a bare device alone, by their words
 
 
 @dataclass(frozen=True)
@@ -59,9 +62,9 @@ class DeviceOptions:
     hand: Hand | None = None
     unilateral: bool = False
 
-    def __post_init__(self):
-        if self.rate is not None and self.Ts is not None:
-            raise ParameterError("rate", self.rate, "is 1/Ts: give --Ts or --rate")
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("rate",), "is 1/Ts: give one of the two", ("Ts",)),
+    )
 
     @property
     def given(self) -> dict[str, Any]:
@@ -90,12 +93,6 @@ class DeviceOptions:
         changes.pop("rate", None)
         changes = {WALL_FIELDS.get(name, name): x for name, x in changes.items()}
         return replace(with_fields(wall, changes), operator=operator)
-
-    def refuse(self, bound: str, but: tuple[str, ...] = ()) -> None:
-        """Refuses what was given."""
-        for name, value in self.given.items():
-            if name not in but:
-                raise ParameterError(name, value, bound)
 
 
 @dataclass(frozen=True)

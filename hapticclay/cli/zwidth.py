@@ -60,6 +60,12 @@ class ZWidthCommand:
 
     unused: ClassVar[tuple[Unused, ...]] = (
         Unused(("quick",), "tries fewer dampings: leave it out where --B gives them", ("B",)),
+        Unused(("gain",), "is for the arm: give --arm x or y", (), ("arm",)),
+        Unused(
+            ("source", *walls.OF_DEVICE),
+            "is for a bare device: leave it out beside --arm",
+            ("arm",),
+        ),
     )
 
     def __call__(self) -> int:
@@ -90,22 +96,13 @@ class ZWidthCommand:
         return 0
 
     def _wall(self) -> Subject:
-        if self.arm:
-            return self._arm(self.arm)
-        if self.gain is not None:
-            raise ParameterError("gain", self.gain, "is for the arm: give --arm x or y")
-        return self.device.wall(self.source)
-
-    def _arm(self, axis: Literal["x", "y"]) -> Subject:
         from ..scene.changes import with_fields
         from ..studies.boundary import PushedLoop
 
-        bound = "is for a bare device: leave it out beside --arm"
-        self.device.refuse(bound, but=("Ts", "rate", "delay", "hand"))
-        if self.source:
-            raise ParameterError("source", str(self.source), bound)
-        gain = GAIN["xy".index(axis)] if self.gain is None else self.gain
-        loop = PushedLoop(axis, K=gain, Ts=TS, operator=walls.operator_of(self.device.hand))
+        if not self.arm:
+            return self.device.wall(self.source)
+        gain = GAIN["xy".index(self.arm)] if self.gain is None else self.gain
+        loop = PushedLoop(self.arm, K=gain, Ts=TS, operator=walls.operator_of(self.device.hand))
         return with_fields(loop, self.device.timing)
 
     def _values(self, wall: Subject) -> list[Any]:

@@ -9,10 +9,11 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named
+from ..display import fields_of
 from ..errors import Bound
 from ..fields import Seed
 from ..model.constants import AXES, L1, L2
-from ..results import Result, fields_of, figure_of
+from ..results import Result, figure_of
 from .identification import (
     COEFFICIENT_NAMES,
     NOMINAL_POSE,
@@ -135,8 +136,9 @@ def drift_map(
     places = list(zip(x.tolist(), y.tolist(), strict=True))
     for m, at in enumerate(places):
         for k, j, i in np.ndindex(2, 2, 2):
-            settings = dict(origin=at, inertia_shaping=bool(k), seed=seed, **DRIFT_SETTINGS)
-            out[m, k, j, i] = identify(AXES[i], DRIFT_BLOCKS[j], **settings).values
+            place: dict[str, Any] = {"origin": at, "inertia_shaping": bool(k), "seed": seed}
+            found = identify(AXES[i], DRIFT_BLOCKS[j], **place, **DRIFT_SETTINGS)
+            out[m, k, j, i] = found.values
         if progress:
             progress(m + 1, len(x))
     w = np.array([endpoint_mobility(*at) for at in places])

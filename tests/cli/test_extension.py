@@ -268,7 +268,7 @@ def test_a_new_study_has_a_command_a_figure_its_numbers_and_a_result(capsys, tmp
     assert list(found.to_frame().columns) == ["force [N]", "reach [m]"]
     assert found.plot().axes[0].get_xlabel() == "force [N]"
     assert "reach" in said(capsys, "--help")[1]
-    assert "Pushes along x [N]. [default: 1 2]" in said(capsys, "reach", "--help")[1]
+    assert "Pushes along x [N]. [default: 1.0 2.0]" in said(capsys, "reach", "--help")[1]
     code, told, err = said(capsys, "reach", "--forse", "1")
     assert (code, told) == (2, "") and "did you mean --force?" in err
 

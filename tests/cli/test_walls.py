@@ -50,10 +50,19 @@ def test_options_change_a_file_and_defaults_do_not(tmp_path):
 
 
 def test_what_is_given_in_vain_is_refused():
-    with pytest.raises(ParameterError, match=r"mass = 0.2: away"):
-        device("--mass 200g").refuse("away", but=("hand",))
-    device("--hand 0.2 1 0").refuse("away", but=("hand",))
+    for command in ("zwidth", "mbk"):
+        with pytest.raises(ParameterError, match="mass = '200g': is for a bare device"):
+            app.parse_words([command, "--arm", "x", "--mass", "200g"])
+        app.parse_words([command, "--arm", "x", "--hand", "0.2", "1", "0", "--Ts", "none"])
     assert box_of(None) is None and box_of((0.0, 1.0, 2.0, 3.0, 4.0, 5.0)).damper == (2.0, 3.0)
+
+
+def test_a_rate_is_another_name_for_the_sample():
+    assert device("--rate 0.5kHz").wall().Ts == device("--Ts 2ms").wall().Ts == 2e-3
+    with pytest.raises(ParameterError, match="rate = '500': is 1/Ts: give one of the two"):
+        device("--rate 500 --Ts 2ms")
+    with pytest.raises(ParameterError, match="--rate = 0.0: must be a finite number > 0 Hz"):
+        device("--rate 0")
 
 
 @pytest.mark.parametrize("command", ["zwidth", "mbk", "impedance", "passivity"])
