@@ -2,7 +2,7 @@
 
     python -m benchmarks.arm_integrators
 
-The leader of mjcf/arms under its gains, 500 Hz, torques a sample late, filtered rates, gravity held.
+The leader of mjcf/arms under its gains, 500 Hz, filtered rates, gravity held.
 A bisection on the common factor of all Kp asks of each integrator and step whether a run grows.
 """
 

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from ..arguments import checked, named
-from ..errors import Bound, ParameterError, is_series, numbers_of
-from ..fields import check_fields
+from ..arguments import checked, part
+from ..errors import Bound, ParameterError
 from . import gain_files
 
 MOST_GAIN = 1e9
-Gains = tuple[float, ...]
 FRICTION = ("Fc", "k", "Fv")  # of the torque Fc tanh(k w) + Fv w
 
 
-@named
-@dataclass(frozen=True)
+@part()
 class JointPD:
     """The torque -Kp (q - q_ref) - Kd w of each joint, held from sample to sample.
 
@@ -38,28 +34,27 @@ class JointPD:
         gravity: whether the host feeds gravity forward; None for as the arm says.
     """
 
-    Kp: Gains
-    Kd: Gains
+    Kp: Annotated[tuple[float, ...], Bound(0.0, MOST_GAIN, "N.m/rad")]
+    Kd: Annotated[tuple[float, ...], Bound(0.0, MOST_GAIN, "N.m.s/rad")]
     velocity: Literal["exact", "difference", "filter"] = "exact"
     cutoff: Annotated[float | None, Bound(0.0, 1e6, "rad/s", above=True)] = None
     runs: Literal["host", "drive"] = "host"
-    friction: tuple[tuple[float, float, float], ...] | None = None
+    friction: Annotated[tuple[tuple[float, ...], ...] | None, Bound(0.0, 1e6)] = None
     gravity: bool | None = None
 
     def __post_init__(self):
-        for name, unit in (("Kp", "N.m/rad"), ("Kd", "N.m.s/rad")):
-            object.__setattr__(self, name, _gains(name, getattr(self, name), unit))
-        if len(self.Kd) != len(self.Kp):
-            bound = f"must have a number for each joint, as Kp ({len(self.Kp)})"
-            raise ParameterError("Kd", self.Kd, bound)
-        if self.friction is not None:
-            object.__setattr__(self, "friction", _frictions(self.friction, len(self.Kp)))
-        check_fields(self)
+        n = len(self.Kp)
+        if not n:
+            raise ParameterError("Kp", self.Kp, "must have a number for each joint")
+        if len(self.Kd) != n:
+            raise ParameterError("Kd", self.Kd, f"must have a number for each joint, as Kp ({n})")
+        rows = self.friction or ((0.0, 0.0, 0.0),) * n
+        if len(rows) != n or len(rows[0]) != len(FRICTION):
+            bound = f"must have ({', '.join(FRICTION)}) for each of {n} joints"
+            raise ParameterError("friction", self.friction, bound)
         if (self.velocity == "filter") is not (self.cutoff is not None):
-            what = (
-                "must be given with velocity 'filter'" if self.cutoff is None else "is for it alone"
-            )
-            raise ParameterError("cutoff", self.cutoff, f"{what} (velocity = {self.velocity!r})")
+            what = "must be given with" if self.cutoff is None else "must be left out without"
+            raise ParameterError("cutoff", self.cutoff, f"{what} velocity 'filter'")
 
     def __len__(self) -> int:
         return len(self.Kp)
@@ -67,7 +62,8 @@ class JointPD:
     @property
     def slopes(self) -> tuple[float, ...]:
         """Slope of the friction fed forward at rest, Fc k + Fv, of each joint [N.m.s/rad]."""
-        return tuple(Fc * k + Fv for Fc, k, Fv in self.friction or ((0.0, 0.0, 0.0),) * len(self))
+        rows = self.friction or ((0.0, 0.0, 0.0),) * len(self)
+        return tuple(Fc * k + Fv for Fc, k, Fv in rows)
 
     @classmethod
     @checked
@@ -89,31 +85,12 @@ class JointPD:
         return cls(**{**gain_files.read_gains(file), **changes})
 
 
-def _gains(name: str, given: Any, unit: str) -> Gains:
-    """A number for each joint, from a sequence or from one number for one joint."""
-    values = list(given) if is_series(given) else [given]
-    if not values:
-        raise ParameterError(name, given, "must have a number for each joint")
-    places = [str(i) for i in range(len(values))]
-    return numbers_of(name, values, places, 0.0, MOST_GAIN, unit=unit)
-
-
-def _frictions(given: Any, n: int) -> tuple[tuple[float, float, float], ...]:
-    rows: list[Any] = list(given) if is_series(given) else []
-    if len(rows) != n:
-        raise ParameterError("friction", given, f"must have (Fc, k, Fv) for each of {n} joints")
-    out = [numbers_of(f"friction[{i}]", row, FRICTION, 0.0, 1e6) for i, row in enumerate(rows)]
-    return tuple((Fc, k, Fv) for Fc, k, Fv in out)
-
-
 def checked_law(law: JointPD, names: Sequence[str]) -> JointPD:
     """The law of an arm's joints.
 
     Raises:
         ParameterError: it has gains for more or fewer joints.
     """
-    if not isinstance(law, JointPD):
-        raise ParameterError("law", law, "must be a JointPD")
     if len(law) != len(names):
         bound = f"must have {len(names)} numbers, one for each joint ({', '.join(names)})"
         raise ParameterError("Kp", law.Kp, bound)

@@ -13,9 +13,9 @@ from ..arguments import checked, named
 from ..arms.joint_law import JointPD, checked_law
 from ..arms.mechanism import Linear
 from ..arms.mjcf_arm import MjcfArm
-from ..errors import number
 from ..results import Result, Tables
 from . import joint_crossings, roots
+from .client_loop import Delay, Sample
 from .joint_families import Circle, Family, Limit
 from .joint_loop import JointLoop, grid
 
@@ -214,7 +214,7 @@ def joint_loop(
 
 
 @checked
-def joint_limits(arm: MjcfArm, law: JointPD, Ts: float, delay: float = 0.0) -> JointLimits:
+def joint_limits(arm: MjcfArm, law: JointPD, Ts: Sample, delay: Delay = 0.0) -> JointLimits:
     """Exact limits of gains, delay and rate of an arm's joints, at its pose.
 
     The arm is linear about its pose: M(q), damping and gravity as the engine has them, constraints
@@ -279,8 +279,7 @@ class Study:
         delay: float,
         q: Sequence[float] | np.ndarray | None = None,
     ):
-        self.Ts = number("Ts", Ts, 1e-6, 1.0, unit="s")
-        self.delay = number("delay", delay, 0.0, 10.0, unit="s")
+        self.Ts, self.delay = Ts, delay
         self.arm, self.law = arm, checked_law(law, arm.names)
         self.compensated = arm.gravity == "compensated" if law.gravity is None else law.gravity
         self.linear = arm.linear(q)

@@ -13,6 +13,7 @@ from ..arms.joint_law import JointPD
 from ..arms.mjcf_arm import MjcfArm
 from ..errors import Bound, ParameterError
 from ..results import Result, Tables
+from .client_loop import Delay, Sample
 from .joint_gains import Study, first_joint
 
 TRIES = 100  # poses drawn for each one wanted, where a chain cannot be closed at most
@@ -94,8 +95,8 @@ class OverPoses(Result):
 def over_poses(
     arm: MjcfArm,
     law: JointPD,
-    Ts: float,
-    delay: float = 0.0,
+    Ts: Sample,
+    delay: Delay = 0.0,
     poses: Annotated[int, Bound(1, 100_000)] = 300,
     seed: Annotated[int, Bound(0, 2**63 - 1)] = 0,
 ) -> OverPoses:

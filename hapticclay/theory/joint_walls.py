@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from ..arguments import checked, named
 from ..arms.mechanism import Linear
 from ..arms.mjcf_arm import MjcfArm
-from ..errors import ParameterError, choice, number
+from ..errors import Bound, ParameterError
 from ..model.operator import NO_HAND, Operator
 from ..results import Result, Tables
+from .client_loop import Delay, Sample
 from .joint_families import Circle, Family, Limit
 from .joint_gains import IGNORED
 from .joint_loop import JointLoop
@@ -107,10 +108,10 @@ def held_arm(linear: Linear, operator: Operator) -> Linear:
 def wall_limit(
     arm: MjcfArm,
     axis: Axis,
-    B: float,
+    B: Annotated[float, Bound(0.0, 1e6, "N.s/m")],
     operator: Operator | None,
-    Ts: float,
-    delay: float = 0.0,
+    Ts: Sample,
+    delay: Delay = 0.0,
     velocity: Literal["exact", "difference"] = "exact",
 ) -> WallLimit:
     """Exact limit of the stiffness of a wall at the handle of an arm, at its pose.
@@ -132,11 +133,6 @@ def wall_limit(
             out of its bounds.
     """
     arm.check_handle()
-    axis = choice("axis", axis, AXES)
-    B = number("B", B, 0.0, 1e6, unit="N.s/m")
-    Ts = number("Ts", Ts, 1e-6, 1.0, unit="s")
-    delay = number("delay", delay, 0.0, 10.0, unit="s")
-    choice("velocity", velocity, ("exact", "difference"))
     linear = held_arm(arm.linear(), operator or NO_HAND)
     along = linear.jacobian[AXES.index(axis)]
     if not np.abs(along).max() > STILL:
