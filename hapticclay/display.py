@@ -6,12 +6,15 @@ import dataclasses
 import html
 import math
 import numbers
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 TABLE_STYLE = "border-collapse:collapse;margin:0.3em 0;color:inherit;background:transparent"
 FEW = 4  # numbers of a tuple that are all shown
 MANY_DIGITS = 1e4, 1e7  # sizes of numbers that are shown to the last whole digit
+_NUMBER = r"[-+]?\d[\d.]*(e[-+]\d+)?"
+NUMERIC = re.compile(rf"(< )?{_NUMBER}( (to|-) {_NUMBER})?( \S+)?|-|any|")
 WIDEST = 80  # [characters] of a table whose headings stand on one line
 CELL_STYLE = (  # this grey is visible on white and on black
     "padding:0.15em 0.8em 0.15em 0;border:0;border-top:1px solid rgba(128,128,128,0.4);"
@@ -71,16 +74,16 @@ def text_table(
     width = sum(2 + max(map(len, [name, *column])) for name, column in cells.items())
     if width > WIDEST and not form:  # the unit stands below the name
         cells = {name.replace(" [", "\n["): column for name, column in cells.items()}
-    sides = ["right" if _is_numeric(column) else "left" for column in columns.values()]
+    sides = ["right" if _are_numbers(column) else "left" for column in cells.values()]
     empty = not any(cells.values())
     return tabulate(
         cells, "keys", form or "simple", colalign=None if empty else sides, disable_numparse=True
     )
 
 
-def _is_numeric(column: Iterable[Any]) -> bool:
-    first = next((x for x in column if x is not None), None)
-    return isinstance(first, numbers.Real) and not isinstance(first, bool)
+def _are_numbers(cells: Iterable[str]) -> bool:
+    """Whether all texts are numbers or ranges, with or without a unit."""
+    return any(cells) and all(NUMERIC.fullmatch(x) for x in cells)
 
 
 def cell_text(x: Any, form: str = "") -> str:

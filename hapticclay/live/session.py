@@ -10,10 +10,12 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 
-from ..errors import ParameterError, integer, number
+from ..arguments import checked
+from ..errors import Bound, ParameterError
 from ..model.operator import NO_HAND
 from ..scene.scenario import Scenario
 from ..simulation import monitor
@@ -39,15 +41,20 @@ class Session:
     partner = Partner()
     frame_time = 0.0
 
+    @checked
     def __init__(
-        self, scenario: Scenario, stiffness: float = 1.0, tool: Tool = TOOL, every: int = 1
+        self,
+        scenario: Scenario,
+        stiffness: float = 1.0,
+        tool: Tool = TOOL,
+        every: Annotated[int, Bound(1, 1_000_000)] = 1,
     ):
         """Begins at the start of a scenario; its force, length and t_max are ignored.
 
         The hand's spring is stiffness times that of Th; every every-th sample is kept.
         """
         self.tool, self.stiffness = tool, stiffness
-        self.every = integer("every", every, 1, 1_000_000)
+        self.every = every
         self.start(scenario)
 
     def start(self, scenario: Scenario) -> None:
@@ -119,17 +126,23 @@ class Session:
         """Makes the hand pull to a point, within reach of the arm."""
         self.point = None if point is None else self._within_reach(point)
 
-    def push(self, force: tuple[float, float]) -> None:
+    @checked
+    def push(self, force: Annotated[tuple[float, float], Bound(-1e3, 1e3, "N")]) -> None:
         """Makes the hand press with a constant force, in addition to any pull."""
-        self.run.pull.force = tuple(number("force", f, -1e3, 1e3, unit="N") for f in force)
+        self.run.pull.force = force
 
-    def change(self, gain: tuple[float, float] | None = None, b: float | None = None) -> None:
+    @checked
+    def change(
+        self,
+        gain: tuple[float, float] | None = None,
+        b: Annotated[float | None, Bound(0.0, 1e6)] = None,
+    ) -> None:
         """Changes the gain or the damping."""
         scenario = self.scenario
         if gain is not None:
             scenario = replace(scenario, gain=gain)
         if b is not None:
-            self.damping = number("b", b, 0.0, 1e6)
+            self.damping = b
             clay = self.given.clay
             scenario = replace(scenario, clay=clay and clay.scaled(self.damping))
         self.scenario = scenario

@@ -24,6 +24,7 @@ from ..live.session import Session
 from ..live.status import banner, status
 from ..model.constants import AXES
 from ..ports.guard import LOCAL, REFUSED, Guard, listening, url_host
+from .captions import unit_text
 from .palette import (
     CLAY_DEEP,
     FORCE_COLORS,
@@ -171,7 +172,7 @@ class Page:
         self.keep = gui.add_checkbox("Record", True)
         hint = "The hand pulls towards the arrows; drag them."
         self.hold = gui.add_checkbox("Hand holds", False, hint=hint)
-        top, gain, name, step = hardest(session.given), session.gain[0], "Clay b [N.s/m]", 1.0
+        top, gain, name, step = hardest(session.given), session.gain[0], "Clay b [N·s/m]", 1.0
         clay, most = session.given.clay, MOST_FORCE
         if clay and not clay.viscous:
             top, name, step = 1.0, "Clay strength [times]", 0.05
@@ -309,7 +310,8 @@ class Page:
 
     def _status(self) -> str:
         line = status(self.session)
-        return f"**{line['state']}** {line['time']}  \n{line['clay']}, hand {line['fh']}"
+        clay = unit_text(line["clay"])
+        return f"**{line['state']}** {line['time']}  \n{clay}, hand {line['fh']}"
 
     def _banner(self) -> str:
         text, unstable = banner(self.session, "press Reset to start again")
