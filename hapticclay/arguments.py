@@ -38,8 +38,8 @@ def known_names(name: str, given: Mapping[str, Any], known: Collection[str]) -> 
     for word, value in given.items():
         if word not in known:
             near = nearest(word, known)
-            told = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
-            raise UnknownArgument(word, value, f"unexpected argument of {name}; {told}") from None
+            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
+            raise UnknownArgument(word, value, f"unexpected argument of {name}; {hint}") from None
 
 
 def named(made: F) -> F:
@@ -161,7 +161,7 @@ def function_of(
 ) -> Callable[P, R]:
     """Makes a function with the fields of a dataclass as arguments, and its description."""
     assert isinstance(kind, type)
-    signature, told = inspect.signature(kind), field_descriptions(kind)
+    signature, descriptions = inspect.signature(kind), field_descriptions(kind)
 
     def make(*args: P.args, **given: P.kwargs) -> R:
         known_names(name, given, signature.parameters)
@@ -174,6 +174,6 @@ def function_of(
     made.__signature__ = signature.replace(return_annotation=back)
     made.__annotations__ = {"return": back}
     summary = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0].rstrip()
-    about = "\n".join(f"    {name}: {told[name]}" for name in signature.parameters)
+    about = "\n".join(f"    {name}: {descriptions[name]}" for name in signature.parameters)
     made.__doc__ = f"{summary}\n\nArgs:\n{about}\n\nRaises:\n    ParameterError: {refused}"
     return made

@@ -6,12 +6,15 @@ import dataclasses
 import html
 import math
 import numbers
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 TABLE_STYLE = "border-collapse:collapse;margin:0.3em 0;color:inherit;background:transparent"
 FEW = 4  # numbers of a tuple that are all shown
 MANY_DIGITS = 1e4, 1e7  # sizes of numbers that are shown to the last whole digit
+_NUMBER = r"[-+]?\d[\d.]*(e[-+]\d+)?"
+NUMERIC = re.compile(rf"(< )?{_NUMBER}( (to|-) {_NUMBER})?( \S+)?|-|any|")
 WIDEST = 80  # [characters] of a table whose headings stand on one line
 CELL_STYLE = (  # this grey is visible on white and on black
     "padding:0.15em 0.8em 0.15em 0;border:0;border-top:1px solid rgba(128,128,128,0.4);"
@@ -41,6 +44,18 @@ def html_table(title: str, rows: Iterable[tuple[str, str]]) -> str:
     return f'<table style="{TABLE_STYLE}">{caption}{"".join(lines)}</table>'
 
 
+def fields_of(part: Any, *left_out: str) -> dict[str, Any]:
+    """Fields of a dataclass by name, without some."""
+    names = [f.name for f in dataclasses.fields(part) if f.name not in left_out]
+    return {name: getattr(part, name) for name in names}
+
+
+def table_of(head: Sequence[str], rows: Iterable[Any]) -> dict[str, list[Any]]:
+    """Columns by heading of rows: each is a sequence, or a dataclass whose fields are the cells."""
+    cells = [[*fields_of(x).values()] if dataclasses.is_dataclass(x) else x for x in rows]
+    return {name: [row[i] for row in cells] for i, name in enumerate(head)}
+
+
 def text_table(
     columns: Mapping[str, Iterable[Any]], formats: Mapping[str, str] | None = None, form: str = ""
 ) -> str:
@@ -59,16 +74,16 @@ def text_table(
     width = sum(2 + max(map(len, [name, *column])) for name, column in cells.items())
     if width > WIDEST and not form:  # the unit stands below the name
         cells = {name.replace(" [", "\n["): column for name, column in cells.items()}
-    sides = ["right" if _is_numeric(column) else "left" for column in columns.values()]
+    sides = ["right" if _are_numbers(column) else "left" for column in cells.values()]
     empty = not any(cells.values())
     return tabulate(
         cells, "keys", form or "simple", colalign=None if empty else sides, disable_numparse=True
     )
 
 
-def _is_numeric(column: Iterable[Any]) -> bool:
-    first = next((x for x in column if x is not None), None)
-    return isinstance(first, numbers.Real) and not isinstance(first, bool)
+def _are_numbers(cells: Iterable[str]) -> bool:
+    """Whether all texts are numbers or ranges, with or without a unit."""
+    return any(cells) and all(NUMERIC.fullmatch(x) for x in cells)
 
 
 def cell_text(x: Any, form: str = "") -> str:

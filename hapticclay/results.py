@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from .arguments import checked
-from .display import html_table, one_line, text_table
+from .display import fields_of, html_table, one_line, text_table
 from .errors import ParameterError, choice, needing
 from .fields import function_name
 from .files import DAMAGED, atomic, parse_json, read_text, versions
@@ -203,13 +203,6 @@ def figure_of(found: Any, drawn_by: str = "", tables: Tables | None = None) -> A
     figure = pkgutil.resolve_name("hapticclay.views.figure:Figure")
     by = drawn_by or found.drawn_by
     return figure(lambda: pkgutil.resolve_name(by)(found), tables or found.tables)
-
-
-def fields_of(part: Any, *left_out: str) -> dict[str, Any]:
-    """Fields of a dataclass by name, without some."""
-    return {
-        f.name: getattr(part, f.name) for f in dataclasses.fields(part) if f.name not in left_out
-    }
 
 
 def with_schema(name: str, data: Mapping[str, Any]) -> dict[str, Any]:

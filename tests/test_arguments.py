@@ -17,7 +17,7 @@ import hapticclay as hc
 from hapticclay import errors, units
 from hapticclay.cli import app
 from hapticclay.errors import ParameterError
-from hapticclay.fields import nodes_of
+from hapticclay.fields import node_of, nodes_of
 from hapticclay.scene.experiments import EXPERIMENTS
 from tests.good_values import good_values, required
 from tests.public import NAMES
@@ -198,7 +198,8 @@ def test_units_of_one_kind_are_taken(unit, x):
     given_unit, size = SIZES[unit]
     exact = float(x * type(x)(size))
     assert errors.number("f", f"{x} {given_unit}", unit=unit) == exact
-    table = errors.table_of("f", [[f"{x} {given_unit}", 1.0], (2, f"{x}{given_unit}")], unit=unit)
+    rows = node_of(tuple[tuple[float, ...], ...], errors.Bound(unit=unit))
+    table = rows.check("f", [[f"{x} {given_unit}", 1.0], (2, f"{x}{given_unit}")])
     assert table == ((exact, 1.0), (2.0, exact))
     assert errors.pair("f", [f"{x} {given_unit}", 1.0], unit=unit) == (exact, 1.0)
 

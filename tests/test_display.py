@@ -32,6 +32,19 @@ def test_numbers_stand_to_the_right_and_words_to_the_left():
     ]
 
 
+@pytest.mark.parametrize(
+    "cells, right",
+    [
+        (["4000 N/m", "1"], True), (["0.6 to 0.9", ""], True), (["< 3e-12", "-"], True),
+        (["100 - 903.9", "50"], True), (["+0.230 %"], True), (["1 up, 2 down"], False),
+        (["yes"], False), (["", None], False), (["1", "one"], False),
+    ],
+)  # fmt: skip
+def test_texts_that_are_numbers_stand_to_the_right_too(cells, right):
+    line = text_table({"a long heading": cells}).splitlines()[2]
+    assert line.startswith(" ") == right or not line
+
+
 def test_units_stand_below_the_names_where_a_table_is_wide():
     columns = {f"quantity number {i} [N.s/m]": [float(i)] for i in range(5)}
     lines = text_table(columns).splitlines()

@@ -39,8 +39,8 @@ class FieldsCommand:
             own = parameters(EXPERIMENTS[name]).values() if name in EXPERIMENTS else ()
             found = list(own) or [f for f in known if name in f.name]
             if not found:
-                told = no_field(name, "", [*EXPERIMENTS, *dotted_names(Scenario)])
-                raise ParameterError("field", name, told.bound)
+                refusal = no_field(name, "", [*EXPERIMENTS, *dotted_names(Scenario)])
+                raise ParameterError("field", name, refusal.bound)
             shown += [f for f in found if f not in shown]
         print(field_list(shown if self.names else known))
         return 0

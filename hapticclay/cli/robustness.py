@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from ..display import text_table
+from ..display import table_of, text_table
 from ..errors import Bound, ParameterError
 from ..files import writable
 from . import console
@@ -164,8 +164,8 @@ class RobustnessCommand:
 
 def hands_table(populations: Mapping[str, Hands]) -> str:
     """Populations of hands, for a terminal."""
-    rows = [hands.row(name)[: len(HANDS_HEAD)] for name, hands in populations.items()]
-    return text_table(dict(zip(HANDS_HEAD, zip(*rows, strict=True), strict=True)))
+    rows = [hands.row(name) for name, hands in populations.items()]
+    return text_table(table_of(HANDS_HEAD, rows))
 
 
 def _announce(cost: Cost, workers: int, out: Path, bar: Any) -> None:

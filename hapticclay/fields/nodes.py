@@ -1,4 +1,4 @@
-"""Nodes for numbers, words and whatever has no fields of its own."""
+"""Nodes of numbers, words, rows, pairs and unions, and the names of what lies below them."""
 
 from __future__ import annotations
 
@@ -13,18 +13,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
-from ..errors import (
-    Bound,
-    ParameterError,
-    choice,
-    integer,
-    is_series,
-    nearest,
-    number,
-    numbers_of,
-    quantity,
-    table_of,
-)
+from .. import errors
+from ..errors import Bound, ParameterError
 from ..units import is_quantity
 
 AXES = ("x", "y")
@@ -47,13 +37,14 @@ class Node:
         words: words that it takes.
         takes_numbers: whether it takes a number, which may have a unit.
         arity: words of a command line that make a value; infinite for any number of them.
+        members: nodes within it, whose parts are its parts.
     """
 
     hint: Any = Any
     bound, none, takes_numbers = Bound(), False, False
     words: tuple[str, ...] = ()
     arity: float = 1
-    members: Sequence[Node] = ()  # whose parts are its parts
+    members: Sequence[Node] = ()
 
     def wants(self) -> str:
         """What it takes, in words that follow "must be"."""
@@ -74,6 +65,8 @@ class Node:
         if isinstance(value, Mapping) and ENTIRE in value:
             old = self.read(value[ENTIRE], path, old)
             value = {k: v for k, v in value.items() if k is not ENTIRE}
+            if not value:
+                return old
         if self.none and isinstance(value, str) and value.lower() == "none":
             return None
         return self._read(value, path, old)
@@ -132,16 +125,6 @@ class Field(NamedTuple):
     about: str
 
     @property
-    def bound(self) -> Bound:
-        """Its bound and unit."""
-        return self.node.bound
-
-    @property
-    def kind(self) -> Any:
-        """Its type hint, without annotations."""
-        return self.node.hint
-
-    @property
     def unit(self) -> str:
         """Its unit; "" for none."""
         return self.node.bound.unit
@@ -168,11 +151,11 @@ class Number(Node):
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
         if type(value) is float and self.low < value < self.high:
             return value
-        return number(field, value, **limits(self.bound, owner))
+        return errors.number(field, value, **limits(self.bound, owner))
 
     def _read(self, value: Any, path: str, old: Any) -> Any:
         if isinstance(value, str):
-            x = quantity(path, value, self.bound.unit)
+            x = errors.quantity(path, value, self.bound.unit)
             return value if x is None else x
         return super()._read(value, path, old)
 
@@ -185,7 +168,7 @@ class Whole(Number):
 
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
         low = limits(self.bound, owner)["low"]
-        return integer(field, value, low, self.high)
+        return errors.integer(field, value, low, self.high)
 
     def _read(self, value: Any, path: str, old: Any) -> Any:
         x = super()._read(value, path, old)
@@ -219,7 +202,7 @@ class Word(Node):
         return f"one of {', '.join(self.words)}"
 
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
-        return choice(field, value, self.words)
+        return errors.choice(field, value, self.words)
 
     def fits(self, value: Any, old: Any = UNSET) -> bool:
         return isinstance(value, str) and not is_quantity(value)
@@ -264,18 +247,18 @@ class Row(Node):
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
         bounds, names = limits(self.bound, owner), self.bound.names
         if isinstance(self.item, Row):
-            return table_of(field, value, **bounds)
+            return errors.table_of(field, value, **bounds)
         if self.any_length:
-            if not is_series(value) or not hasattr(value, "__len__"):
+            if not errors.is_series(value) or not hasattr(value, "__len__"):
                 raise ParameterError(field, value, f"must be {self.wants()}")
             names = place_names(len(value))
         if self.takes_numbers:
-            return numbers_of(field, value, names, **bounds)
+            return errors.numbers_of(field, value, names, **bounds)
         items = (self.item.check(f"{field}[{i}]", x, owner) for i, x in enumerate(value))
         return _as_tuple(value, items)
 
     def fits(self, value: Any, old: Any = UNSET) -> bool:
-        return isinstance(old, tuple) if isinstance(value, Mapping) else is_series(value)
+        return isinstance(old, tuple) if isinstance(value, Mapping) else errors.is_series(value)
 
     def _read(self, value: Any, path: str, old: Any) -> Any:
         if isinstance(value, Mapping):
@@ -409,7 +392,7 @@ class Either(Node):
             return None
         member = self.member(value)
         if isinstance(member, Word) and self.takes_numbers:
-            return choice(field, value, self.words, self.wants())
+            return errors.choice(field, value, self.words, self.wants())
         return member.check(field, value, owner)
 
     def _read(self, value: Any, path: str, old: Any) -> Any:
@@ -476,10 +459,10 @@ def no_field(name: str, value: Any, known: Sequence[str]) -> ParameterError:
         return ParameterError(name, value, bound)
     depth = name.count(".")
     level = list(dict.fromkeys(".".join(k.split(".")[: depth + 1]) for k in known))
-    near = nearest(name, level)
+    near = errors.nearest(name, level)
     if not near:  # another part may have this field
         ends = {k.rpartition(".")[2]: k for k in reversed(known)}
-        near = [ends[n] for n in nearest(last, ends)]
+        near = [ends[n] for n in errors.nearest(last, ends)]
     bound = "no such field"
     if not near or len(level) <= MOST_LISTED:
         bound += f"; there are {', '.join(k.removeprefix(f'{path}.') for k in level)}"

@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from .. import views
+from ..display import fields_of
 from ..files import atomic, versions
 from ..model.constants import B_CONSTANT, B_STABILITY, GAINS_FIG11
 from ..model.operator import Operator
-from ..results import fields_of, with_schema, write_json
+from ..results import with_schema, write_json
 from ..studies import workspace
 from ..studies.chart import Chart
 from ..views.chart_plots import chart_plot

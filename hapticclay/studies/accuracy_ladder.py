@@ -15,8 +15,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..display import fields_of, table_of
 from ..errors import ParameterError
-from ..results import Result, fields_of, figure_of
+from ..results import Result, figure_of
 from ..scene.scenario import Scenario
 from ..simulation.asked_error import METHODS, choices
 from ..simulation.engines import engine_for
@@ -107,58 +108,51 @@ class Ladder(Result):
         """Units in which there are errors, of "s" and "m"."""
         return [u for u in ("s", "m") if any(x.error(u) is not None for x in self.settings)]
 
+    def least(self, unit: str) -> float:
+        """The least error that clearly exceeds that of the reference."""
+        return CLEAR * (self.left[unit] or 0.0)
+
     def shown(self, setting: Setting, unit: str) -> float | None:
         """The error of a setting if it clearly exceeds that of the reference; else None."""
-        error, left = setting.error(unit), self.left[unit]
-        return error if error and error >= CLEAR * (left or 0.0) else None
+        error = setting.error(unit)
+        return error if error and error >= self.least(unit) else None
 
     def cheapest(self, unit: str) -> dict[float, Setting]:
         """The fastest setting by requested error; sampled control replaces no continuous one."""
-        out = {}
-        for asked in ASKED:
-            # bound for an error that does not clearly exceed that of the reference
-            least = CLEAR * (self.left[unit] or 0.0)
-            fit = [
-                x
-                for x in self.settings
-                if x.series != SAMPLED
-                and x.wall is not None
-                and (e := x.error(unit)) is not None
-                and max(e, least) <= asked
-            ]
-            if fit:
-                out[asked] = min(fit, key=lambda x: x.wall or math.inf)
-        return out
+        bounds = {
+            x: max(error, self.least(unit))
+            for x in self.settings
+            if x.series != SAMPLED and x.wall is not None and (error := x.error(unit)) is not None
+        }
+        fit = {asked: [x for x, e in bounds.items() if e <= asked] for asked in ASKED}
+        return {e: min(xs, key=lambda x: x.wall or math.inf) for e, xs in fit.items() if xs}
 
     def tables(self) -> dict[str, dict[str, list]]:
         """Errors and run time of each setting; the fastest setting for each requested error."""
-        settings = {
-            "method": [x.series for x in self.settings],
-            "dt [s]": [x.dt for x in self.settings],
-            "error of border times [s]": [x.time for x in self.settings],
-            "error of position [m]": [x.position for x in self.settings],
-            "run time [s]": [x.wall for x in self.settings],
-            "status": [x.status for x in self.settings],
-        }
-        return {"settings": settings} | {CHEAPEST[u]: self._cheapest_table(u) for u in self.units()}
-
-    def _cheapest_table(self, unit: str) -> dict[str, list]:
-        found = self.cheapest(unit)
-        return {
-            f"requested error [{unit}]": list(found),
-            "integrator": [x.series for x in found.values()],
-            "dt [s]": [x.dt for x in found.values()],
-            f"error [{unit}]": [self.error_text(x, unit) for x in found.values()],
-            "run time [s]": [x.wall for x in found.values()],
-        }
+        head = (
+            "method",
+            "dt [s]",
+            "error of border times [s]",
+            "error of position [m]",
+            "run time [s]",
+            "status",
+        )
+        tables = {"settings": table_of(head, self.settings)}
+        for u in self.units():
+            head = f"requested error [{u}]", "integrator", "dt [s]", f"error [{u}]", "run time [s]"
+            tables[CHEAPEST[u]] = table_of(
+                head,
+                [
+                    (asked, x.series, x.dt, self.error_text(x, u), x.wall)
+                    for asked, x in self.cheapest(u).items()
+                ],
+            )
+        return tables
 
     def error_text(self, setting: Setting, unit: str) -> str:
         """The error of a setting; "<" where it does not clearly exceed that of the reference."""
-        error = setting.error(unit)
-        if error is None:
-            return "-"
-        least = CLEAR * (self.left[unit] or 0.0)
-        return f"{error:.1e}" if self.shown(setting, unit) else f"< {least:.1e}"
+        error = self.shown(setting, unit)
+        return f"{error:.1e}" if error else f"< {self.least(unit):.1e}"
 
     def remarks(self) -> list[str]:
         """The reference, its error, and notes."""
@@ -177,19 +171,12 @@ class Ladder(Result):
 
     def contents(self) -> dict[str, Any]:
         """Everything."""
-        return {
-            "scenario": self.scenario,
-            "engine": self.engine,
-            "reference": self.reference,
-            "reference_error": self.left,
-            "simulated_time": self.simulated,
-            "settings": self.settings,
-            "cheapest": {
-                unit: [{"asked": e, **fields_of(x)} for e, x in self.cheapest(unit).items()]
-                for unit in self.units()
-            },
-            "notes": self.notes,
+        cheapest = {
+            unit: [{"asked": e, **fields_of(x)} for e, x in self.cheapest(unit).items()]
+            for unit in self.units()
         }
+        more = {"reference_error": self.left, "simulated_time": self.simulated}
+        return fields_of(self, "left", "simulated") | more | {"cheapest": cheapest}
 
 
 def accuracy_ladder(
@@ -210,20 +197,13 @@ def accuracy_ladder(
     if choices(scenario, SHARP, "s")[0][0] == "accurate":
         best = dataclasses.replace(scenario, dt=FINER * finest / 2.0, integrator="accurate")
     timed = 1 if quick else REPEATS
-    exact: Reference | None = None
-    settings: list[Setting] = []
-    for series, s in progress([("reference", best), *rungs]):
-        if exact is None:
-            exact = _reference(s, grid)
-        else:
-            settings.append(_setting(series, s, exact, grid, timed))
-    assert exact is not None
-    how = f"{best.integrator} integrator at dt = {best.dt:.3g} s"
+    jobs = iter(progress([("reference", best), *rungs]))
+    exact = _reference(next(jobs)[1], grid)
     return Ladder(
         scenario,
         engine_for("auto"),
-        tuple(settings),
-        how,
+        tuple(_setting(series, s, exact, grid, timed) for series, s in jobs),
+        f"{best.integrator} integrator at dt = {best.dt:.3g} s",
         exact.left,
         float(exact.record.t[-1]),
         exact.notes,

@@ -19,10 +19,11 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from ..arguments import checked, named
+from ..display import fields_of, table_of
 from ..errors import Bound, ParameterError, choice
 from ..model.constants import AXES
 from ..model.flow import N_MAX, N_MIN, Flow
-from ..results import Result, fields_of, figure_of
+from ..results import Result, figure_of
 from ..simulation.record import Record
 from .flow_models import (
     FLOW_LAWS,
@@ -31,13 +32,13 @@ from .flow_models import (
     PARSIMONY,
     FlowParameter,
     best_fit,
-    far_forces,
     first_guesses,
-    of_theta,
+    outlying_forces,
     parameter_intervals,
+    parameters_of,
     refit_nested,
     student_quantile,
-    to_theta,
+    theta_of,
 )
 from .measurement import Measurement
 from .outliers import LOST, Cleaned, cleaned, robust_deviation, sentence, times
@@ -47,12 +48,12 @@ from .sliding import (
     ROUNDED,
     UNDITHERED,
     Sliding,
-    check_met,
-    of_known_speed,
-    of_positions,
-    of_record,
+    check_one_law,
+    driving_forces,
     quantum,
-    wrong_way,
+    recorded_motion,
+    sliding_along_positions,
+    sliding_at_known_speed,
 )
 from .trajectory import (
     Joint,
@@ -176,7 +177,7 @@ class Fitted(Result):
         Args:
             v: velocities [m/s], (m,), none of them 0.
         """
-        law, theta = FLOW_LAWS[self.law], to_theta([p.value for p in self.parameters], self.law)
+        law, theta = FLOW_LAWS[self.law], theta_of([p.value for p in self.parameters], self.law)
         J = law.slopes(theta, np.abs(np.asarray(v, dtype=float)))[2]
         quantile = student_quantile(self.level, len(self.v) / self.correlation - len(theta))
         return quantile * np.sqrt(np.einsum("ij,jk,ik->i", J, self.covariance, J))
@@ -194,10 +195,7 @@ class Fitted(Result):
         interval = f"{100.0 * self.level:g} % interval"
         head = ("law", "AICc", "weight", "left [N]", "parameter", "fitted", interval)
         return {
-            "parameters": {
-                name: [getattr(p, name) for p in self.parameters]
-                for name in ("name", "unit", "value", "low", "high")
-            },
+            "parameters": table_of(("name", "unit", "value", "low", "high"), self.parameters),
             "samples": {
                 "time [s]": self.t,
                 "velocity [m/s]": self.v,
@@ -206,7 +204,7 @@ class Fitted(Result):
                 f"half the {100 * self.level:g} % band [N]": self.band(self.v),
                 "residual [N]": self.residuals,
             },
-            "candidates": dict(zip(head, zip(*rows, strict=True), strict=True)),
+            "candidates": table_of(head, rows),
         }
 
     def remarks(self) -> list[str]:
@@ -283,7 +281,7 @@ def fit_flow(
             raise ParameterError("data", data, "must be a Measurement, a Record or its folder")
         source = "record" if isinstance(data, Record) else Path(data).name
         record = data if isinstance(data, Record) else Record.load(data)
-        axis, p, v, f, inside, met = of_record(record, axis)
+        axis, p, v, f, inside, met = recorded_motion(record, axis)
         t = record.t
     for name, span, x in (("time", time, t), ("place", place, p)):
         if span is not None:
@@ -296,7 +294,7 @@ def fit_flow(
         bound = f"must leave {LEAST_SLIDING} samples or more inside clay"
         raise ParameterError("data", f"{count} samples", bound)
     if met is not None:
-        check_met(met, inside)
+        check_one_law(met, inside)
     position = cleaned(p, quantum(p)) if v is None else None
     try:
         return _fitted(_Columns(t, position, v, f, inside), names, level, axis, source)
@@ -337,8 +335,8 @@ class _Columns(NamedTuple):
         """The sliding samples without the forces of a mask."""
         if self.place is None:
             assert self.v is not None
-            return of_known_speed(self.t, self.v, self.f, self.inside & ~out)
-        return of_positions(self.t, self.place, self.f, self.inside, out)
+            return sliding_at_known_speed(self.t, self.v, self.f, self.inside & ~out)
+        return sliding_along_positions(self.t, self.place, self.f, self.inside, out)
 
 
 class _Laws(NamedTuple):
@@ -359,7 +357,7 @@ def _without_outliers(data: _Columns) -> tuple[Sliding, np.ndarray]:
     out = np.zeros(len(data.t), dtype=bool)
     s = data.sliding(out)
     for _ in range(SCREENINGS):
-        some = far_forces(s)
+        some = outlying_forces(s)
         if not some.any():
             break
         out[s.at[some]] = True
@@ -461,7 +459,7 @@ def _left_out(r: Fitted, data: _Columns, out: np.ndarray) -> tuple[str, ...]:
         )
     if len(r.force_outliers):
         why = f"more than {OUTLYING:g} deviations from any law"
-        if n_wrong := np.count_nonzero(wrong_way(data.f, data.place, data.v)[out]):
+        if n_wrong := np.count_nonzero(driving_forces(data.f, data.place, data.v)[out]):
             why += (
                 f"; {n_wrong} of them drive the motion: wrong signs, or a delay between the columns"
             )
@@ -485,7 +483,7 @@ def _compared(
         a = found[law][0]
         parameters = tuple(
             FlowParameter(name, FLOW_UNITS[name], value)
-            for name, value in zip(FLOW_LAWS[law].names, of_theta(a.theta, law), strict=True)
+            for name, value in zip(FLOW_LAWS[law].names, parameters_of(a.theta, law), strict=True)
         )
         deviation = math.sqrt(a.sum / (len(a.v) - len(parameters)))
         weight = odds[law] / sum(odds.values())

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args
 import numpy as np
 
 from ..arguments import function_of, named, part
+from ..display import fields_of, table_of
 from ..errors import Bound, ParameterError, integer, numbers_of
 from ..fields import Axis, Seed
 from ..formulas import arm as arm_law
@@ -24,7 +25,7 @@ from ..model.arm import Arm
 from ..model.constants import AXES, L1, L2, TS, G, S
 from ..model.operator import Operator
 from ..model.signals import Multisine
-from ..results import Result, fields_of
+from ..results import Result
 from ..scene.scenario import Control, Position, Scenario
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
@@ -172,10 +173,9 @@ class Identified(Result):
 
     def tables(self) -> dict[str, dict[str, Any]]:
         """Coefficients, and the response beside those of the fit and of the paper."""
-        rows = self.coefficients
         names = ("name", "unit", "printed", "value", "low", "high")
         return {
-            "coefficients": {name: [getattr(c, name) for c in rows] for name in names},
+            "coefficients": table_of(names, self.coefficients),
             "response": response_tables([self])[self.axis],
         }
 
@@ -364,14 +364,10 @@ class Identification:
         )  # fmt: skip
 
 
-def _identified(experiment: Identification) -> Identified:
-    return experiment.identified()
-
-
 identify = function_of(
     Identification,
     "identify",
-    _identified,
+    Identification.identified,
     "a value is out of its bounds, the handle cannot be there, or a run ended early or met the "
     "limits of the motors.",
 )

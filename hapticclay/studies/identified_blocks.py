@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ..display import table_of
 from ..results import Result, figure_of
 from .identification import Identified, response_tables
 from .workspace import Drift
@@ -37,16 +38,13 @@ class IdentifiedBlocks(Result):
 
     def tables(self) -> dict[str, dict[str, Any]]:
         """Coefficients of all blocks, and their ranges over the workspace."""
-        rows = [(r, c) for r in self.results for c in r.coefficients]
-        table = {
-            "block": [r.what for r, _ in rows],
-            "axis": [r.axis for r, _ in rows],
-            "coefficient": [f"{c.name} [{c.unit}]" for _, c in rows],
-            "printed": [c.printed for _, c in rows],
-            "fitted": [c.value for _, c in rows],
-            "95 % interval": [f"{c.low:.6g} to {c.high:.6g}" for _, c in rows],
-            "error": [c.error for _, c in rows],
-        }
+        head = ("block", "axis", "coefficient", "printed", "fitted", "95 % interval", "error")
+        rows = []
+        for r in self.results:
+            for c in r.coefficients:
+                name, span = f"{c.name} [{c.unit}]", f"{c.low:.6g} to {c.high:.6g}"
+                rows.append((r.what, r.axis, name, c.printed, c.value, span, c.error))
+        table = table_of(head, rows)
         if not self.paper:
             table = {n: table[n] for n in table if n not in ("axis", "printed", "error")}
         drift = {"over the workspace": self.drift.tables()["ranges"]} if self.drift else {}

@@ -118,14 +118,9 @@ class MeasuredImpedance(Result):
 
     def contents(self) -> dict[str, Any]:
         """Subject, differences from theory, tables and notes."""
-        return {
-            "kind": type(self.subject).__name__,
-            "subject": self.subject,
-            "gap": self.gap,
-            "felt_gap": self.felt_gap,
-            "tables": self.tables(),
-            "notes": self.notes,
-        }
+        gaps = {"gap": self.gap, "felt_gap": self.felt_gap, "tables": self.tables()}
+        names = {"kind": type(self.subject).__name__, "subject": self.subject}
+        return {**names, **gaps, "notes": self.notes}
 
 
 def computed_impedance(subject: Subject, omega: np.ndarray) -> Impedance:

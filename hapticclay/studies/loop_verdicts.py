@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..display import text_table
+from ..display import fields_of, table_of, text_table
 from ..model.constants import TS
 from ..model.flow import Flow
-from ..results import Result, fields_of
+from ..results import Result
 from ..theory import describing, loop_passivity, relay_cycle, stability_margins
 from ..theory.loops import TIMING, Loop
 from .boundary import PushedLoop
@@ -63,27 +63,19 @@ class YieldingClay:
 
     def cycles(self) -> dict[str, list[Any]]:
         """Predicted and exact cycles as a table."""
-        rows = [
-            (
-                f"{x.kind}, predicted",
-                x,
-                x.third,
-                "yes" if x.trusted else f"no, off by {100.0 * x.speed_shift:+.0f} %",
-            )
-            for x in self.predicted
-        ]
+        found: list[tuple[str, Any, float | None, str]] = []
+        for x in self.predicted:
+            trusted = "yes" if x.trusted else f"no, off by {100.0 * x.speed_shift:+.0f} %"
+            found.append((f"{x.kind}, predicted", x, x.third, trusted))
         for x in self.exact or ():
             stuck = f" ({100.0 * x.stuck:.0f} % stuck)" if x.stuck else ""
             name = "limit cycle" if x.multiplier < 1.0 else "threshold"
-            rows.append((f"{name}, exact{stuck}", x, None, None))
-        return {
-            "cycle": [name for name, *_ in rows],
-            "mm/s": [1e3 * x.speed for _, x, *_ in rows],
-            "mm": [1e3 * x.amplitude for _, x, *_ in rows],
-            "Hz": [x.omega / ONE_HZ for _, x, *_ in rows],
-            "3rd": [third for *_, third, _ in rows],
-            "to be trusted": [trusted for *_, trusted in rows],
-        }
+            found.append((f"{name}, exact{stuck}", x, None, ""))
+        rows = [
+            (name, 1e3 * x.speed, 1e3 * x.amplitude, x.omega / ONE_HZ, *rest)
+            for name, x, *rest in found
+        ]
+        return table_of(("cycle", "mm/s", "mm", "Hz", "3rd", "to be trusted"), rows)
 
     def lines(self) -> list[str]:
         """Law, unstable dampings and outcomes of pushes."""
@@ -103,8 +95,9 @@ class YieldingClay:
 
     def contents(self) -> dict[str, Any]:
         """Everything, for a file."""
-        more = [{"amplitude": x.amplitude, "trusted": x.trusted} for x in self.predicted]
-        predicted = [{**fields_of(x), **y} for x, y in zip(self.predicted, more, strict=True)]
+        predicted = [
+            {**fields_of(x), "amplitude": x.amplitude, "trusted": x.trusted} for x in self.predicted
+        ]
         return {**fields_of(self), "kind": self.flow.kind, "predicted": predicted}
 
 
@@ -143,14 +136,7 @@ class LoopVerdicts(Result):
 
     def tables(self) -> dict[str, dict[str, list[Any]]]:
         """Verdicts, and cycles in clay that yields."""
-        rows = self.answers
-        answers = {
-            "": [x.question for x in rows],
-            "?": [x.answer for x in rows],
-            "value": [x.value for x in rows],
-            "meaning": [x.what for x in rows],
-            "at rad/s": [x.omega for x in rows],
-        }
+        answers = table_of(("", "?", "value", "meaning", "at rad/s"), self.answers)
         return {"verdicts": answers} | ({"cycles": self.clay.cycles()} if self.clay else {})
 
     def text(self, form: str = "") -> str:

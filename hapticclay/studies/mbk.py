@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import checked, named
+from ..display import table_of
 from ..errors import choice, integer, numbers_of
 from ..results import Result, figure_of
 from ..scene.scenario import Scenario
@@ -90,22 +91,15 @@ class DeviceMBK(Result):
             a, b = (f"{name} [{MBK_UNITS[name]}]" for name in PLANES[plane])
             low, high = region.low.tolist(), region.high.tolist()
             out[plane] = {a: region.x.tolist(), f"least {b}": low, f"largest {b}": high}
-            runs = self.found[plane]
-            out[f"{plane} by runs"] = {
-                a: [r.x for r in runs],
-                b: [r.y for r in runs],
-                f"exact {b}": [r.exact for r in runs],
-                "end": [r.end for r in runs],
-            }
-        found = [(plane, x) for plane, some in self.found.items() for x in some]
-        out["borders"] = {
-            "plane": [plane for plane, _ in found],
-            "at": [x.x for _, x in found],
-            "border": [x.end for _, x in found],
-            "by runs": [x.y for _, x in found],
-            "exact": [x.exact for _, x in found],
-            "off": [x.y / x.exact - 1.0 for _, x in found],
-        }
+            out[f"{plane} by runs"] = table_of((a, b, f"exact {b}", "end"), self.found[plane])
+        out["borders"] = table_of(
+            ("plane", "at", "border", "by runs", "exact", "off"),
+            [
+                (plane, x.x, x.end, x.y, x.exact, x.y / x.exact - 1.0)
+                for plane, some in self.found.items()
+                for x in some
+            ],
+        )
         r = self.range
         out["range"] = {
             "f [Hz]": (r.omega / (2.0 * math.pi)).tolist(),
@@ -195,11 +189,7 @@ class ArmMBK(Result):
             name: {B: b.tolist(), M: m.tolist()}
             for name, (m, b) in (("this hand", self.nominal), ("hand box", self.worst))
         }
-        out["runs"] = {
-            B: [r.x for r in self.found],
-            M: [r.y for r in self.found],
-            "exact M [kg]": [r.exact for r in self.found],
-        }
+        out["runs"] = table_of((B, M, "exact M [kg]"), self.found)
         by_runs = {r.exact: r.y for r in self.found}
         out["least masses"] = {
             B: self.nominal[1].tolist(),

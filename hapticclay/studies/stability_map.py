@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..display import text_table
+from ..display import table_of, text_table
 from ..errors import choice
 from ..model.constants import TS
 from ..results import Result, figure_of
@@ -84,14 +84,7 @@ class StabilityMap(Result):
     def tables(self) -> dict[str, dict[str, list]]:
         """Returns the numbers of the figure: cells, lines, and boundaries by runs."""
         x, y = self.x_name, self.y_name
-        cells = {
-            x: [c.x for c in self.cells],
-            y: [c.y for c in self.cells],
-            "stable by theory": [c.theory for c in self.cells],
-            "run": [c.simulated for c in self.cells],
-            "cause": [c.cause for c in self.cells],
-        }
-        out = {"cells": cells}
+        out = {"cells": table_of((x, y, "stable by theory", "run", "cause"), self.cells)}
         for name, lines in (("lines", self.lines), ("runs", self.found)):
             out[name] = {
                 "line": [label for label, (places, _) in lines.items() for _ in places],
@@ -115,14 +108,8 @@ class StabilityMap(Result):
             "at the nominal pose",
         ]
         if wrong:
-            table = {
-                self.x_name: [c.x for c in wrong],
-                self.y_name: [c.y for c in wrong],
-                "theory": ["stable" if c.theory else "unstable" for c in wrong],
-                "run": [c.simulated for c in wrong],
-                "cause": [c.cause for c in wrong],
-            }
-            lines.append(text_table(table, form=form))
+            head = (self.x_name, self.y_name, "stable by theory", "run", "cause")
+            lines.append(text_table(table_of(head, wrong), form=form))
         return "\n".join(lines)
 
     def figures(self) -> dict[str, Any]:

@@ -9,10 +9,11 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named
+from ..display import fields_of
 from ..errors import Bound
 from ..fields import Seed
 from ..model.constants import AXES, L1, L2
-from ..results import Result, fields_of, figure_of
+from ..results import Result, figure_of
 from .identification import (
     COEFFICIENT_NAMES,
     NOMINAL_POSE,

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..display import text_table
+from ..display import table_of, text_table
 from ..errors import ParameterError, choice
 from ..model.clay import slab
 from ..model.constants import AXES
@@ -93,7 +93,7 @@ class YieldMap(Result):
         cells: points at which theory and a run are compared.
     """
 
-    drawn_by = "hapticclay.views.yield_map_plots:yield_map_plot"
+    drawn_by = "hapticclay.views.stability_map_plots:yield_map_plot"
     written_as = "gain-yield"
 
     loop: PushedLoop
@@ -106,22 +106,21 @@ class YieldMap(Result):
 
     def tables(self) -> dict[str, dict[str, Any]]:
         """Returns the numbers of the figure: cells, and lines over the gain."""
-        return {
-            "cells": {
-                "Fy [N]": [c.Fy for c in self.cells],
-                "K [1/kg]": [c.K for c in self.cells],
-                "expected": [c.expected for c in self.cells],
-                "predicted speed [m/s]": [c.predicted for c in self.cells],
-                "exact speed [m/s]": [c.exact for c in self.cells],
-                "run": [c.simulated for c in self.cells],
-                "speed of the run [m/s]": [c.speed for c in self.cells],
-            },
-            "lines": {
-                "K [1/kg]": self.K,
-                "push that just sticks [m/s per N]": self.critical,
-                "speed of the cycle [m/s per N]": self.speed,
-            },
+        head = (
+            "Fy [N]",
+            "K [1/kg]",
+            "expected",
+            "predicted speed [m/s]",
+            "exact speed [m/s]",
+            "run",
+            "speed of the run [m/s]",
+        )
+        lines = {
+            "K [1/kg]": self.K,
+            "push that just sticks [m/s per N]": self.critical,
+            "speed of the cycle [m/s per N]": self.speed,
         }
+        return {"cells": table_of(head, self.cells), "lines": lines}
 
     def headline(self) -> str:
         """The number of runs that differ from theory."""
@@ -136,9 +135,8 @@ class YieldMap(Result):
             share = f"within {100.0 * max(gaps):.2g} % of the exact"
             lines.append(f"largest speed of the cycles: {share}")
         if wrong := [c for c in self.cells if c.simulated != c.expected]:
-            names = {"Fy [N]": "Fy", "K": "K", "theory": "expected", "run": "simulated"}
-            table = {title: [getattr(c, name) for c in wrong] for title, name in names.items()}
-            lines.append(text_table(table, form=form))
+            rows = [(c.Fy, c.K, c.expected, c.simulated) for c in wrong]
+            lines.append(text_table(table_of(("Fy [N]", "K", "theory", "run"), rows), form=form))
         return "\n".join(lines)
 
 

@@ -13,7 +13,7 @@ from hapticclay.studies import yield_map as study
 from hapticclay.studies.boundary import PushedLoop
 from hapticclay.studies.yield_map import measured_cycle, yielding_run
 from hapticclay.theory.relay_cycle import critical_push
-from hapticclay.views.yield_map_plots import yield_map_plot
+from hapticclay.views.stability_map_plots import yield_map_plot
 from tests.hunt import some
 
 Y = PushedLoop("y", K=1.0, inertia_shaping=True)
