@@ -159,13 +159,6 @@ def integer(field: str, value: object, low: float, high: float) -> int:
     return int(value)
 
 
-def flag(field: str, value: object) -> bool:
-    """Returns value if it is a bool."""
-    if not isinstance(value, bool):
-        raise ParameterError(field, value, "must be True or False")
-    return value
-
-
 def is_series(value: object) -> bool:
     """Whether a value can be iterated over and is no text; a NumPy scalar only seems so."""
     plain = isinstance(value, Iterable) and not isinstance(value, str | bytes)

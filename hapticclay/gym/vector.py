@@ -179,11 +179,10 @@ class TaskVectorEnv(VectorEnv):
         self._count += live
         ended = found.ended & live
         cut_off = (self._count >= self._most) & live
-        self._over = ended | cut_off
-        again, final = ~live, {}  # with NEXT_STEP: the episode ended before this step
-        if self.autoreset_mode is AutoresetMode.SAME_STEP:
-            again = self._over.copy()
-            final = self._final(found, again) if again.any() else {}
+        self._over = over = ended | cut_off
+        again, final = ~live, {}  # the episode ended before this step, or its restart was refused
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and over.any():
+            again, final = again | over, self._final(found, over.copy())
         observations = found.observation
         if again.any():
             self._begin(again)

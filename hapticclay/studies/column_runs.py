@@ -16,8 +16,8 @@ from ..errors import Bound
 from ..fields import plain_data
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
-from ..simulation.batch import SUMMARY
 from ..simulation.column_batch import Columns, simulate_columns
+from ..simulation.summaries import SUMMARY
 from .store import Plan
 from .store_runs import run_plan
 from .sweep_rows import RESULT_COLUMNS

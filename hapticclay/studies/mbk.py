@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from ..arguments import checked, named
 from ..display import table_of
-from ..errors import choice, integer, numbers_of
+from ..errors import Bound, numbers_of
 from ..results import Result, figure_of
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import VirtualWall
@@ -19,6 +19,7 @@ from ..theory.hand_boxes import Box
 from ..theory.mbk import (
     PLANES,
     DynamicRange,
+    Plane,
     Region,
     dynamic_range,
     least_mass,
@@ -220,7 +221,7 @@ class ArmMBK(Result):
 def device_mbk(
     wall: VirtualWall,
     *,
-    columns: int = 5,
+    columns: Annotated[int, Bound(0, 100)] = 5,
     points: int = 41,
     band: tuple[float, float] = RANGE_BAND,
     progress: Callable[[Iterable], Iterable] = iter,
@@ -238,7 +239,6 @@ def device_mbk(
     Raises:
         ParameterError: a value is out of its bounds, or nothing in a plane is stable.
     """
-    columns = integer("columns", columns, 0, 100)
     low, high = numbers_of("band", band, ("low", "high"), 0.0, 1e4, above=True, unit="Hz")
     linear = replace(wall.device, friction=0.0, quantum=0.0)
     wall = replace(wall, device=linear, unilateral=False)
@@ -258,7 +258,7 @@ def device_mbk(
 
 
 @checked
-def wall_borders(wall: VirtualWall, plane: str, x: float) -> list[Border]:
+def wall_borders(wall: VirtualWall, plane: Plane, x: float) -> list[Border]:
     """The borders in one column of a plane by runs; the search starts at the exact borders.
 
     Low borders at or below 0 are not searched.
@@ -268,7 +268,7 @@ def wall_borders(wall: VirtualWall, plane: str, x: float) -> list[Border]:
         plane: one of PLANES.
         x: the part on the horizontal axis.
     """
-    across, up = PLANES[choice("plane", plane, tuple(PLANES))]
+    across, up = PLANES[plane]
     wall = replace(wall, **{across: x})
     low, high = stable_band(wall, up)
     out = []
@@ -291,8 +291,8 @@ def arm_mbk(
     box: Box = HANDS,
     *,
     axis: str = "x",
-    columns: int = 5,
-    points: int = 15,
+    columns: Annotated[int, Bound(0, 100)] = 5,
+    points: Annotated[int, Bound(2, 1001)] = 15,
     samples: int = 24,
     progress: Callable[[Iterable], Iterable] = iter,
 ) -> ArmMBK:
@@ -311,7 +311,6 @@ def arm_mbk(
         ParameterError: a value is out of its bounds.
     """
     loop = of_scenario(loop, axis)
-    points, columns = integer("points", points, 2, 1001), integer("columns", columns, 0, 100)
     decays, linear = np.geomspace(*DECAYS, points), loop.linear
     nominal, worst, found = [], [], []
     runs = set(np.linspace(0, points - 1, columns).round().astype(int).tolist())

@@ -12,12 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
+from typing import Annotated
 
 import numpy as np
 
 from ..arguments import checked
 from ..display import brief
-from ..errors import ParameterError, number, pair
+from ..errors import Bound, ParameterError, number
 from ..model.controller import matrix_exponential
 from ..model.operator import NO_HAND
 from ..scene.scenario import Scenario
@@ -56,11 +57,10 @@ class Handle:
     def of(
         cls,
         scenario: Scenario,
-        place: tuple[float, float] = (0.0, 0.0),
+        place: Annotated[tuple[float, float], Bound(-10.0, 10.0, "m")] = (0.0, 0.0),
         normal: tuple[float, float] = (1.0, 0.0),
     ) -> Handle:
         """The handle of a scenario's arm and operator."""
-        place = pair("place", place, -10.0, 10.0, unit="m")
         size = math.hypot(*normal)
         if not (size > 0.0 and math.isfinite(size)):
             raise ParameterError("normal", normal, "must have a direction")
@@ -115,8 +115,12 @@ def _stable(loop: np.ndarray) -> bool:
     return bool(np.abs(z[np.abs(z - 1.0) > AT_REST]).max(initial=0.0) < 1.0 + ROUNDING)
 
 
+Sample = Annotated[float, Bound(1e-6, 1.0, "s")]
+Delay = Annotated[float, Bound(0.0, 10.0, "s")]
+
+
 @checked
-def rendered_stiffness_limit(handle: Handle, B: float, Ts: float, delay: float = 0.0) -> float:
+def rendered_stiffness_limit(handle: Handle, B: float, Ts: Sample, delay: Delay = 0.0) -> float:
     """Largest stable stiffness of a wall rendered by a program [N/m]."""
     (limit,) = rendered_stiffness_limits(handle, (B,), Ts, delay)
     return limit
@@ -124,11 +128,10 @@ def rendered_stiffness_limit(handle: Handle, B: float, Ts: float, delay: float =
 
 @checked
 def rendered_stiffness_limits(
-    handle: Handle, B: Sequence[float], Ts: float, delay: float = 0.0
+    handle: Handle, B: Sequence[float], Ts: Sample, delay: Delay = 0.0
 ) -> tuple[float, ...]:
     """Largest stable stiffness by damping of the wall: the Z-width of a program's loop."""
     dampings = [number("B", b, -1e6, 1e6) for b in B]
-    Ts, delay = number("Ts", Ts, 1e-6, 1.0), number("delay", delay, 0.0, 10.0)
     free = client_map(handle, 0.0, 0.0, Ts, delay)  # the loop is linear in K and B
     by_K = client_map(handle, 1.0, 0.0, Ts, delay) - free
     by_B = client_map(handle, 0.0, 1.0, Ts, delay) - free

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..arguments import named
-from ..errors import ParameterError, choice, number, pair
+from ..errors import Bound, ParameterError, pair
 from ..model.compensator import Compensator
 from ..results import Result
 from . import gain_limits, margin_gains, stability_margins
@@ -25,11 +25,11 @@ DESIGN_BAND = (0.3, 30.0)  # [rad/s]: voluntary motion of a hand, up to about 5 
 def design_gain(
     loop: Loop,
     *,
-    gain_margin: float = 1.0,
-    phase_margin: float = 0.0,
-    disk_margin: float = 0.0,
-    delay_margin: float = 0.0,
-    at: str = "compensator",
+    gain_margin: Annotated[float, Bound(1.0)] = 1.0,
+    phase_margin: Annotated[float, Bound(0.0, math.pi, "rad")] = 0.0,
+    disk_margin: Annotated[float, Bound(0.0, 2.0)] = 0.0,
+    delay_margin: Annotated[float, Bound(0.0, unit="s")] = 0.0,
+    at: stability_margins.Break = "compensator",
 ) -> float:
     """Largest K for which it and every lower K keep all requested margins.
 
@@ -51,22 +51,18 @@ def design_gain(
     Raises:
         ParameterError: a value is out of its bounds.
     """
-    gain = number("gain_margin", gain_margin, 1.0)
-    phase = number("phase_margin", phase_margin, 0.0, math.pi, unit="rad")
-    disk = number("disk_margin", disk_margin, 0.0, 2.0)
-    late = number("delay_margin", delay_margin, 0.0, unit="s")
-    choice("at", at, stability_margins.BREAKS)
     top = gain_limits.gain_limit(loop)
+    beside = phase_margin, disk_margin, delay_margin
     if loop.Ts is not None or loop.delay:
-        if phase or disk or late or at != "compensator":
+        if any(beside) or at != "compensator":
             bound = "must stay as they are with sampling or delay, where only gain_margin is known"
             field = "phase_margin, disk_margin, delay_margin, at"
-            raise ParameterError(field, (phase, disk, late, at), bound)
-        return top / gain
+            raise ParameterError(field, (*beside, at), bound)
+        return top / gain_margin
 
     if at == "compensator":
-        top /= gain
-    K = (1.0 - SPARE) * min(top, margin_gains.first_gain(loop, at, gain, phase, disk, late))
+        top /= gain_margin
+    K = (1.0 - SPARE) * min(top, margin_gains.first_gain(loop, at, gain_margin, *beside))
     return math.inf if top == math.inf and K > K_MAX else K
 
 
@@ -133,7 +129,7 @@ def compare(
     compensators: Iterable[Any],
     *,
     band: tuple[float, float] = DESIGN_BAND,
-    at: str = "compensator",
+    at: stability_margins.Break = "compensator",
     **margin: float,
 ) -> list[Design]:
     """Compensators at equal margin, the most transparent first.

@@ -9,24 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..arguments import named
 from ..display import brief, html_table
-from ..errors import (
-    ParameterError,
-    array_of,
-    choice,
-    integer,
-)
+from ..errors import Bound, ParameterError, array_of
 from . import exact_roots, gain_crossings, linear_loop, roots
 from .exact_roots import rational
 from .loops import Loop, of_loop
 
-BREAKS = ("force", "compensator")
+Break = Literal["force", "compensator"]  # where a loop is opened
+BREAKS = get_args(Break)
 DIPS = 20  # dips of |1 + L| that are refined, the deepest ones on the grid
 LINEAR = "one axis at the nominal pose, linear, motors within their torque limits"
 
@@ -133,7 +129,7 @@ class Nyquist:
 
 
 @of_loop("K", "b", "operator")
-def open_loop(loop: Loop, *, at: str = "force") -> tuple[Polynomial, Polynomial]:
+def open_loop(loop: Loop, *, at: Break = "force") -> tuple[Polynomial, Polynomial]:
     """The loop's transfer function as (numerator, denominator), common factors s removed."""
     return _opened(loop, at)
 
@@ -144,7 +140,7 @@ def _opened(
     """As `open_loop`, by polynomials of another kind: see `linear_loop.loop_polynomials`."""
     blank, passive, driven = linear_loop.loop_polynomials(loop, polynomial)
     driven = polynomial([loop.gain]) * driven
-    if choice("at", at, BREAKS) == "force":
+    if at == "force":
         n, d = passive + driven, blank
     else:
         n, d = driven, blank + passive
@@ -155,7 +151,7 @@ def _opened(
 
 
 @of_loop("K", "b", "operator", timing=True)
-def nyquist(loop: Loop, *, at: str = "force") -> Nyquist:
+def nyquist(loop: Loop, *, at: Break = "force") -> Nyquist:
     """The Nyquist curve and its encirclements.
 
     With sampling the contour is the unit circle, z = exp(j omega Ts), and P and Z count poles
@@ -192,7 +188,7 @@ def encirclements(n: Polynomial, d: Polynomial) -> tuple[int, int]:
 
 
 @of_loop("K", "b", "operator", timing=True)
-def margins(loop: Loop, *, at: str = "compensator") -> Margins:
+def margins(loop: Loop, *, at: Break = "compensator") -> Margins:
     """Gain, phase, delay and disk margins, in continuous time from roots of polynomials.
 
     With sampling or delay the margins follow from the frequency response at the compensator, up to
@@ -223,7 +219,7 @@ def margins(loop: Loop, *, at: str = "compensator") -> Margins:
 def _is_timed(loop: Loop, at: str) -> bool:
     """Whether the loop is sampled or delayed; it can then be opened at the compensator only."""
     timed = loop.Ts is not None or loop.delay > 0.0
-    if choice("at", at, BREAKS) != "compensator" and timed:
+    if at != "compensator" and timed:
         raise ParameterError("at", at, "must be 'compensator' with sampling or delay")
     return timed
 
@@ -328,7 +324,7 @@ def coupled_stability(loop: Loop) -> Verdict:
 
 
 @of_loop("K", "b", "operator")
-def small_gain(loop: Loop, *, equation: int = 13) -> Verdict:
+def small_gain(loop: Loop, *, equation: Annotated[int, Bound(9, 13)] = 13) -> Verdict:
     """The paper's conditions for stability (Eqs. 9 to 13), with the bands where they fail.
 
     (11), the same as (10), requires |L| < 1 and (13), the same as (12), |G C| < |1/(Te + Th) + Sh|:
@@ -342,7 +338,6 @@ def small_gain(loop: Loop, *, equation: int = 13) -> Verdict:
     Returns:
         Verdict whose margin is the least ratio of right to left side; for (9), the least |1 + L|.
     """
-    equation = integer("equation", equation, 9, 13)
     at = "force" if equation < 12 else "compensator"
     n, d = open_loop(loop, at=at)
     n2, d2 = roots.squared_magnitude(n), roots.squared_magnitude(d)

@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..arguments import checked
-from ..errors import ParameterError, array_of, integer, number
+from ..errors import Bound, ParameterError, array_of, number
 from ..model.operator import Operator
 from ..scene.virtual_wall import Device, VirtualWall
 from . import gain_crossings, linear_loop, roots
@@ -494,7 +494,11 @@ def jury_limit(wall: VirtualWall) -> float:
 
 @checked
 def hulin_boundary(
-    mass: float, damper: float, Ts: float, samples: float = 0.0, n: int = 401
+    mass: float,
+    damper: float,
+    Ts: float,
+    samples: Annotated[float, Bound(0.0, 100.0)] = 0.0,
+    n: Annotated[int, Bound(3, 100_001)] = 401,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exact stability boundary of the held, delayed wall in the plane of B and K.
 
@@ -515,7 +519,6 @@ def hulin_boundary(
     """
     from scipy.optimize import brentq
 
-    samples, n = number("samples", samples, 0.0, 100.0), integer("n", n, 3, 100_001)
     wall = VirtualWall(device=Device(mass=mass, damper=damper), Ts=Ts)
     wall = replace(wall, delay=samples * wall.Ts)
 
