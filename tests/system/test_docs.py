@@ -176,7 +176,6 @@ def test_readme_figures_and_links_exist():
         assert (ROOT / target).is_file(), target
     for target in re.findall(r"`((?:docs|mjcf)/\S+?)`|\]\(([^)#:]+)\)", README):
         assert (ROOT / (target[0] or target[1])).is_file(), target
-    assert len(README.splitlines()) <= 105
 
 
 def test_make_targets_named_in_the_documents_exist():
@@ -221,12 +220,11 @@ def test_inertias_in_the_documents_are_those_of_the_model():
 
     text = (ROOT / "docs" / "equations.md").read_text()
     model = hc.build(hc.free())
-    link1 = model.body("link1").inertia[2]
-    assert repr(float(link1)) in text
-    assert (
-        repr(constants.L1**2 / constants.S[0].gain) in text
-        and repr(constants.L2**2 / constants.S[1].gain) in text
-    )
+    link1 = float(model.body("link1").inertia[2])
+    shoulder = constants.L1**2 / constants.S[0].gain
+    elbow = constants.L2**2 / constants.S[1].gain
+    for inertia in (link1, shoulder, elbow):
+        assert f"{inertia:.6g} kg·m²" in text
     mujoco.MjModel.from_xml_path(str(engine.mjcf_folder() / "arm.xml"))
 
 
