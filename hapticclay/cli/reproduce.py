@@ -93,15 +93,15 @@ class ReproduceCommand:
 
 def claims_table(rows: Sequence[Row]) -> str:
     """The claims of a classic, for a terminal."""
-    from ..paper.report import format_error, format_number, format_verdict
+    from ..paper import report
 
     cells = [
         [
             textwrap.fill(r.what, WIDE),
-            format_number(r.expected, r.unit),
-            format_number(r.ours, r.unit),
-            format_error(r),
-            format_verdict(r),
+            report.format_number(r.expected, r.unit, report.expected_digits(r)),
+            report.format_number(r.ours, r.unit, report.digits(r)),
+            report.format_error(r),
+            report.format_verdict(r),
         ]
         for r in rows
     ]

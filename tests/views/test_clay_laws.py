@@ -3,7 +3,6 @@
 import dataclasses
 import functools
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -177,18 +176,3 @@ def test_a_law_says_how_it_is_scaled(name):
     if name != "springs":  # their stiffness stays
         rest, halved = (c.laws[0].forces(c.kinds, 0.3, 0.01) for c in (clay, half))
         np.testing.assert_allclose(halved, 0.5 * rest, rtol=1e-12)
-
-
-def test_nothing_outside_model_and_kernel_asks_for_a_law():
-    """They ask the clay: a law's flags stand in its own modules.
-
-    But for `many`, which takes runs in clay without any.
-    """
-    flags = re.compile(r"\bclay\.(yields|springs|grows|groove|smooth|isotropic)\b")
-    package = Path(hc.__file__).parent
-    asked = {
-        str(p.relative_to(package)): flags.findall(p.read_text())
-        for p in package.rglob("*.py")
-        if p.relative_to(package).parts[0] not in ("model", "kernel")
-    }
-    assert {file for file, found in asked.items() if found} <= {"simulation/many.py"}

@@ -1,9 +1,7 @@
 """The block of finite elements: it keeps its dent, and nothing but its script knows of it."""
 
-import ast
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -11,20 +9,6 @@ import hapticclay as hc
 from benchmarks import flex_block
 from hapticclay.kernel import engine
 from hapticclay.views.stage import Stage
-
-ROOT = Path(flex_block.__file__).parents[1]
-
-
-def test_no_module_and_no_model_names_the_block():
-    for path in (ROOT / "hapticclay").rglob("*.py"):
-        text = path.read_text()
-        words = ast.walk(ast.parse(text)) if "flex" in text else ()
-        texts = [x.value for x in words if isinstance(x, ast.Constant) and isinstance(x.value, str)]
-        assert not any("flex_block" in x for x in texts), path
-    for path in engine.mjcf_folder().glob("*.xml"):
-        assert path.name == flex_block.FILE or "flex" not in path.read_text(), path
-    for path in (ROOT / "benchmarks").rglob("*.py"):
-        assert path.stem == "flex_block" or "flex_block" not in path.read_text(), path
 
 
 def test_models_that_are_stepped_or_drawn_have_no_flex():
