@@ -87,7 +87,8 @@ def draw(trips: np.ndarray, figures: dict[str, Any], file: Path) -> None:
     """The histogram of the round trips, over the logarithm of time."""
     from matplotlib.figure import Figure
 
-    from hapticclay.views.style import BLACK, BLUE, VERMILION, figure_size, figure_style, stroke
+    from hapticclay.views.palette import BLACK, BLUE, VERMILION
+    from hapticclay.views.style import figure_size, figure_style, stroke
 
     with figure_style():
         figure = Figure(figsize=figure_size(1, 3.6))

@@ -61,7 +61,7 @@ def ratios(env: Any, rounds: int, clock: Clock) -> dict[str, float]:
     rng = np.random.default_rng(0)
     env.reset(seed=0)
     shape = (PERIODS, *env.action_space.shape)
-    truth = inner.info_of(0) if n > 1 else inner._episode.truth
+    truth = inner.info_of(0) if n > 1 else inner._episodes.truth
     scenario = inner.task.scenario(truth)
     stepped(env, rng.uniform(-0.2, 0.2, shape).astype(np.float32), clock)
     found, spent = [], []

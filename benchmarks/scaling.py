@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from hapticclay.files import atomic
-from hapticclay.studies import sweep, sweep_store
-from hapticclay.studies.sampling import Sweep, parse_grid
+from hapticclay.studies import store, store_runs
+from hapticclay.studies.sampling import parse_grid
+from hapticclay.studies.sweep import Sweep
 
 from . import common
 
@@ -62,10 +63,10 @@ def measure(quick: bool, rounds: int) -> dict[str, Any]:
         for k in range(rounds + 1):
             for n in times:
                 out = Path(folder) / f"{k}-{n}"
-                chunks = sweep_store.begin_sweep(todo, out)
+                chunks = store.begin(todo, out)
                 begin = time.perf_counter()
                 jobs = client.map(
-                    sweep.run_part,
+                    store_runs.run_part,
                     [todo] * todo.chunks,
                     chunks,
                     [str(out)] * todo.chunks,

@@ -3,32 +3,34 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import functools
 import inspect
 import itertools
 import os
-import pkgutil
 import re
-import sys
 import types
-from collections import ChainMap
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from collections.abc import Callable, Collection, Mapping
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    ParamSpec,
+    TypeVar,
+    Union,
+    dataclass_transform,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
-from .errors import ParameterError, nearest
+from .errors import Bound, ParameterError, nearest
+from .fields import CLASS_WORDS, Node, check_fields, class_of, field_descriptions, node_of
 
+P = ParamSpec("P")
+T = TypeVar("T")
+R = TypeVar("R")
 F = TypeVar("F", bound=Callable[..., Any])
-IN_WORDS: dict[Any, str] = {
-    Callable: "a function",
-    Iterable: "an iterable, as a list",
-    Mapping: "a dictionary",
-    dict: "a dictionary",
-    bool: "True or False",
-    os.PathLike: "a path",
-    type(None): "None",
-}
-WIDER: dict[Any, Any] = {Sequence: Iterable, Path: os.PathLike}  # an array is not a Sequence
 
 
 class UnknownArgument(ParameterError, TypeError):
@@ -65,14 +67,39 @@ def named(made: F) -> F:
     return guarded  # type: ignore[return-value]
 
 
-class SignatureInWords:
-    """The signature of a class, and of each of its subclasses, with units in words."""
+@dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))
+def part(prefix: str = "", **options: Any) -> Callable[[type[T]], type[T]]:
+    """Makes a frozen dataclass, `named`, whose fields are checked by their annotations.
 
-    def __get__(self, instance: Any, owner: type) -> inspect.Signature:
-        init: Any = owner.__init__
-        scopes = [vars(sys.modules[kind.__module__]) for kind in owner.__mro__]
-        told = in_words(inspect.signature(init), ChainMap(*scopes))
-        return told.replace(parameters=list(told.parameters.values())[1:])
+    Its own `__post_init__` follows the check. prefix stands before the fields in errors.
+    """
+
+    def decorate(kind: type[T]) -> type[T]:
+        own = vars(kind).get("__post_init__")
+
+        def __post_init__(self: Any) -> None:
+            check_fields(self, prefix)
+            if own is not None:
+                own(self)
+
+        kind.__post_init__ = __post_init__  # type: ignore[attr-defined]
+        return named(dataclasses.dataclass(frozen=True, **options)(kind))
+
+    return decorate
+
+
+class SignatureInWords:
+    """The signature of a class, and of each of its subclasses, with units: `float [N/m]`."""
+
+    def __get__(self, instance: Any, owner: Any) -> inspect.Signature:
+        _, *parameters = inspect.signature(owner.__init__).parameters.values()
+        with contextlib.suppress(NameError):  # a type that is imported for type checkers alone
+            source = owner if dataclasses.is_dataclass(owner) else owner.__init__
+            hints = get_type_hints(source, include_extras=True)
+            parameters = [
+                p.replace(annotation=_spelled(hints.get(p.name, p.annotation))) for p in parameters
+            ]
+        return inspect.Signature(parameters)
 
 
 class Words(str):
@@ -81,57 +108,23 @@ class Words(str):
     __repr__ = str.__str__
 
 
-def in_words(signature: inspect.Signature, scope: Mapping[str, Any]) -> inspect.Signature:
-    """A signature with units in place of bounds: `float [N/m]`."""
-    return signature.replace(
-        parameters=[
-            p.replace(annotation=unit_in_words(p.annotation, scope))
-            for p in signature.parameters.values()
-        ]
-    )
-
-
-def unit_in_words(hint: Any, scope: Mapping[str, Any]) -> Any:
-    """An annotation with units in place of bounds, and with aliases expanded."""
-    if not isinstance(hint, str):
-        return hint
+def _spelled(hint: Any) -> Words:
+    """A type without modules and bounds, with its unit."""
     unit = ""
-    if found := re.fullmatch(r"Annotated\[(.*), (?:Bound\((.*)\)|(\w+))\]", hint, re.S):
-        hint, inner, name = found.groups()
-        unit = (
-            scope[name].unit if name else "".join(re.findall(r"(?:, |unit=)'([^']+)'", inner)[:1])
-        )
-    units = [unit] if unit else []
-
-    def spelled(match: re.Match[str]) -> str:
-        named_ = scope.get(match[0])
-        if get_origin(named_) is Annotated:
-            units.append(get_args(named_)[1].unit)
-        return _alias_text(named_) or match[0]
-
-    text = re.sub(r"\b(?<!')[A-Z]\w*\b(?!')", spelled, hint)
-    return Words(text + _of_unit(", ".join(dict.fromkeys(filter(None, units)))))
-
-
-def _alias_text(kind: Any) -> str:
-    """The expansion of an alias of a type; "" for anything else."""
-    if get_origin(kind) is Annotated:
-        kind = get_args(kind)[0]
-    elif get_origin(kind) not in (Literal, Union, types.UnionType):
-        return ""
-    if isinstance(kind, type) and not get_args(kind):
-        return kind.__name__
-    return str(kind).replace("typing.", "")
-
-
-def _of_unit(unit: str) -> str:
-    return f" [{unit}]" if unit else ""
+    if get_origin(hint) is Annotated:
+        hint, *notes = get_args(hint)
+        unit = next((n.unit for n in notes if isinstance(n, Bound)), "")
+    plain = isinstance(hint, type) and not get_args(hint)
+    text = hint.__name__ if plain else re.sub(r"\b(?:[a-z_]\w*\.)+(?=\w)", "", str(hint))
+    return Words(f"{text} [{unit}]" if unit else text)
 
 
 def checked(made: F) -> F:
-    """As `named`, and refuses arguments that are not of the classes in their annotations.
+    """As `named`, and checks arguments by their annotations, as the fields of a part.
 
-    The function itself checks numbers, words, arrays and tuples, since it knows their bounds.
+    Enforced are bounds, `Annotated[float, Bound(...)]`, words, `Literal[...]`, flags, classes of
+    this package, functions, iterables, dictionaries and paths; what is given arrives as its type,
+    "5 cm" as 0.05. A number or an array without a bound is left to the function.
     """
     inner: Any = made.__init__ if isinstance(made, type) else made
     parameters = list(_parameters(inner).values())
@@ -142,13 +135,12 @@ def checked(made: F) -> F:
 
     @functools.wraps(inner)
     def entry(*args: Any, **given: Any) -> Any:
-        kinds = argument_kinds(inner)
-        ordered = itertools.chain(names, itertools.cycle(rest))
-        for name, value in (*zip(ordered, args, strict=False), *given.items()):
-            if name in kinds and not _is_of(value, kinds[name]):
-                told = " or ".join(dict.fromkeys(map(_in_words, kinds[name])))
-                raise ParameterError(name, value, f"must be {told}")
-        return inner(*args, **given)
+        nodes = argument_nodes(inner)
+        ordered = zip(itertools.chain(names, itertools.cycle(rest)), args, strict=False)
+        taken = [nodes[name].check(name, x) if name in nodes else x for name, x in ordered]
+        for name in given.keys() & nodes.keys():
+            given[name] = nodes[name].check(name, given[name])
+        return inner(*taken, *args[len(taken) :], **given)
 
     if isinstance(made, type):
         made.__init__ = entry
@@ -156,53 +148,57 @@ def checked(made: F) -> F:
     return named(entry)  # type: ignore[arg-type]
 
 
-def _is_of(value: Any, kinds: tuple[Any, ...]) -> bool:
-    """Whether an argument is of one of the classes; a text is no list of characters."""
-    if isinstance(value, str | bytes) and str not in kinds:
-        return False
-    if getattr(value, "ndim", 1) == 0 and Iterable in kinds:  # NumPy's scalars say they iterate
-        return False
-    return isinstance(value, kinds)
-
-
 def _parameters(made: Any) -> Mapping[str, inspect.Parameter]:
     return inspect.signature(made).parameters
 
 
 @functools.cache
-def argument_kinds(made: Callable[..., Any]) -> dict[str, tuple[Any, ...]]:
-    """Required classes of the arguments of a function; no entry for those it checks itself."""
-    hints = get_type_hints(made)
-    found = {name: _classes(hints[name]) for name in _parameters(made) if name in hints}
-    return {name: kinds for name, kinds in found.items() if kinds}
+def argument_nodes(made: Callable[..., Any]) -> dict[str, Node]:
+    """Types of the arguments of a function that are enforced, by name."""
+    hints = get_type_hints(made, include_extras=True)
+    return {
+        name: node_of(hints[name]) for name in _parameters(made) if is_enforced(hints.get(name))
+    }
 
 
-def _classes(hint: Any) -> tuple[Any, ...]:
-    """The classes of a type; none if classes do not determine it, as for numbers and arrays."""
-    members = get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
-    kinds = tuple(get_origin(m) or m for m in members)
-    kinds = tuple(WIDER.get(k, k) for k in kinds)
-    plain = (k for k in kinds if k is not str or os.PathLike not in kinds)
-    told = all(isinstance(k, type) and (k in IN_WORDS or _is_own(k)) for k in plain)
-    return kinds if told else ()
+def is_enforced(hint: Any) -> bool:
+    """Whether an argument of this type is checked: whether bounds or classes say all of it."""
+    if get_origin(hint) is Annotated:
+        return any(isinstance(note, Bound) for note in get_args(hint)[1:])
+    if get_origin(hint) in (Union, types.UnionType):
+        members = get_args(hint)
+        paths = any(class_of(x) is os.PathLike for x in members)
+        plain = [x for x in members if not (paths and x is str)]
+        bounded = any(get_origin(x) is Annotated and is_enforced(x) for x in members)
+        return bounded or all(map(is_enforced, plain))
+    if get_origin(hint) is Literal:
+        return True
+    kind = class_of(hint)
+    return kind is not str and (kind in CLASS_WORDS or _is_own(kind))
 
 
 def _is_own(kind: Any) -> bool:
-    return kind.__module__.partition(".")[0] == __name__.partition(".")[0]
+    return getattr(kind, "__module__", "").partition(".")[0] == __name__.partition(".")[0]
 
 
-def _in_words(kind: Any) -> str:
-    if kind in IN_WORDS:
-        return IN_WORDS[kind]
-    if kind is str:
-        return IN_WORDS[os.PathLike]
-    return f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"
+def function_of(
+    kind: Callable[P, T], name: str, answer: Callable[[T], R], refused: str
+) -> Callable[P, R]:
+    """Makes a function with the fields of a dataclass as arguments, and its description."""
+    assert isinstance(kind, type)
+    signature, told = inspect.signature(kind), field_descriptions(kind)
 
+    def make(*args: P.args, **given: P.kwargs) -> R:
+        known_names(name, given, signature.parameters)
+        return answer(kind(*args, **given))
 
-def function_name(function: Any) -> str:
-    """The name "package.module:name" by which a function can be imported; "" for none."""
-    name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', '')}"
-    with contextlib.suppress(ImportError, AttributeError, ValueError):
-        if not name.startswith("__main__") and pkgutil.resolve_name(name) is function:
-            return name
-    return ""
+    made: Any = make
+    made.__name__ = made.__qualname__ = name
+    made.__module__ = answer.__module__
+    back = get_type_hints(answer)["return"]
+    made.__signature__ = signature.replace(return_annotation=back)
+    made.__annotations__ = {"return": back}
+    summary = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0].rstrip()
+    about = "\n".join(f"    {name}: {told[name]}" for name in signature.parameters)
+    made.__doc__ = f"{summary}\n\nArgs:\n{about}\n\nRaises:\n    ParameterError: {refused}"
+    return made

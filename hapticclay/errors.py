@@ -3,26 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import difflib
-import functools
 import itertools
 import math
 import numbers
 import reprlib
-import types
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import (
-    TYPE_CHECKING,
-    Annotated,
-    Any,
-    Literal,
-    Union,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from typing import TYPE_CHECKING, Any
 
 from .display import one_line
 from .units import from_unit, is_quantity
@@ -146,12 +134,7 @@ def number(
             x = math.nan
         if _is_within(x, low, high, above):
             return x
-    bound = "must be a finite number"
-    if low > -math.inf:
-        bound += f" {'>' if above else '>='} {low:g}"
-    if high < math.inf:
-        bound += f"{' and' if low > -math.inf else ''} <= {high:g}"
-    raise ParameterError(field, value, bound + (f" {unit}" if unit else ""))
+    raise ParameterError(field, value, f"must be {Bound(low, high, unit, above).number_words()}")
 
 
 def _is_within(x: float, low: float, high: float, above: bool) -> bool:
@@ -160,7 +143,7 @@ def _is_within(x: float, low: float, high: float, above: bool) -> bool:
     )
 
 
-def integer(field: str, value: object, low: int, high: int) -> int:
+def integer(field: str, value: object, low: float, high: float) -> int:
     """Returns value as an int within [low, high]."""
     if type(value) is int and low <= value <= high:
         return value
@@ -169,7 +152,7 @@ def integer(field: str, value: object, low: int, high: int) -> int:
         or not isinstance(value, numbers.Integral)
         or not low <= int(value) <= high
     ):
-        raise ParameterError(field, value, f"must be a whole number from {low} to {high}")
+        raise ParameterError(field, value, f"must be {Bound(low, high).integer_words()}")
     return int(value)
 
 
@@ -303,212 +286,22 @@ class Bound:
     above: bool = False
     names: tuple[str, ...] = ("x", "y")
 
+    def number_words(self) -> str:
+        """What a number within these bounds is."""
+        low, high = self.low, self.high
+        limits = [f"{'>' if self.above else '>='} {_spelled(low)}"] * (low != -math.inf)
+        limits += [f"<= {high:g}"] * (high < math.inf)
+        words = ["a finite number", " and ".join(limits), self.unit]
+        return " ".join(filter(None, words))
 
-Check = Callable[[str, Any, Any], Any]  # (name for the error, value, part that has the field)
-
-
-def check_fields(part: Any, prefix: str = "") -> None:
-    """Checks each field of a frozen dataclass by its annotation.
-
-    Numbers become floats, sequences become tuples. Fields may be float, int, bool, str, Literal,
-    tuples of floats, other dataclasses, pairs (x, y) of them, or a union of these with None; float
-    and int take a `Bound`.
-    """
-    for name, told, check, good in _checks_to_make(type(part), prefix):
-        value = getattr(part, name)
-        if value is good:
-            continue
-        checked = check(told, value, part)
-        if checked is not value:
-            object.__setattr__(part, name, checked)
+    def integer_words(self) -> str:
+        """What a whole number within these bounds is."""
+        some = self.high < math.inf
+        return f"a whole number from {self.low} to {self.high}" if some else "a whole number"
 
 
-@functools.cache
-def field_types(kind: type) -> dict[str, tuple[Any, Bound | None]]:
-    """Type without annotations, and bound, of each field of a dataclass."""
-    hints = get_type_hints(kind, include_extras=True)
-    out: dict[str, tuple[Any, Bound | None]] = {}
-    for field in dataclasses.fields(kind):
-        hint, *notes = (
-            get_args(hints[field.name])
-            if get_origin(hints[field.name]) is Annotated
-            else (hints[field.name],)
-        )
-        out[field.name] = hint, next((n for n in notes if isinstance(n, Bound)), None)
-    return out
-
-
-@functools.cache
-def _field_checks(kind: type, prefix: str) -> list[tuple[str, str, Check]]:
-    return [
-        (name, prefix + name, _check_of(hint, bound or Bound()))
-        for name, (hint, bound) in field_types(kind).items()
-    ]
-
-
-@functools.cache
-def _checks_to_make(kind: type, prefix: str) -> list[tuple[str, str, Check, Any]]:
-    """As `_field_checks`, with the default if it needs no check; else MISSING."""
-    defaults = {f.name: f.default for f in dataclasses.fields(kind)}
-    out = []
-    for name, told, check in _field_checks(kind, prefix):
-        bound, good = field_types(kind)[name][1], defaults[name]
-        try:  # not if the bound is another field
-            if (bound and isinstance(bound.low, str)) or check(told, good, None) is not good:
-                good = dataclasses.MISSING
-        except ParameterError:
-            good = dataclasses.MISSING
-        out.append((name, told, check, good))
-    return out
-
-
-def _check_of(hint: Any, bound: Bound, optional: str = "") -> Check:
-    """The check for values of a type."""
-    origin, args = get_origin(hint), get_args(hint)
-    if origin in (Union, types.UnionType):
-        return _check_union(args, bound)
-    if origin is Literal:
-        return lambda field, value, part: choice(field, value, args)
-    if _is_pair(hint):
-        return _check_each_axis(hint, [], bound)
-    if origin is tuple:
-        return _check_tuple(args, bound)
-    if hint is float:
-        return _check_number(bound)
-    if hint is int:
-        high = int(bound.high)
-        return lambda field, value, part: integer(
-            field, value, _bound_limits(bound, part)["low"], high
-        )
-    if hint is bool:
-        return lambda field, value, part: flag(field, value)
-    if hint is str:
-        return _check_text
-    if hint is Any:  # the part itself checks it
-        return lambda field, value, part: value
-    if isinstance(hint, type) and dataclasses.is_dataclass(hint):
-        article = "an" if hint.__name__[0] in "AEIOU" else "a"
-        return _check_part(hint, f"must be {article} {hint.__name__}{optional}")
-    raise TypeError(f"{hint}: no check for fields of this type")
-
-
-def _check_number(bound: Bound) -> Check:
-    low, high, above, unit = bound.low, bound.high, bound.above, bound.unit
-    if isinstance(low, str):
-        return lambda field, value, part: number(field, value, **_bound_limits(bound, part))
-    return lambda field, value, part: number(field, value, low, high, above=above, unit=unit)
-
-
-def _bound_limits(bound: Bound, part: Any) -> dict[str, Any]:
-    low = getattr(part, bound.low) if isinstance(bound.low, str) else bound.low
-    return {"low": low, "high": bound.high, "above": bound.above, "unit": bound.unit}
-
-
-def _check_union(kinds: tuple[Any, ...], bound: Bound) -> Check:
-    """None, a word, or a value of the only other type."""
-    nullable, words = type(None) in kinds, [k for k in kinds if get_origin(k) is Literal]
-    others = [k for k in kinds if k is not type(None) and k not in words]
-    pairs = [k for k in others if _is_pair(k)]
-    if pairs:  # of parts, or one part for both axes
-        return _check_each_axis(pairs[0], [k for k in kinds if k not in pairs], bound)
-    other = _check_of((others or words)[0], bound, " or None" if nullable else "")
-    if len(others) > 1:
-        told = " or ".join(f"a {k.__name__}" for k in others) + " or None" * nullable
-        other = _check_part(tuple(others), f"must be {told}")
-    word = _check_of(words[0], bound) if words else other
-
-    def check(field: str, value: Any, part: Any) -> Any:
-        if value is None and nullable:
-            return None
-        spoken = isinstance(value, str) and not is_quantity(value)
-        return (word if spoken else other)(field, value, part)
-
-    return check
-
-
-def _is_pair(hint: Any) -> bool:
-    """Whether a type is a pair of parts, one per axis."""
-    kinds = get_args(hint)
-    two = get_origin(hint) is tuple and len(kinds) == 2 and kinds[1] is not ...
-    return two and _part_of(kinds[0]) is not None
-
-
-def _part_of(hint: Any) -> Any:
-    """The dataclass in a type, or in its union with None; None if there is none."""
-    kinds = get_args(hint) or (hint,)
-    return next((k for k in kinds if isinstance(k, type) and dataclasses.is_dataclass(k)), None)
-
-
-def _check_each_axis(pair_hint: Any, single: list[Any], bound: Bound) -> Check:
-    """A pair (x, y) of parts; or one of the single types, where there are any."""
-    each = _check_of(get_args(pair_hint)[0], bound)
-    whole = _check_of(Union[tuple(single)], bound) if single else None  # noqa: UP007
-    part = _part_of(get_args(pair_hint)[0]).__name__
-
-    def check(field: str, value: Any, owner: Any) -> Any:
-        if isinstance(value, tuple | list):
-            if len(value) != 2:
-                raise ParameterError(field, value, f"must be a pair (x, y) of {part}")
-            x, y = (each(f"{field}.{axis}", v, owner) for axis, v in zip("xy", value, strict=True))
-            return (x, y)
-        if whole is None:
-            raise ParameterError(field, value, f"must be a pair (x, y) of {part}")
-        return whole(field, value, owner)
-
-    return check
-
-
-def _check_tuple(kinds: tuple[Any, ...], bound: Bound) -> Check:
-    """As many floats as the bound names, or any number of them, of rows of them, or of parts."""
-    if get_origin(kinds[0]) is tuple:
-        return lambda field, value, part: table_of(field, value, **_bound_limits(bound, part))
-    if _part_of(kinds[0]) is not None:
-        return _check_parts(kinds[0])
-
-    def check(field: str, value: Any, part: Any) -> Any:
-        names: Sequence[str] = bound.names
-        if kinds[1:] == (...,):
-            if not is_series(value) or not hasattr(value, "__len__"):
-                raise ParameterError(field, value, "must be a sequence of numbers")
-            names = _place_names(len(value))
-        return numbers_of(field, value, names, **_bound_limits(bound, part))
-
-    return check
-
-
-@functools.lru_cache(maxsize=64)
-def _place_names(n: int) -> list[str]:
-    """Names of n numbers."""
-    return [str(i) for i in range(n)]
-
-
-def _check_parts(kind: type) -> Check:
-    """Any number of parts of one class."""
-
-    def check(field: str, value: Any, part: Any) -> Any:
-        if not isinstance(value, tuple | list):
-            raise ParameterError(field, value, f"must be a sequence of {kind.__name__}")
-        for i, x in enumerate(value):
-            if not isinstance(x, kind):
-                raise ParameterError(f"{field}[{i}]", x, f"must be a {kind.__name__}")
-        return tuple(value)
-
-    return check
-
-
-def _check_part(kind: type | tuple[type, ...], told: str) -> Check:
-    def check(field: str, value: Any, part: Any) -> Any:
-        if not isinstance(value, kind):
-            raise ParameterError(field, value, told)
-        return value
-
-    return check
-
-
-def _check_text(field: str, value: Any, part: Any) -> Any:
-    if not isinstance(value, str) or not value:
-        raise ParameterError(field, value, "must be a non-empty string")
-    return value
+def _spelled(low: float | str) -> str:
+    return low if isinstance(low, str) else f"{low:g}"
 
 
 @contextlib.contextmanager

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from .arguments import checked, function_name
+from .arguments import checked
 from .display import html_table, one_line
 from .errors import ParameterError, choice, needing
+from .fields import function_name
 from .files import DAMAGED, atomic, parse_json, read_text, versions
 
 if TYPE_CHECKING:

@@ -17,7 +17,8 @@ import hapticclay as hc
 from hapticclay import errors, units
 from hapticclay.cli import app
 from hapticclay.cli import words as cli_words
-from hapticclay.errors import ParameterError, field_types
+from hapticclay.errors import ParameterError
+from hapticclay.fields import nodes_of
 from hapticclay.scene.experiments import EXPERIMENTS
 from tests.public import NAMES
 
@@ -216,24 +217,12 @@ def test_an_argument_far_from_all_lists_those_there_are():
 SIZES = {"m": ("mm", "1e-3"), "s": ("ms", "1e-3"), "N": ("kN", "1e3"), "kg": ("g", "1e-3")}
 
 
-def numbers_with_units(kind):
-    """Fields of one number with a known unit: name, bound."""
-    for name, (hint, bound) in field_types(kind).items():
-        if (
-            bound
-            and bound.unit
-            and units.parse_unit(bound.unit)
-            and float in cli_words._members(hint)
-        ):
-            yield name, hint, bound
-
-
 PLACES = [
-    (kind, name, bound)
+    (kind, name, node.bound)
     for kind in (*EXPERIMENTS.values(), hc.Scenario, hc.Arm, hc.Operator, hc.Flow, hc.VirtualWall,
                  hc.Device, hc.Hardware, hc.theory.Loop, hc.walls.Press)
-    for name, hint, bound in numbers_with_units(kind)
-    if not any(getattr(k, "__origin__", None) is tuple for k in cli_words._members(hint))
+    for name, node in nodes_of(kind).items()
+    if node.bound.unit and units.parse_unit(node.bound.unit) and node.arity == 1
 ]  # fmt: skip
 
 
@@ -257,7 +246,7 @@ def test_a_number_with_its_unit_is_that_number(place, share):
     kind, name, bound = place
     x = within(bound, share)
     text = f"{x!r} {bound.unit}"
-    extra = {"control": "sampled"} if name == "Ts" and "control" in field_types(kind) else {}
+    extra = {"control": "sampled"} if name == "Ts" and "control" in nodes_of(kind) else {}
     plain = made_of(kind, **extra, **{name: x})
     assert made_of(kind, **extra, **{name: text}) == plain
     if not isinstance(plain, tuple):

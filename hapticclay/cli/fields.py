@@ -6,14 +6,12 @@ import math
 import textwrap
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, Any
 
 import tyro
 
 from ..errors import ParameterError
-
-if TYPE_CHECKING:
-    from ..scene.fields import Field
+from ..fields import UNSET, Field, Node, dotted_names, leaves, no_field
 
 WIDTH = 96  # of the text
 
@@ -34,15 +32,13 @@ class FieldsCommand:
     names: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
 
     def __call__(self) -> int:
-        from ..scene.experiments import EXPERIMENTS, parameter_fields
-        from ..scene.field_kinds import no_field
-        from ..scene.fields import dotted_names, fields_of
+        from ..scene.experiments import EXPERIMENTS, parameters
         from ..scene.scenario import Scenario
 
-        known, shown = fields_of(Scenario, part=Scenario()), []
+        known, shown = leaves(Scenario, part=Scenario()), []
         for name in self.names:
-            own = parameter_fields(EXPERIMENTS[name]) if name in EXPERIMENTS else ()
-            found = own or [f for f in known if name in f.name]
+            own = parameters(EXPERIMENTS[name]).values() if name in EXPERIMENTS else ()
+            found = list(own) or [f for f in known if name in f.name]
             if not found:
                 told = no_field(name, "", [*EXPERIMENTS, *dotted_names(Scenario)])
                 raise ParameterError("field", name, told.bound)
@@ -55,15 +51,13 @@ def field_list(fields: Iterable[Field]) -> str:
     """Fields with their defaults, units, bounds and descriptions, for a terminal."""
     lines = []
     for f in fields:
-        unit = f"  [{f.bound.unit}]" if f.bound.unit else ""
-        lines.append(f"{f.name} = {_value_in_words(f.default)}{unit}  {_takes(f)}".rstrip())
+        unit = f"  [{f.unit}]" if f.unit else ""
+        lines.append(f"{f.name} = {_value_in_words(f.default)}{unit}  {_takes(f.node)}".rstrip())
         lines += textwrap.wrap(f.about, WIDTH, initial_indent="    ", subsequent_indent="    ")
     return "\n".join(lines)
 
 
 def _value_in_words(value: Any) -> str:
-    from ..scene.field_kinds import UNSET
-
     if value is UNSET:
         return "(to be given)"
     if isinstance(value, tuple):
@@ -71,28 +65,20 @@ def _value_in_words(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value).lower()
 
 
-def _takes(field: Field) -> str:
+def _takes(node: Node) -> str:
     """Bounds of a number, or the words that a field takes."""
-    from ..scene.field_kinds import union_members
-
-    words, numbers = [], False
-    for kind in union_members(field.hint):
-        if get_origin(kind) is Literal:
-            words += get_args(kind)
-        elif kind is bool:
-            words += ["true", "false"]
-        elif kind is type(None):
-            words += ["none"]
-        else:
-            numbers = kind is not str
-    low, high = field.bound.low, field.bound.high
-    if numbers and isinstance(low, str):  # the name of a field
+    words = list(node.words) or ["true", "false"] * (node.hint is bool)
+    words += ["none"] * node.none
+    low, high = node.bound.low, node.bound.high
+    if not node.takes_numbers:
+        return " | ".join(words)
+    if isinstance(low, str):  # the name of a field
         words.insert(0, f"{low} to {high:.10g}")
-    elif numbers and not isinstance(low, str) and math.isfinite(low):
-        above = "above " if field.bound.above else ""
+    elif math.isfinite(low):
+        above = "above " if node.bound.above else ""
         words.insert(
             0, f"{above}{low:g}{f' to {high:.10g}' if math.isfinite(high) else ' or more'}"
         )
-    elif numbers and words:
+    elif words:
         words.insert(0, "a number")
     return " | ".join(words)

@@ -120,8 +120,8 @@ class RobustnessCommand:
         return 0
 
     def _trials(self) -> Trials:
+        from ..fields import field_unit
         from ..model.constants import AXES, B_CONSTANT, GAIN
-        from ..scene.fields import field_unit
         from ..scene.scenario import Scenario
         from ..studies.boundary import PushedLoop
         from ..studies.distribution import parse_laws

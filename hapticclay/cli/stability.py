@@ -171,9 +171,9 @@ class StabilityCommand:
 
 def clay_of(words: Sequence[str], b: float | None = None) -> Flow:
     """The law of clay that is given by its numbers, or by the name of a material."""
+    from ..fields import field_unit
     from ..model.flow import Flow
     from ..model.materials import material
-    from ..scene.fields import field_unit
 
     text = " ".join(words)
     if not text.strip():

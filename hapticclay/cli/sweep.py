@@ -19,7 +19,7 @@ from . import console
 from .unused import Unused, undrawn
 
 if TYPE_CHECKING:
-    from ..studies.sampling import Sweep
+    from ..studies.sweep import Sweep
 
 LARGE_SWEEP = 1000  # runs from which an estimate, made of 20 at most, pays
 STATUS_LINE = (
@@ -84,23 +84,23 @@ class SweepCommand:
     )
 
     def __call__(self) -> int:
-        from ..studies import sweep_store
+        from ..studies import store
 
         asked = self._plan()
         if self.workers is not None:
             integer("workers", self.workers, 1, 1024)
-        with sweep_store.claimed(asked, self.out) as (plan, todo):
+        with store.claimed(asked, self.out) as (plan, todo):
             try:
                 self._make(plan, todo)
             except KeyboardInterrupt:
-                missing = sweep_store.missing_parts(plan, self.out)
+                missing = store.missing_parts(plan, self.out)
                 here = len(plan) - sum(map(len, missing))
                 print(
                     f"{here} of {len(plan)} runs are in {self.out / 'data'}; "
                     "the same command resumes the sweep"
                 )
                 raise
-        table = sweep_store.read_sweep(self.out)
+        table = store.read_sweep(self.out)
         for status, n in Counter(table["status"].to_pylist()).most_common():
             print(f"{n:8d}  {status}")
         print(f"{table.num_rows} runs in {self.out / 'data'}")
@@ -109,19 +109,20 @@ class SweepCommand:
         return 0
 
     def _make(self, plan: Sweep, todo: list[range]) -> None:
-        from ..studies import sweep
+        from ..studies import store_runs
 
         left = sum(map(len, todo))
         if left >= LARGE_SWEEP:
             self._estimate(plan, left, todo)
-        chunks = sweep.run_chunks(plan, self.out, todo, self.workers, self.scheduler)
+        chunks = store_runs.run_chunks(plan, self.out, todo, self.workers, self.scheduler)
         with _status(plan, len(plan) - left) as show, closing(chunks) as results:
             for n in results:
                 show(n)
 
     def _plan(self) -> Sweep:
         from ..scene.files import is_scenario_file, read_settings
-        from ..studies.sampling import Sweep, load_sweep, parse_fixed, parse_grid
+        from ..studies.sampling import parse_fixed, parse_grid
+        from ..studies.sweep import Sweep, load_sweep
 
         if (self.spec is None) == (self.grid is None):
             raise ParameterError("arguments", "", "give either a SPEC.toml or --grid")
@@ -145,10 +146,10 @@ class SweepCommand:
 
         from tqdm import tqdm
 
-        from ..studies import sweep
+        from ..studies import store_runs, sweep
 
         seconds, size = sweep.estimate_time(plan)
-        crew = 1 if self.scheduler else sweep.processes(plan, todo, self.workers)
+        crew = 1 if self.scheduler else store_runs.processes(plan, todo, self.workers)
         span = tqdm.format_interval(seconds * left / crew)
         free, room = shutil.disk_usage(self.out).free, size * left
         print(

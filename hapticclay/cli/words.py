@@ -179,8 +179,8 @@ def _experiment_options(words: Sequence[str]) -> set[str]:
 
 def _option_units(words: Sequence[str]) -> dict[str, str]:
     """Units of options, by name: those of an experiment, and those in brackets in their help."""
+    from ..fields import field_descriptions
     from ..scene.experiments import EXPERIMENTS, parameters
-    from ..scene.fields import field_descriptions
 
     kind = load_command(words[0])
     nested: Any = (x.kind for x in _own_slots(kind).values() if dataclasses.is_dataclass(x.kind))

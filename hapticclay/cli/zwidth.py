@@ -17,7 +17,7 @@ from . import console, walls
 from .unused import Unused
 
 if TYPE_CHECKING:
-    from ..studies.wall_lines import Wall
+    from ..studies.wall import Subject
     from ..studies.zwidth import ZRegion, ZWidth
 
 ZWIDTH_SCHEMA = "hapticclay-zwidth-1"
@@ -104,14 +104,14 @@ class ZWidthCommand:
         print(f"written to {self.out}")
         return 0
 
-    def _wall(self) -> Wall:
+    def _wall(self) -> Subject:
         if self.arm:
             return self._arm(self.arm)
         if self.gain is not None:
             raise ParameterError("gain", self.gain, "is for the arm: give --arm x or y")
         return self.device.wall(self.source)
 
-    def _arm(self, axis: Literal["x", "y"]) -> Wall:
+    def _arm(self, axis: Literal["x", "y"]) -> Subject:
         from ..scene.changes import with_fields
         from ..studies.boundary import PushedLoop
 
@@ -124,7 +124,7 @@ class ZWidthCommand:
         timing = {n: getattr(self.device, n) for n in ("Ts", "delay")}
         return with_fields(loop, walls.quantities(timing))
 
-    def _values(self, wall: Wall) -> list[Any]:
+    def _values(self, wall: Subject) -> list[Any]:
         """The values behind --vary."""
         from ..scene.changes import named_values
 

@@ -11,10 +11,10 @@ from typing_extensions import override
 
 from ..model.clay import slab
 from ..scene.scenario import Scenario
-from .columns import Value, bounded, mapped, picked, where
+from .columns import Value, clipped, each, entry, where
 from .draws import HAND, Range, Truth
 from .environment import TaskEnv
-from .quantities import Quantity, either_way
+from .quantities import Quantity, symmetric
 from .task import DT, Command, Handle, Judged, Memory, Task, saturated, scene_of
 from .vector import TaskVectorEnv
 
@@ -37,7 +37,7 @@ class AdaptiveGainTask(Task):
     limit: ClassVar[int] = 500
     strain: ClassVar[float] = 0.5
     actions: ClassVar[tuple[Quantity, ...]] = (
-        either_way("change of the gain: K is multiplied by 2^(action / 4)", 1.0),
+        symmetric("change of the gain: K is multiplied by 2^(action / 4)", 1.0),
     )
     drawn: ClassVar[dict[str, Range]] = {
         **HAND,
@@ -48,8 +48,8 @@ class AdaptiveGainTask(Task):
     @property
     def observations(self) -> tuple[Quantity, ...]:
         """Quantities of an observation."""
-        v = (either_way(f"velocity, {k} periods ago", 200.0, "cm/s") for k in range(SAMPLES))
-        f = (either_way(f"force of the hand, {k} periods ago", 100.0, "N") for k in range(SAMPLES))
+        v = (symmetric(f"velocity, {k} periods ago", 200.0, "cm/s") for k in range(SAMPLES))
+        f = (symmetric(f"force of the hand, {k} periods ago", 100.0, "N") for k in range(SAMPLES))
         return (
             *v, *f,
             Quantity("decimal logarithm of the gain K [1/kg]", -1.5, 1.5),
@@ -73,16 +73,16 @@ class AdaptiveGainTask(Task):
 
     @override
     def command(self, m: Memory, action: tuple[Value, ...]) -> Command:
-        factor = mapped(lambda a: math.pow(2.0, RATE * a), action[0])
-        m["K"] = bounded(m["K"] * factor, LEAST, MOST)
-        push = picked(m["muscle"], m["count"] % CYCLE)
-        push = push * bounded((m["count"] + 1) / RAMP, 0.0, 1.0)
+        factor = each(lambda a: math.pow(2.0, RATE * a), action[0])
+        m["K"] = clipped(m["K"] * factor, LEAST, MOST)
+        push = entry(m["muscle"], m["count"] % CYCLE)
+        push = push * clipped((m["count"] + 1) / RAMP, 0.0, 1.0)
         nothing = 0.0 * m["K"]
         return Command((push, nothing), (m["K"], nothing + GAIN_Y))
 
     @override
     def observe(self, m: Memory, h: Handle) -> tuple[Value, ...]:
-        return *m["v"], *m["f"], mapped(math.log10, m["K"]), m["b"] / 60.0
+        return *m["v"], *m["f"], each(math.log10, m["K"]), m["b"] / 60.0
 
     @override
     def judge(self, m: Memory, h: Handle, action: tuple[Value, ...]) -> Judged:
@@ -91,7 +91,7 @@ class AdaptiveGainTask(Task):
         m["f"] = h.fh[0], *m["f"][:-1]
         error = (h.fh[0] - h.fe[0]) / WEIGHT
         cost = saturated(error * error)
-        left = bounded(self.limit - m["count"], 0, self.limit)
+        left = clipped(self.limit - m["count"], 0, self.limit)
         reward = where(h.diverged, -1.0 - left, -cost)
         m["errors"] = m["errors"] + cost
         info = {"K": m["K"], "lost": h.diverged, "mean_cost": m["errors"] / m["count"]}

@@ -29,16 +29,16 @@ def negated(condition: Value) -> Value:
     return ~condition if isinstance(condition, np.ndarray) else not condition
 
 
-def bounded(x: Value, low: Value, high: Value) -> Value:
+def clipped(x: Value, low: Value, high: Value) -> Value:
     """x, at least low and at most high; NaN stays NaN."""
     if isinstance(x, np.ndarray):
         return np.where(x < low, low, np.where(x > high, high, x))
     return low if x < low else high if x > high else x
 
 
-def shown(x: Value, low: Value, high: Value) -> Value:
+def observed(x: Value, low: Value, high: Value) -> Value:
     """x, at least low and at most high; 0 in place of NaN."""
-    return where(x == x, bounded(x, low, high), 0.0)
+    return where(x == x, clipped(x, low, high), 0.0)
 
 
 def root(x: Value) -> Value:
@@ -46,12 +46,12 @@ def root(x: Value) -> Value:
     return np.sqrt(x) if isinstance(x, np.ndarray) else math.sqrt(x)
 
 
-def mapped(f: Callable[[float], float], x: Value) -> Value:
+def each(f: Callable[[float], float], x: Value) -> Value:
     """f(x), value by value."""
     return np.array([f(value) for value in x.tolist()]) if isinstance(x, np.ndarray) else f(x)
 
 
-def picked(table: Any, i: Value) -> Value:
+def entry(table: Any, i: Value) -> Value:
     """Entry i of each copy's table."""
     return table[np.arange(len(i)), i] if isinstance(i, np.ndarray) else table[i]
 
@@ -64,16 +64,14 @@ def columns_of(rows: Sequence[Any]) -> Any:
     return None if first is None else np.array(rows)
 
 
-def replaced(columns: Any, which: Sequence[int], rows: Sequence[Any]) -> Any:
+def replaced(columns: Any, which: Sequence[int], new: Any) -> Any:
     """Columns with the values of some copies replaced."""
-    first = rows[0]
-    if isinstance(first, tuple):
-        parts = zip(columns, zip(*rows, strict=True), strict=True)
-        return tuple(replaced(column, which, x) for column, x in parts)
-    if first is None:
+    if isinstance(new, tuple):
+        return tuple(replaced(x, which, y) for x, y in zip(columns, new, strict=True))
+    if new is None:
         return None
     made = columns.copy()
-    made[which] = rows
+    made[which] = new
     return made
 
 

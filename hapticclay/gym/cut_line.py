@@ -16,7 +16,7 @@ from .columns import Value
 from .draws import HAND, Range, Truth
 from .environment import TaskEnv
 from .follow import MOTION, Follow
-from .quantities import Quantity, either_way
+from .quantities import Quantity, symmetric
 from .task import Handle, Memory, scene_of
 from .vector import TaskVectorEnv
 
@@ -50,14 +50,14 @@ class CutLineTask(Follow):
     def observations(self) -> tuple[Quantity, ...]:
         """Quantities of an observation."""
         return (
-            either_way("distance from the line, positive to its left", 50.0, "mm"),
+            symmetric("distance from the line, positive to its left", 50.0, "mm"),
             *MOTION,
-            either_way("sine of the turn of the line 5 mm ahead", 1.0),
+            symmetric("sine of the turn of the line 5 mm ahead", 1.0),
         )
 
     def line(self, truth: Truth) -> np.ndarray:
         """Nodes of the line [m]."""
-        return lines.turned(lines.SHAPES[self.shape](LENGTH), truth["angle"])
+        return lines.rotated(lines.SHAPES[self.shape](LENGTH), truth["angle"])
 
     @override
     def scenario(self, truth: Truth) -> Scenario:
@@ -73,7 +73,7 @@ class CutLineTask(Follow):
 
     @override
     def observe(self, m: Memory, h: Handle) -> tuple[Value, ...]:
-        at = self.beside(m, h)
+        at = self.place(m, h)
         turn = lines.along_across(at.tangent, at.ahead)[1]
         return 1000.0 * at.across, *self.motion(m, h, at), turn
 

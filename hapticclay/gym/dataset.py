@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import importlib.util
-import json
 import os
 import re
 import shutil
 import tempfile
-import zipfile
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import gymnasium
 import numpy as np
 
 from .. import __version__
-from ..errors import ParameterError, choice, integer, needing, number
-from ..files import atomic
-from ..simulation.engines import ENGINES
+from ..arguments import checked
+from ..errors import Bound, ParameterError, choice, integer, needing
+from ..studies import store
+from ..studies.store_runs import run_plan
+from ..studies.sweep_rows import Notes
 from .baselines import BASELINES, at_random, mean_of, returns
+from .environment import Engine
 from .registry import NAMESPACE
 
 BASELINE = {  # the best policy of `BASELINES` that uses only what an agent observes
@@ -34,17 +37,92 @@ SCORED = 20  # episodes behind the scores stored with a data set
 SEEDS = 2**63 - 1  # the largest seed that Minari's files hold
 NAME = re.compile(r"(?:(?=..+/)(?:[-\w]+/)+)?[-\w]*\w-v\d+")  # of those Minari takes, with version
 FOLDER = "MINARI_DATASETS_PATH"  # Minari's variable for the folder of data sets
-COLUMNS = ("observations", "actions", "rewards", "terminations", "truncations")
+SCHEMA = "hapticclay-recording-1"
+COLUMNS: dict[str, Any] = {  # of an episode, and the types of their numbers
+    "observations": np.float32,
+    "actions": np.float32,
+    "rewards": float,
+    "terminations": bool,
+    "truncations": bool,
+}
 WRITTEN = 50  # episodes that Minari's writer is given at once
 
 
+@dataclass(frozen=True)
+class Recording(store.Plan):
+    """Episodes of an environment's baseline with noise on its actions, one per file.
+
+    Attributes:
+        id: name of the environment.
+        noise: standard deviation of the noise.
+        seed: seed of the first episode; counted up for the others.
+        episodes: number of episodes; a recording may be continued with another one.
+        engine: as in `Simulation`; the bits are the same for all.
+    """
+
+    id: str
+    noise: float
+    seed: int
+    episodes: int
+    engine: str
+    chunk: ClassVar[int | None] = 1
+    notes: ClassVar[Notes] = {
+        "run": ("", "number of the episode"),
+        "observations": ("", "observations, one after another"),
+        "actions": ("", "actions, one after another"),
+        "rewards": ("", "reward of each control period"),
+        "terminations": ("", "whether the episode ended, after each control period"),
+        "truncations": ("", "whether it was cut off, likewise"),
+    }
+    noun: ClassVar[str] = "recording"
+    remedy: ClassVar[str] = "take another name, or remove that folder"
+
+    def __len__(self) -> int:
+        return self.episodes
+
+    def described(self) -> dict[str, Any]:
+        """What determines each episode."""
+        return {"schema": SCHEMA, "id": self.id, "noise": self.noise, "seed": self.seed}
+
+    def blank_row(self) -> dict[str, Any]:
+        """An episode, for the types of its columns."""
+        return {"run": 0, **{name: np.zeros(1, kind) for name, kind in COLUMNS.items()}}
+
+    def rows(self, runs: range, late: Callable[[], bool]) -> list[dict[str, Any]]:
+        """Records episodes, with their observations and actions one after another."""
+        return [{"run": i, **self._episode(self.seed + i)} for i in runs]
+
+    @functools.cached_property
+    def env(self) -> Any:
+        """The environment."""
+        return gymnasium.make(f"{NAMESPACE}/{self.id}", engine=self.engine)
+
+    def _episode(self, seed: int) -> dict[str, np.ndarray]:
+        """An episode by columns. Its noise has a stream of its own, so it depends on no other."""
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1,)))
+        observation, info = self.env.reset(seed=seed)
+        policy = BASELINES[self.id][BASELINE[self.id]](self.env.unwrapped.task, [info], 0)
+        observations, steps, over = [observation], [], False
+        while not over:
+            action = policy(observation[None])[0]
+            action = np.clip(action + self.noise * rng.standard_normal(action.shape), -1.0, 1.0)
+            action = action.astype(np.float32)
+            observation, reward, ended, cut_off, _ = self.env.step(action)
+            observations.append(observation)
+            steps.append((action, reward, ended, cut_off))
+            over = ended or cut_off
+        columns = (observations, *zip(*steps, strict=True))
+        return {name: np.array(x).ravel() for name, x in zip(COLUMNS, columns, strict=True)}
+
+
+@checked
 def record(
     id: str,
     name: str,
-    episodes: int,
-    noise: float = 0.1,
+    episodes: Annotated[int, Bound(1, 100_000)],
+    noise: Annotated[float, Bound(0.0, 1.0)] = 0.1,
     seed: int = 0,
-    engine: str = "auto",
+    engine: Engine = "auto",
     *,
     progress: Callable[[int], None] | None = None,
 ) -> Any:
@@ -55,9 +133,6 @@ def record(
     never interrupted. The data set appears when it is complete.
     """
     choice("id", id, tuple(BASELINE))
-    choice("engine", engine, ENGINES)
-    episodes = integer("episodes", episodes, 1, 100_000)
-    noise = number("noise", noise, 0.0, 1.0)
     seed = integer("seed", seed, 0, SEEDS - episodes)
     target = _target(name)
     with needing("a data set", "minari", "minari"):
@@ -65,10 +140,20 @@ def record(
     with needing("a data set", "h5py", "minari"):  # which Minari imports when it writes
         if importlib.util.find_spec("h5py") is None:
             raise ImportError
-    settings = {"id": id, "noise": noise, "seed": seed, "hapticclay": __version__}
-    kept = _begun(target.with_name(f".{target.name}.part"), settings)
-    _record_missing(kept, episodes, settings, engine, progress or (lambda n: None))
-    return _written(kept, target, name, episodes, settings, engine)
+    kept = target.with_name(f".{target.name}.part")
+    kept = target.with_name(f".{target.name}.part")
+    plan = Recording(id, noise, seed, max(episodes, store.last_part(kept) + 1), engine)
+    count = 0
+
+    def show(more: int) -> None:
+        nonlocal count
+        count += more
+        if progress:
+            progress(min(count, episodes))
+
+    with contextlib.closing(plan.env):
+        run_plan(plan, kept, 1, progress=show, before=lambda _, todo: show(len(plan) - len(todo)))
+    return _written(plan, kept, name, episodes)
 
 
 def _folder() -> Path:
@@ -89,132 +174,54 @@ def _target(name: Any) -> Path:
     return target
 
 
-def _begun(kept: Path, settings: dict[str, Any]) -> Path:
-    """The folder of a recording, begun or continued; refused where others settings began it."""
-    file = kept / "recording.json"
-    with contextlib.suppress(FileNotFoundError):
-        before = _settings_in(file)
-        for name, value in settings.items():
-            if before.get(name) != value:
-                bound = f"must be {before.get(name)!r}, as in the interrupted recording in {kept}"
-                remedy = "or take another name, or remove that folder"
-                raise ParameterError(name, value, f"{bound}; {remedy}")
-        return kept
-    with atomic(file) as f:
-        f.write(json.dumps(settings).encode())
-    return kept
-
-
-def _settings_in(file: Path) -> dict[str, Any]:
-    try:
-        found = json.loads(file.read_bytes())
-    except ValueError:
-        found = None
-    if not isinstance(found, dict):
-        raise ParameterError(
-            "name", str(file.parent), "must not hold a damaged recording: remove it"
-        )
-    return found
-
-
-def _record_missing(
-    kept: Path, n: int, settings: dict[str, Any], engine: str, progress: Callable[[int], None]
-) -> None:
-    """Records the episodes that are not kept yet."""
-    missing = [i for i in range(n) if _episode_in(_file_of(kept, i)) is None]
-    progress(n - len(missing))
-    if not missing:
-        return
-    env = gymnasium.make(f"{NAMESPACE}/{settings['id']}", engine=engine)
-    try:
-        for count, i in enumerate(missing, 1):
-            rows = _episode(env, settings, settings["seed"] + i)
-            with atomic(_file_of(kept, i)) as f:
-                np.savez(f, **rows)  # pyright: ignore[reportArgumentType]
-            progress(n - len(missing) + count)
-    finally:
-        env.close()
-
-
-def _file_of(kept: Path, i: int) -> Path:
-    return kept / f"episode_{i}.npz"
-
-
-def _episode_in(file: Path) -> dict[str, np.ndarray] | None:
-    """A kept episode by columns; None where it is not there, or damaged."""
-    try:
-        with file.open("rb") as f, np.load(f) as found:
-            return {name: found[name] for name in COLUMNS}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-        return None
-
-
-def _episode(env: Any, settings: dict[str, Any], seed: int) -> dict[str, np.ndarray]:
-    """An episode by columns. Its noise has a stream of its own, so it depends on no other."""
-    id, noise = settings["id"], settings["noise"]
-    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1,)))
-    observation, info = env.reset(seed=seed)
-    policy = BASELINES[id][BASELINE[id]](env.unwrapped.task, [info], 0)
-    seen, steps, over = [observation], [], False
-    while not over:
-        action = policy(observation[None])[0]
-        action = np.clip(action + noise * rng.standard_normal(action.shape), -1.0, 1.0)
-        action = action.astype(np.float32)
-        observation, reward, ended, cut_off, _ = env.step(action)
-        seen.append(observation)
-        steps.append((action, reward, ended, cut_off))
-        over = ended or cut_off
-    columns = (seen, *zip(*steps, strict=True))
-    return {name: np.array(x) for name, x in zip(COLUMNS, columns, strict=True)}
-
-
-def _buffers(kept: Path, which: range) -> list[Any]:
+def _buffers(plan: Recording, kept: Path, which: range) -> list[Any]:
     """Kept episodes as Minari's writer takes them."""
     from minari.data_collector import (  # pyright: ignore[reportMissingImports]
         EpisodeBuffer,
     )
 
-    settings = _settings_in(kept / "recording.json")
     found = []
     for i in which:
-        rows = _episode_in(_file_of(kept, i))
-        if rows is None:
-            raise OSError(f"{_file_of(kept, i)} has gone while the data set was written")
-        lists: dict[str, Any] = {name: list(x) for name, x in rows.items()}
-        found.append(EpisodeBuffer(id=i, seed=settings["seed"] + i, infos={}, **lists))
+        table = store.read_part(store.part_file(kept, i))
+        if table is None:
+            raise OSError(f"episode {i} in {kept} was damaged while the data set was written")
+        [row] = table.to_pylist()
+        columns = {name: np.array(row[name], kind) for name, kind in COLUMNS.items()}
+        n = len(columns["rewards"])
+        columns["observations"] = columns["observations"].reshape(n + 1, -1)
+        columns["actions"] = columns["actions"].reshape(n, -1)
+        lists: dict[str, Any] = {name: list(x) for name, x in columns.items()}
+        found.append(EpisodeBuffer(id=i, seed=plan.seed + i, infos={}, **lists))
     return found
 
 
-def _written(
-    kept: Path, target: Path, name: str, n: int, settings: dict[str, Any], engine: str
-) -> Any:
+def _written(plan: Recording, kept: Path, name: str, n: int) -> Any:
     """Writes the data set beside the kept episodes, moves it to its place, removes them."""
     import minari  # pyright: ignore[reportMissingImports]
 
-    id = settings["id"]
-    maker = BASELINES[id][BASELINE[id]]
+    id, engine, policy = plan.id, plan.engine, BASELINE[plan.id]
     scores = [
-        mean_of(returns(id, made, range(SCORED), engine=engine).total)[0]
-        for made in (at_random, maker)
+        mean_of(returns(id, maker, range(SCORED), engine=engine).total)[0]
+        for maker in (at_random, BASELINES[id][policy])
     ]
     folder = _folder()
     with tempfile.TemporaryDirectory(dir=kept) as beside, _datasets_in(beside):
         made = minari.create_dataset_from_buffers(
             dataset_id=name,
-            buffer=_buffers(kept, range(min(n, WRITTEN))),
+            buffer=_buffers(plan, kept, range(min(n, WRITTEN))),
             env=gymnasium.make(f"{NAMESPACE}/{id}", engine=engine),
-            algorithm_name=f"{BASELINE[id]}, noise {settings['noise']:g}",
+            algorithm_name=f"{policy}, noise {plan.noise:g}",
             author="The hapticclay authors",
             author_email="none given",
             eval_env=f"{NAMESPACE}/{id}",
             code_permalink=f"hapticclay {__version__}: hapticclay/gym/dataset.py",
-            description=f"{BASELINE[id]} in {NAMESPACE}/{id} of hapticclay {__version__}",
+            description=f"{policy} in {NAMESPACE}/{id} of hapticclay {__version__}",
             ref_min_score=min(scores),
             ref_max_score=max(scores),
             num_episodes_average_score=SCORED,
         )
         for i in range(WRITTEN, n, WRITTEN):
-            made.update_dataset_from_buffer(_buffers(kept, range(i, min(i + WRITTEN, n))))
+            made.update_dataset_from_buffer(_buffers(plan, kept, range(i, min(i + WRITTEN, n))))
         sums = made.storage.apply(minari.EpisodeMetadataCallback())
         made.storage.update_episode_metadata(sums)
         _move(Path(beside), folder, name)

@@ -62,7 +62,7 @@ def with_ranges(ranges: Mapping[str, Range], given: Mapping[str, Any] | None) ->
 
 
 def fixed_by(ranges: Mapping[str, Range], given: Mapping[str, Any]) -> Truth:
-    """The numbers of an episode that are given, not drawn."""
+    """Checks numbers that replace drawn ones."""
     found = {}
     for name, value in given.items():
         r = ranges[choice("options", name, tuple(ranges))]
@@ -75,17 +75,18 @@ def draw(ranges: Mapping[str, Range], rng: np.random.Generator, fixed: Truth) ->
 
     All numbers are drawn, so that a fixed value does not change the others.
     """
-    return {name: _spread(r, float(rng.random())) for name, r in ranges.items()} | fixed
+    return {name: _sample(r, float(rng.random())) for name, r in ranges.items()} | fixed
 
 
-def _spread(r: Range, u: float) -> float:
+def _sample(r: Range, u: float) -> float:
+    """The number of a range at u, 0 to 1, of its distribution."""
     if r.log and r.low > 0.0:
         return min(max(r.low * math.exp(u * math.log(r.high / r.low)), r.low), r.high)
     return r.low + u * (r.high - r.low)
 
 
 def table_of(ranges: Mapping[str, Range]) -> str:
-    """Markdown table of the drawn numbers."""
+    """Markdown table of the numbers drawn."""
     rows = ["| option | what | drawn from | law | allowed | unit |", "|---|---|---|---|---|---|"]
     for name, r in ranges.items():
         law = "log-uniform" if r.log else "uniform"

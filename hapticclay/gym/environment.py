@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import choice
-from ..simulation.engines import ENGINES
+from ..arguments import checked
 from .draws import fixed_by
-from .episodes import Episode
+from .episodes import Episodes, One
 from .inputs import action_of, options_of, seed_of, task_of
 from .quantities import box_of
-from .task import DT, Task
+from .task import Task
 
 if TYPE_CHECKING:
     from .picture import Picture
 
 FPS = 50
 MODES = ["human", "rgb_array"]
+Engine = Literal["auto", "python", "native"]
 
 
 class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -40,18 +39,17 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     metadata: dict[str, Any] = {"render_modes": MODES, "render_fps": FPS}  # noqa: RUF012
     task_type: ClassVar[type[Task]]
 
+    @checked
     def __init__(
         self,
-        render_mode: str | None = None,
-        engine: str = "auto",
-        ranges: Mapping[str, Any] | None = None,
+        render_mode: Literal["human", "rgb_array"] | None = None,
+        engine: Engine = "auto",
+        ranges: Any = None,
         **options: Any,
     ):
-        if render_mode is not None:
-            choice("render_mode", render_mode, MODES)
         self.render_mode = render_mode
         self.task = task_of(self.task_type, ranges, options, self)
-        self._episode = Episode(self.task, choice("engine", engine, ENGINES))
+        self._episodes = Episodes(self.task, One, engine)
         self.action_space = box_of(self.task.actions)
         self.observation_space = box_of(self.task.observations)
         self._shape = (len(self.task.actions),)
@@ -75,12 +73,12 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         fixed = fixed_by(self.task.ranges, options_of(options))
         super().reset(seed=seed_of("seed", seed))
         self._live = False
-        self._episode.reset(self.np_random, fixed)
+        self._episodes.reset([0], [self.np_random], [fixed])
         self._live = True
         if self.render_mode is not None:
-            self._shown_by().begin()
+            self._present_picture().begin()
             self._show()
-        return self._episode.observe(), dict(self._episode.truth)
+        return self._episodes.observe(), dict(self._episodes.truth)
 
     def step(
         self, action: NDArray[np.float32]
@@ -97,10 +95,10 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if not self._live:
             raise RuntimeError("reset the environment before its first step")
         numbers = action_of("action", action, self._shape)
-        observation, reward, ended, info = self._episode.step(numbers.tolist())
+        observation, reward, ended, info = self._episodes.step(numbers.tolist())
         if self.render_mode is not None:
             self._show()
-        return observation, reward, ended, False, self._episode.truth | info
+        return observation, reward, ended, False, self._episodes.truth | info
 
     def render(self) -> Any:
         """A picture of the scene from above, shape (h, w, 3), in mode "rgb_array"."""
@@ -109,45 +107,38 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             return None
         if not self._live:
             raise RuntimeError("reset the environment before it is drawn")
-        return self._drawn() if self.render_mode == "rgb_array" else None
+        return self._draw() if self.render_mode == "rgb_array" else None
 
     def __getstate__(self) -> dict[str, Any]:
         """What a copy or a pickle keeps: all but the picture, whose path starts anew in it."""
         return self.__dict__ | {"_picture": None}
 
-    def _drawn(self) -> Any:
-        now = self._episode
-        return self._shown_by().drawn(now.truth, now.memory, now.handle)
+    def _draw(self) -> Any:
+        now = self._episodes
+        return self._present_picture().draw(now.truth, now.memory, now.handle)
 
-    def _shown_by(self) -> Picture:
+    def _present_picture(self) -> Picture:
         """The picture; a new one at the first reset, after `close` and in a copy."""
         if self._picture is None:
             from .picture import Picture
 
             self._picture = Picture(self.task, self.render_mode == "human")
             if self._picture.unseen and not self._warned:
-                shown = "render_mode='human' shows nothing here"
-                gymnasium.logger.warn(
-                    f"{shown}: {self._picture.unseen}; 'rgb_array' needs no display"
-                )
+                fault = f"render_mode='human' shows nothing here: {self._picture.unseen}"
+                gymnasium.logger.warn(f"{fault}; 'rgb_array' needs no display")
                 self._warned = True
         return self._picture
 
     def _show(self) -> None:
-        picture = self._shown_by()
-        picture.note(self._episode.handle.p)
+        picture = self._present_picture()
+        picture.note(self._episodes.handle.p)
         if self.render_mode == "human" and not picture.unseen:
-            self._drawn()
+            self._draw()
 
     def close(self) -> None:
         """Ends the run and closes the window, if any."""
         if self._picture is not None:
             self._picture.close()
             self._picture = None
-        self._episode.close()
+        self._episodes.close()
         self._live = False
-
-
-def fps_of(task: type[Task]) -> int:
-    """Control periods per second of a task."""
-    return round(1.0 / (task.steps * DT))

@@ -10,9 +10,9 @@ import numpy as np
 from typing_extensions import override
 
 from . import lines
-from .columns import Value, bounded, negated, root, where
+from .columns import Value, clipped, negated, root, where
 from .draws import Truth
-from .quantities import Quantity, either_way
+from .quantities import Quantity, symmetric
 from .task import FORCE, Command, Handle, Judged, Memory, Task, saturated
 
 SPEED = 0.05  # [m/s] along the line
@@ -22,16 +22,16 @@ SLOW = 4.0  # the cost of a wrong speed saturates here, so that haste does not p
 SETTLING = 25  # first control periods, not counted for success
 
 PUSH = (
-    either_way("muscle force along the line", 1.0),
-    either_way("muscle force across the line, to the left", 1.0),
+    symmetric("muscle force along the line", 1.0),
+    symmetric("muscle force across the line, to the left", 1.0),
 )
 MOTION = (
-    either_way("velocity along the line", 100.0, "cm/s"),
-    either_way("velocity across the line", 100.0, "cm/s"),
-    either_way("force of the hand on the handle, along", 100.0, "N"),
-    either_way("force of the hand on the handle, across", 100.0, "N"),
-    either_way("last action, along", 1.0),
-    either_way("last action, across", 1.0),
+    symmetric("velocity along the line", 100.0, "cm/s"),
+    symmetric("velocity across the line", 100.0, "cm/s"),
+    symmetric("force of the hand on the handle, along", 100.0, "N"),
+    symmetric("force of the hand on the handle, across", 100.0, "N"),
+    symmetric("last action, along", 1.0),
+    symmetric("last action, across", 1.0),
     Quantity("remaining length of the line", 0.0, 20.0, "cm"),
     Quantity("gain of the device, share of the default", 0.0, 2.0),
 )
@@ -63,9 +63,8 @@ class Follow(Task):
         nodes = self.line(truth)
         pieces = lines.pieces_of(nodes)
         zero = dict.fromkeys(("errors", "speeds", "squares", "s", "count"), 0.0)
-        drawn = {name: truth.get(name, 1.0) for name in ("gain", "depth", "depth_at_end")}
         return {
-            **zero, **drawn, "nodes": nodes, "pieces": pieces, "length": lines.length_of(nodes),
+            **zero, **truth, "nodes": nodes, "pieces": pieces, "length": lines.length_of(nodes),
             "tangent": pieces[0][2:4], "action": (0.0, 0.0), "at": None,
         }  # fmt: skip
 
@@ -75,8 +74,8 @@ class Follow(Task):
         a, b = self.most * action[0], self.most * action[1]
         return Command((x * a - y * b, y * a + x * b))
 
-    def beside(self, m: Memory, h: Handle) -> lines.Place:
-        """Position of the handle along its line, as found by `judge`; computed after a reset."""
+    def place(self, m: Memory, h: Handle) -> lines.Place:
+        """Position of the handle along its line, from `judge`; computed after a reset."""
         if m["at"] is None:
             m["at"] = lines.place(m["pieces"], h.p, AHEAD)
         return m["at"]
@@ -85,8 +84,8 @@ class Follow(Task):
         """The observations listed in MOTION."""
         v, w = lines.along_across(at.tangent, h.v)
         f, g = lines.along_across(at.tangent, h.fh)
-        left = m["length"] - at.s
-        return 100.0 * v, 100.0 * w, f, g, *m["action"], 100.0 * left, m["gain"]
+        remaining = m["length"] - at.s
+        return 100.0 * v, 100.0 * w, f, g, *m["action"], 100.0 * remaining, m["gain"]
 
     @override
     def judge(self, m: Memory, h: Handle, action: tuple[Value, ...]) -> Judged:
@@ -102,20 +101,20 @@ class Follow(Task):
         done = negated(lost) & (at.s >= m["length"])
         reward = where(lost, LOST, reward + where(done, END, 0.0))
         m["s"], m["tangent"], m["action"] = at.s, at.tangent, action
-        self._count(m, abs(error), speed)
-        return Judged(reward, lost | done, self._told(m, done, lost))
+        self._add(m, abs(error), speed)
+        return Judged(reward, lost | done, self._info(m, done, lost))
 
-    def _count(self, m: Memory, error: Value, speed: Value) -> None:
+    def _add(self, m: Memory, error: Value, speed: Value) -> None:
+        """Adds error and speed to their sums, once the motion has settled."""
         m["count"] = m["count"] + 1.0
-        on = m["count"] > SETTLING
-        m["errors"] = m["errors"] + where(on, error, 0.0)
-        m["speeds"] = m["speeds"] + where(on, speed, 0.0)
-        m["squares"] = m["squares"] + where(on, speed * speed, 0.0)
+        settled = m["count"] > SETTLING
+        for name, x in (("errors", error), ("speeds", speed), ("squares", speed * speed)):
+            m[name] = m[name] + where(settled, x, 0.0)
 
-    def _told(self, m: Memory, done: Value, lost: Value) -> Memory:
-        n = bounded(m["count"] - SETTLING, 1.0, math.inf)
+    def _info(self, m: Memory, done: Value, lost: Value) -> Memory:
+        n = clipped(m["count"] - SETTLING, 1.0, math.inf)
         error, mean = m["errors"] / n, m["speeds"] / n
-        spread = root(bounded(m["squares"] / n - mean * mean, 0.0, math.inf)) / SPEED
+        spread = root(clipped(m["squares"] / n - mean * mean, 0.0, math.inf)) / SPEED
         success = done & (error < 0.5) & (spread < 0.2)
         return {
             "progress": m["s"] / m["length"], "mean_error": error, "speed_spread": spread,

@@ -6,11 +6,12 @@ Positions are numbers or columns, see `columns`.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from .columns import Pair, Value, bounded, root, where
+from .columns import Pair, Value, clipped, root, where
 
 PIECES = 24  # pieces of an arc
 
@@ -22,8 +23,8 @@ class Place(NamedTuple):
         s: arc length of the nearest point of the line [m].
         across: distance from the line, positive to its left [m].
         distance: distance from the nearest point [m].
-        tangent: direction of the line there, (x, y).
-        ahead: direction of the line further on, (x, y).
+        tangent: unit vector along the line there.
+        ahead: unit vector along the line further on.
     """
 
     s: Value
@@ -57,16 +58,15 @@ def arc(length: float) -> list[tuple[float, float]]:
 SHAPES = {"straight": straight, "arc": arc, "corner": corner}
 
 
-def turned(nodes: list[tuple[float, float]], angle: float) -> np.ndarray:
+def rotated(nodes: list[tuple[float, float]], angle: float) -> np.ndarray:
     """A line rotated about its start, shape (number of nodes, 2) [m]."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([(c * x - s * y, s * x + c * y) for x, y in nodes])
 
 
 def pieces_of(nodes: np.ndarray) -> tuple[tuple[float, ...], ...]:
-    """The pieces of a line: x and y of its begin [m], of its direction, length and start [m]."""
-    d = np.diff(nodes, axis=0)
-    lengths = np.sqrt(d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1])
+    """The pieces of a line: x and y of the begin, unit vector, length and arc length there [m]."""
+    d, lengths = _steps(nodes)
     starts = np.cumsum(lengths) - lengths
     rows = np.column_stack((nodes[:-1], d / lengths[:, None], lengths, starts))
     return tuple(map(tuple, rows.tolist()))
@@ -74,37 +74,40 @@ def pieces_of(nodes: np.ndarray) -> tuple[tuple[float, ...], ...]:
 
 def length_of(nodes: np.ndarray) -> float:
     """Length of a line [m]."""
+    return float(np.cumsum(_steps(nodes)[1])[-1])
+
+
+def _steps(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """From each node to the next: differences, shape (n, 2), and distances, shape (n,) [m]."""
     d = np.diff(nodes, axis=0)
-    return float(np.cumsum(np.sqrt(d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1]))[-1])
+    return d, np.sqrt(d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1])
 
 
 def place(pieces: tuple[tuple[Value, ...], ...], p: Pair, ahead: float) -> Place:
     """Position of a handle relative to its line."""
-    square, s, across, tx, ty = beside(pieces[0], p)
+    nearest = _from_piece(pieces[0], p)
     for piece in pieces[1:]:
-        found = beside(piece, p)
-        near = found[0] < square
-        square, s, across = (
-            where(near, x, y) for x, y in zip(found[:3], (square, s, across), strict=True)
-        )
-        tx, ty = where(near, found[3], tx), where(near, found[4], ty)
-    _, _, ux, uy, _, _ = pieces[0]
+        found = _from_piece(piece, p)
+        nearer = found[0] < nearest[0]
+        nearest = [where(nearer, x, y) for x, y in zip(found, nearest, strict=True)]
+    square, s, across, tx, ty = nearest
+    ux, uy = pieces[0][2:4]
     for piece in pieces[1:]:
-        on = piece[5] <= s + ahead
-        ux, uy = where(on, piece[2], ux), where(on, piece[3], uy)
+        begun = piece[5] <= s + ahead
+        ux, uy = where(begun, piece[2], ux), where(begun, piece[3], uy)
     return Place(s, across, root(square), (tx, ty), (ux, uy))
 
 
-def beside(piece: tuple[Value, ...], p: Pair) -> tuple[Value, ...]:
-    """Squared distance from a piece, arc length, distance to its left, and its direction."""
+def _from_piece(piece: tuple[Value, ...], p: Pair) -> Sequence[Value]:
+    """Squared distance from a piece, arc length, distance to its left, and its unit vector."""
     x, y, tx, ty, length, start = piece
     dx, dy = p[0] - x, p[1] - y
-    along = bounded(dx * tx + dy * ty, 0.0, length)
+    along = clipped(dx * tx + dy * ty, 0.0, length)
     ox, oy = dx - along * tx, dy - along * ty
     return ox * ox + oy * oy, start + along, tx * dy - ty * dx, tx, ty
 
 
-def along_across(tangent: Pair, x: Pair) -> Pair:
-    """Components of a vector along and across a line."""
-    (a, b), (u, v) = tangent, x
+def along_across(tangent: Pair, vector: Pair) -> Pair:
+    """Components of a vector along a line and to its left."""
+    (a, b), (u, v) = tangent, vector
     return a * u + b * v, a * v - b * u

@@ -13,12 +13,12 @@ from ..model.groove import Groove
 from ..model.tool import Tool
 from ..scene.scenario import Scenario
 from . import lines
-from .columns import Value, bounded
+from .columns import Value, clipped
 from .cut_line import GAIN_SHARE
 from .draws import HAND, Range, Truth
 from .environment import TaskEnv
 from .follow import AHEAD, MOTION, Follow
-from .quantities import Quantity, either_way
+from .quantities import Quantity, symmetric
 from .task import Handle, Memory, scene_of
 from .vector import TaskVectorEnv
 
@@ -52,7 +52,7 @@ class PareEdgeTask(Follow):
     def observations(self) -> tuple[Quantity, ...]:
         """Quantities of an observation."""
         return (
-            either_way("depth of the tool's edge below that of the block", 20.0, "mm"),
+            symmetric("depth of the tool's edge below that of the block", 20.0, "mm"),
             Quantity("target depth", 0.0, 10.0, "mm"),
             Quantity("target depth 5 mm ahead", 0.0, 10.0, "mm"),
             *MOTION,
@@ -80,7 +80,7 @@ class PareEdgeTask(Follow):
         step = m["depth_at_end"] - m["depth"]
 
         def target(s: Value) -> Value:
-            return m["depth"] + step * bounded((s - APPROACH) / along, 0.0, 1.0)
+            return m["depth"] + step * clipped((s - APPROACH) / along, 0.0, 1.0)
 
         here = target(at.s)
         return here - at.across, here, target(at.s + AHEAD)
@@ -92,7 +92,7 @@ class PareEdgeTask(Follow):
 
     @override
     def observe(self, m: Memory, h: Handle) -> tuple[Value, ...]:
-        at = self.beside(m, h)
+        at = self.place(m, h)
         depth, target, ahead = self.depths(m, at)
         return 1000.0 * depth, 1000.0 * target, 1000.0 * ahead, *self.motion(m, h, at)
 

@@ -17,14 +17,10 @@ PATH = 2000  # points of the path to keep
 
 
 class Picture:
-    """A picture of one copy, with the path of its handle.
-
-    Args:
-        task: the task.
-        window: whether to show it in a window.
+    """A picture of one copy, in a window or as an array, with the path of its handle.
 
     Attributes:
-        unseen: why there is no window although one was asked for; "" otherwise.
+        unseen: why there is no window although one was asked for, else "".
     """
 
     def __init__(self, task: Task, window: bool):
@@ -43,7 +39,7 @@ class Picture:
             self._path.append(point)
         del self._path[:-PATH]
 
-    def drawn(self, truth: Truth, m: Memory, h: Handle) -> np.ndarray | None:
+    def draw(self, truth: Truth, m: Memory, h: Handle) -> np.ndarray | None:
         """The present picture, shape (height, width, 3), uint8; None if a window shows it."""
         x, y = map(float, h.p)
         scenario, nodes = self._task.scenario(truth), m.get("nodes")
@@ -54,8 +50,8 @@ class Picture:
         return self._plan.draw(plan)
 
     def _title(self, m: Memory, h: Handle) -> str:
-        told = f"{100.0 * math.hypot(*h.v):.1f} cm/s"
-        return f"K = {m['K']:.2f} 1/kg, {told}" if "K" in m else told
+        speed = f"{100.0 * math.hypot(*h.v):.1f} cm/s"
+        return f"K = {m['K']:.2f} 1/kg, {speed}" if "K" in m else speed
 
     def close(self) -> None:
         """Closes the window, if any."""

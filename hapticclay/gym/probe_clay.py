@@ -12,10 +12,10 @@ from typing_extensions import override
 from ..model.clay import slab
 from ..model.flow import Flow
 from ..scene.scenario import Scenario
-from .columns import Value, mapped, where
+from .columns import Value, each, where
 from .draws import HAND, Range, Truth
 from .environment import TaskEnv
-from .quantities import Quantity, either_way
+from .quantities import Quantity, symmetric
 from .task import DT, FORCE, Command, Handle, Judged, Memory, Task, scene_of
 from .vector import TaskVectorEnv
 
@@ -30,10 +30,10 @@ class ProbeClayTask(Task):
     limit: ClassVar[int] = 150
     share: ClassVar[float] = 0.5
     actions: ClassVar[tuple[Quantity, ...]] = (
-        either_way("muscle force along x / 30 N", 1.0),
-        either_way("muscle force along y / 30 N", 1.0),
-        either_way("answer: log10(b / 50 N.s/m) / 0.8, counts at the end", 1.0),
-        either_way("answer: log10(Fy / 1.5 N) / 0.8, counts at the end", 1.0),
+        symmetric("muscle force along x / 30 N", 1.0),
+        symmetric("muscle force along y / 30 N", 1.0),
+        symmetric("answer: log10(b / 50 N.s/m) / 0.8, counts at the end", 1.0),
+        symmetric("answer: log10(Fy / 1.5 N) / 0.8, counts at the end", 1.0),
     )
     drawn: ClassVar[dict[str, Range]] = {
         **HAND,
@@ -45,14 +45,14 @@ class ProbeClayTask(Task):
     def observations(self) -> tuple[Quantity, ...]:
         """Quantities of an observation."""
         return (
-            either_way("position x", 200.0, "mm"),
-            either_way("position y", 200.0, "mm"),
-            either_way("velocity x", 100.0, "cm/s"),
-            either_way("velocity y", 100.0, "cm/s"),
-            either_way("force of the hand on the handle, x", 100.0, "N"),
-            either_way("force of the hand on the handle, y", 100.0, "N"),
-            either_way("last action, x", 1.0),
-            either_way("last action, y", 1.0),
+            symmetric("position x", 200.0, "mm"),
+            symmetric("position y", 200.0, "mm"),
+            symmetric("velocity x", 100.0, "cm/s"),
+            symmetric("velocity y", 100.0, "cm/s"),
+            symmetric("force of the hand on the handle, x", 100.0, "N"),
+            symmetric("force of the hand on the handle, y", 100.0, "N"),
+            symmetric("last action, x", 1.0),
+            symmetric("last action, y", 1.0),
             Quantity("time left", 0.0, self.limit * self.steps * DT, "s"),
         )
 
@@ -99,7 +99,7 @@ def answer_of(b: float, Fy: float) -> tuple[float, float]:
 def _error(answer: Value, truth: Value, middle: float) -> Value:
     """|ln(answer/truth)|."""
     named = DECADES * math.log(10.0) * answer
-    return abs(named - mapped(math.log, truth / middle))
+    return abs(named - each(math.log, truth / middle))
 
 
 class ProbeClay(TaskEnv):

@@ -13,9 +13,6 @@ class Quantity(NamedTuple):
     """One number of an action or an observation.
 
     Attributes:
-        name: what it is.
-        low: smallest value.
-        high: largest value.
         unit: its unit; "" for none.
     """
 
@@ -25,13 +22,13 @@ class Quantity(NamedTuple):
     unit: str = ""
 
 
-def either_way(name: str, most: float, unit: str = "") -> Quantity:
+def symmetric(name: str, most: float, unit: str = "") -> Quantity:
     """A quantity with symmetric bounds."""
     return Quantity(name, -most, most, unit)
 
 
 def box_of(quantities: Sequence[Quantity]) -> Box:
-    """The space of quantities, shape (n,), float32."""
+    """The space of quantities, float32."""
     low = np.array([q.low for q in quantities], np.float32)
     high = np.array([q.high for q in quantities], np.float32)
     return Box(low, high, dtype=np.float32)

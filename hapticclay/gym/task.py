@@ -6,7 +6,7 @@ The functions of a task work on the numbers of one copy, or on columns with one 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
@@ -16,14 +16,11 @@ from ..model.constants import GAIN, TORQUE_LIMIT
 from ..model.operator import Operator
 from ..scene.scenario import Scenario
 from .columns import Pair, Value, negated
-from .draws import Range, Truth, with_ranges
+from .draws import HAND, Range, Truth, with_ranges
 from .quantities import Quantity
 
 DT = 3.5714286e-4  # [s] 56 steps are 20 ms, and a step is at most the paper's 0.36 ms
 FORCE = 30.0  # [N] muscle force at an action of 1
-HELD = (
-    0.25  # share of a period with a torque, for it to count; after a jump of the force it is less
-)
 SPEED_LIMIT = 20.0  # [m/s] beyond which a run counts as unstable
 Memory = dict[str, Any]  # values, tables, or tuples of them, by name: of one copy, or columns
 
@@ -78,7 +75,6 @@ class Task:
 
     Attributes:
         given: ends (low, high) of ranges other than the task's own, by name; None for none.
-        period: control period [s].
         steps: engine steps per control period.
         limit: control periods after which an episode is truncated.
         strain: share of the torque limit beyond which a run counts as unstable.
@@ -90,7 +86,7 @@ class Task:
         ranges: these ranges with the given ends.
     """
 
-    given: Mapping[str, Any] | None = None
+    given: Any = None
     ranges: dict[str, Range] = field(init=False)
     steps: ClassVar[int] = 56
     limit: ClassVar[int] = 500
@@ -108,7 +104,7 @@ class Task:
         return self.steps * DT
 
     @property
-    def held(self) -> int:
+    def strained_samples(self) -> int:
         """Samples of a control period in which a torque must be reached to count."""
         return round(self.share * self.steps)
 
@@ -126,7 +122,7 @@ class Task:
         raise NotImplementedError
 
     def command(self, m: Memory, action: tuple[Value, ...]) -> Command:
-        """Command of an action for a control period."""
+        """Command of an action, whose numbers lie from -1 to 1."""
         raise NotImplementedError
 
     def observe(self, m: Memory, h: Handle) -> tuple[Value, ...]:
@@ -134,25 +130,25 @@ class Task:
         raise NotImplementedError
 
     def judge(self, m: Memory, h: Handle, action: tuple[Value, ...]) -> Judged:
-        """Reward of a control period."""
+        """Reward of a control period; updates the memory."""
         raise NotImplementedError
 
-    def handle(self, sample: Sequence[Pair], held: Sequence[Value], over: Value) -> Handle:
-        """The handle in a sample.
+    def handle(self, sample: Sequence[Pair], torques: Sequence[Value], over: Value) -> Handle:
+        """The handle in a sample, with the torques reached in `strained_samples`.
 
         A run counts as diverged if it is over (for example out of reach), if it is faster than
         SPEED_LIMIT, or if a motor needed a torque that no stable run of the task needs.
         """
         p, v, fh, fe = sample
         shoulder, elbow = TORQUE_LIMIT
-        calm = (held[0] < self.strain * shoulder) & (held[1] < self.strain * elbow)
+        calm = (torques[0] < self.strain * shoulder) & (torques[1] < self.strain * elbow)
         slow = v[0] * v[0] + v[1] * v[1] <= SPEED_LIMIT * SPEED_LIMIT
         return Handle(p, v, fh, fe, over | negated(calm & slow))
 
 
 def hand_of(truth: Truth) -> Operator:
     """The hand of an episode."""
-    return Operator(truth["mass"], truth["damper"], truth["spring"])
+    return Operator(*(truth[name] for name in HAND))
 
 
 def scene_of(truth: Truth, **parts: Any) -> Scenario:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import gymnasium
 import numpy as np
@@ -11,11 +11,11 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from ..errors import ParameterError, choice, integer
-from ..simulation.engines import ENGINES
+from ..arguments import checked
+from ..errors import Bound, ParameterError, choice, integer
 from .draws import Truth, fixed_by
-from .environment import FPS, MODES
-from .episodes import Episodes
+from .environment import FPS, MODES, Engine
+from .episodes import Episodes, Many, Period
 from .inputs import action_of, options_of, seeds_of, task_of
 from .quantities import box_of
 from .task import Memory, Task
@@ -42,32 +42,30 @@ class TaskVectorEnv(VectorEnv):
 
     task_type: ClassVar[type[Task]]
 
+    @checked
     def __init__(
         self,
-        num_envs: int = 1,
-        max_episode_steps: int | None = None,
+        num_envs: Annotated[int, Bound(1, MOST_COPIES)] = 1,
+        max_episode_steps: Annotated[int | None, Bound(1, 1_000_000_000)] = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        render_mode: str | None = None,
-        engine: str = "auto",
-        ranges: Mapping[str, Any] | None = None,
+        render_mode: Literal["rgb_array"] | None = None,
+        engine: Engine = "auto",
+        ranges: Any = None,
         **options: Any,
     ):
-        self.num_envs = integer("num_envs", num_envs, 1, MOST_COPIES)
+        self.num_envs = num_envs
         self.autoreset_mode = mode_of(autoreset_mode)
         self.metadata = {
             "render_modes": MODES[1:], "render_fps": FPS, "autoreset_mode": self.autoreset_mode,
         }  # fmt: skip
-        if render_mode is not None:
-            choice("render_mode", render_mode, MODES[1:])
         self.render_mode = render_mode
         self.task = task_of(self.task_type, ranges, options, self)
-        most = self.task.limit if max_episode_steps is None else max_episode_steps
-        self._most = integer("max_episode_steps", most, 1, 1_000_000_000)
+        self._most = self.task.limit if max_episode_steps is None else max_episode_steps
         self.single_action_space = box_of(self.task.actions)
         self.single_observation_space = box_of(self.task.observations)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self._episodes = Episodes(self.task, self.num_envs, choice("engine", engine, ENGINES))
+        self._episodes = Episodes(self.task, Many, engine)
         self._generators: list[np.random.Generator] = []
         self._seeds: list[int] = []
         self._count = np.zeros(self.num_envs, np.int64)
@@ -111,7 +109,12 @@ class TaskVectorEnv(VectorEnv):
         fixed, mask = self._options(options)
         seeds = seeds_of(seed, self.num_envs)
         self.closed = False
-        self._seed(seeds, mask)
+        if not self._generators:
+            pairs = [seeding.np_random() for _ in range(self.num_envs)]
+            self._generators, self._seeds = map(list, zip(*pairs, strict=True))
+        for i in np.flatnonzero(mask).tolist():
+            if seeds[i] is not None:
+                self._generators[i], self._seeds[i] = seeding.np_random(seeds[i])
         self._begin(mask, fixed)
         return self._episodes.observe(), _masked(self._episodes.truth, mask)
 
@@ -128,6 +131,7 @@ class TaskVectorEnv(VectorEnv):
         return [fixed_by(self.task.ranges, common)] * n, mask
 
     def _mask(self, given: Any) -> np.ndarray:
+        """Which copies to reset, from the option "reset_mask"."""
         n = self.num_envs
         if given is None:
             return np.ones(n, bool)
@@ -142,15 +146,8 @@ class TaskVectorEnv(VectorEnv):
             raise ParameterError("reset_mask", given, "must be True for all at the first reset")
         return mask
 
-    def _seed(self, seeds: Sequence[int | None], mask: np.ndarray) -> None:
-        if not self._generators:
-            made = [seeding.np_random() for _ in range(self.num_envs)]
-            self._generators, self._seeds = [x[0] for x in made], [x[1] for x in made]
-        for i in np.flatnonzero(mask).tolist():
-            if seeds[i] is not None:
-                self._generators[i], self._seeds[i] = seeding.np_random(seeds[i])
-
     def _begin(self, mask: np.ndarray, fixed: Sequence[Truth] | None = None) -> None:
+        """Starts the episodes of some copies."""
         which = np.flatnonzero(mask).tolist()
         self._over[mask] = True  # and stays so where the values drawn are refused
         given = [{} if fixed is None else fixed[i] for i in which]
@@ -178,44 +175,31 @@ class TaskVectorEnv(VectorEnv):
             raise RuntimeError("reset the environments before their first step")
         if self.autoreset_mode is AutoresetMode.DISABLED and not live.all():
             raise RuntimeError("an episode is over: reset its copy before the next step")
-        found = self._episodes.step(numbers, live)
+        found = self._episodes.step(numbers.T, live)
         self._count += live
         ended = found.ended & live
         cut_off = (self._count >= self._most) & live
-        rewards = np.where(live, found.reward, 0.0)
-        if not live.all():  # with NEXT_STEP: the episode ended before this step
-            self._begin(~live)
         self._over = ended | cut_off
-        infos = self._infos(found.info, live)
-        observations = found.observation if live.all() else self._episodes.observe()
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
-            observations = self._next_episodes(found.observation, infos)
-        return observations, rewards, ended, cut_off, infos
-
-    def _infos(self, info: Memory, live: np.ndarray) -> dict[str, Any]:
+        again, final = ~live, {}  # with NEXT_STEP: the episode ended before this step
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            again = self._over.copy()
+            final = self._final(found, again) if again.any() else {}
+        observations = found.observation
+        if again.any():
+            self._begin(again)
+            observations = self._episodes.observe()
         everywhere = np.ones(self.num_envs, bool)
-        return _masked(self._episodes.truth, everywhere) | _masked(info, live)
+        infos = _masked(self._episodes.truth, everywhere) | _masked(found.info, live & ~again)
+        return observations, np.where(live, found.reward, 0.0), ended, cut_off, infos | final
 
-    def _next_episodes(self, last: np.ndarray, infos: dict[str, Any]) -> np.ndarray:
-        """Starts the next episode where one is over; its final values go into infos."""
-        over = self._over.copy()
-        final = np.full(self.num_envs, None, object)
+    def _final(self, found: Period, over: np.ndarray) -> dict[str, Any]:
+        """Observations and infos of the episodes that are over, as Gymnasium hands them out."""
+        last = np.full(self.num_envs, None, object)
         for i in np.flatnonzero(over).tolist():
-            final[i] = last[i].copy()
-        final_info = {
-            name: np.where(over, x, np.zeros_like(x))
-            for name, x in infos.items()
-            if not name.startswith("_")
-        }
-        final_info |= {f"_{name}": over.copy() for name in list(final_info)}
-        infos |= {"final_obs": final, "_final_obs": over, "final_info": final_info}
-        infos["_final_info"] = over.copy()
-        for name in [x for x in infos if not x.startswith("_") and x not in self.task.ranges]:
-            if not name.startswith("final"):
-                infos[f"_{name}"] = infos[f"_{name}"] & ~over
-        self._begin(over)
-        infos |= {name: x.copy() for name, x in self._episodes.truth.items()}
-        return self._episodes.observe()
+            last[i] = found.observation[i].copy()
+        info = _masked(self._episodes.truth | found.info, over)
+        final = {"final_obs": last, "final_info": info}
+        return final | {f"_{name}": over.copy() for name in final}
 
     def render(self) -> tuple[Any, ...] | None:
         """A picture of each copy from above, in mode "rgb_array"."""
@@ -232,7 +216,7 @@ class TaskVectorEnv(VectorEnv):
         for i, picture in enumerate(self._pictures):
             truth, memory, handle = self._episodes.copy(i)
             picture.note(handle.p)
-            frames.append(picture.drawn(truth, memory, handle))
+            frames.append(picture.draw(truth, memory, handle))
         return tuple(frames)
 
     def info_of(self, i: int) -> dict[str, Any]:
@@ -255,8 +239,8 @@ class TaskVectorEnv(VectorEnv):
         Raises:
             TypeError: always.
         """
-        told = "cannot be copied or pickled: make another with the same arguments"
-        raise TypeError(f"{type(self).__name__} {told}, or take single environments")
+        remedy = "make another with the same arguments, or take single environments"
+        raise TypeError(f"{type(self).__name__} cannot be copied or pickled: {remedy}")
 
     def close_extras(self, **_: Any) -> None:
         """Ends the runs."""

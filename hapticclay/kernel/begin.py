@@ -15,7 +15,7 @@ def begin(m, s, px, py, vx, vy):
     u[0], u[1], u[2], u[3] = arm_law.jacobian(s.q1, s.q2, m.links)
     r1, r2 = arm_law.joint_velocity(vx, vy, u, 1.0)
     s.w1, s.w2 = r1, r2 - r1
-    s.fine = s.resolved = s.mode_step = math.inf
+    s.max_step = s.spring_step = s.mode_step = math.inf
     s.form_before = s.form_after = -1.0
     arm.put(m, s)
     for i in range(2):
@@ -83,17 +83,17 @@ def fill_angles(m, s):
 def change(m, s):
     """Continues in a changed scene with the same borders."""
     px, py = arm.place(m, s.q1, s.q2)
-    drag, s.drag, s.lost, s.stored = s.drag, 0.0, 0.0, 0.0
+    drag, entered, s.drag = s.drag, s.entered, 0.0
+    s.springs_dissipated = s.springs_stored = 0.0
     for i in range(2):
         z, o = s.axis[i], s.k.axis[i]
-        o.b0, o.b1, o.p = z.old, z.old_rate, z.bare  # what stays
+        o.b0, o.b1, o.p = z.old, z.old_rate, z.bare  # these stay
         z.force = 0.0
-    struck = s.struck
     borders.enter(m, s, s.x.index, s.y.index, px, py, -1, 0.0)
-    s.drag, s.struck = drag, struck
+    s.drag, s.entered = drag, entered
     for i in range(2):
         z, o = s.axis[i], s.k.axis[i]
         z.old, z.old_rate, z.bare = o.b0, o.b1, o.p
     if m.groove:
-        groove.meet(m, px, py)
+        groove.touch(m, px, py)
     arm.put(m, s)

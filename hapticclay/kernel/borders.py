@@ -16,13 +16,13 @@ def place_of(s, i, up):
     return s.axis[i].high if up > 0 else s.axis[i].low
 
 
-def is_same_beyond(m, s, i, up):
+def is_identical_beyond(m, s, i, up):
     """Whether the clay beyond a border of the region is the same."""
     return regions.is_alike(m.table, s.x.index, s.y.index, i, up)
 
 
-def stood_on(s, herex, herey, sx, sy):
-    """The border on or beyond which the handle is, of those on the sides: coordinate, side."""
+def border_at_handle(s, herex, herey, sx, sy):
+    """Which border the handle is on or beyond: its coordinate and side; side 0 for none."""
     if sx != 0 and side(s.x, herex) != 0:
         return 0, sx
     if sy != 0 and side(s.y, herey) != 0:
@@ -33,8 +33,8 @@ def stood_on(s, herex, herey, sx, sy):
 # ---- into another region -------------------------------------------------------------------------
 
 
-def enter(m, s, ix, iy, px, py, crossed, struck):
-    """Puts the handle into a region."""
+def enter(m, s, ix, iy, px, py, crossed, entered):
+    """Puts the handle into a region; `entered`: 1.0 if a hit may begin."""
     low, high, b, rate = regions.enter_region(m.table, ix, iy, s.t)
     x, y = s.x, s.y
     x.index, y.index = ix, iy
@@ -43,13 +43,13 @@ def enter(m, s, ix, iy, px, py, crossed, struck):
     x.b, y.b = b
     x.b_rate, y.b_rate = rate
     if m.hits:
-        s.struck = max(s.struck, struck)
+        s.entered = max(s.entered, entered)
     if m.special:
         laws.enter(m, s, px, py, crossed)
 
 
-def move_on(m, s, px, py, i, up, struck):
-    """Into the region beyond a border of coordinate i."""
+def enter_beyond(m, s, px, py, i, up, entered):
+    """Enters the region beyond a border of coordinate i."""
     ix, iy, j, seen = s.x.index, s.y.index, 2 * i, s.seen
     if i:
         iy += up
@@ -57,19 +57,19 @@ def move_on(m, s, px, py, i, up, struck):
         ix += up
     at = iy if i else ix
     if seen[j] <= at and at <= seen[j + 1]:
-        s.landings += 1
+        s.returns += 1
     seen[j], seen[j + 1] = min(seen[j], at), max(seen[j + 1], at)
-    enter(m, s, ix, iy, px, py, i, struck)
+    enter(m, s, ix, iy, px, py, i, entered)
 
 
-def pass_alike(m, s, herex, herey, px, py):
-    """Into the last region before different clay, on the way to a place."""
+def skip_identical_regions(m, s, herex, herey, px, py):
+    """Enters the last region before different clay, on the way to a place."""
     while True:
         sx, sy = side(s.x, px), side(s.y, py)
         i, up = (1, sy) if sx == 0 else (0, sx)
-        if (sx == 0) == (sy == 0) or not is_same_beyond(m, s, i, up):
+        if (sx == 0) == (sy == 0) or not is_identical_beyond(m, s, i, up):
             return
-        move_on(m, s, herex, herey, i, up, 0.0)
+        enter_beyond(m, s, herex, herey, i, up, 0.0)
 
 
 # ---- the step that ends on a border --------------------------------------------------------------

@@ -6,10 +6,10 @@ from . cimport methods
 from . cimport modes
 from . cimport search
 
-cdef void put(State s, double endx, double endy) noexcept nogil
+cdef void put_ends(State s, double endx, double endy) noexcept nogil
 cdef bint leaves_mode(Model m, State s, double vx, double vy) noexcept nogil
 @cython.locals(strays=cython.bint)
-cdef (double, bint) meet(Model m, State s, double after) noexcept nogil
+cdef (double, bint) shorten_to_end(Model m, State s, double after) noexcept nogil
 cdef double end_of_mode(Model m, State s, Grip grip, long i) noexcept nogil
 cdef bint may_end(Model m, State s, double v, long i) noexcept nogil
 cdef bint is_calm(Model m, State s, double after) noexcept nogil

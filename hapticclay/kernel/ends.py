@@ -5,7 +5,7 @@ import math
 from . import march, methods, modes, search
 
 
-def put(s, endx, endy):
+def put_ends(s, endx, endy):
     """Puts what ends the step."""
     s.mode[0].ends, s.mode[1].ends = endx, endy
 
@@ -22,7 +22,7 @@ def leaves_mode(m, s, vx, vy):
     return modes.TURN * speed > 2.0 * modes.TURNING * m.dt * turns
 
 
-def meet(m, s, after):
+def shorten_to_end(m, s, after):
     """Shortens the step tried to where a mode first ends, as detected at its end."""
     x, y, shortest = s.mode[0], s.mode[1], modes.shortest_step(m, s)
     if x.ends != 0.0 or y.ends != 0.0:
@@ -35,7 +35,7 @@ def meet(m, s, after):
     watchx, watchy = may_end(m, s, vx, 0), may_end(m, s, vy, 1)
     if not (watchx or watchy):
         return after, False
-    march.feel_behind(m, s, after)
+    march.evaluate_end(m, s, after)
     grip, span, endx, endy = s.a.now.grip, math.inf, 0.0, 0.0
     gapx = modes.gap(m, s, grip, 0) if watchx else 0.0
     gapy = modes.gap(m, s, grip, 1) if watchy else 0.0
@@ -49,7 +49,7 @@ def meet(m, s, after):
             span, endx, endy = h, 0.0, freey
     if span == math.inf:
         return after, False
-    put(s, endx, endy)
+    put_ends(s, endx, endy)
     return min(max(span, shortest), after), True
 
 
@@ -78,7 +78,7 @@ def is_calm(m, s, after):
     z, x, y = s.a.end, s.x, s.y
     if not march.is_finite(z):
         return False
-    px, py = methods.place_behind(m, s, after)
+    px, py = methods.place_after(m, s, after)
     touch = march.TOUCH
     if not (x.low - touch <= px and px <= x.high + touch):
         return False

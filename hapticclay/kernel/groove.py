@@ -48,6 +48,6 @@ def laws_along(m, x, y):
     return Fy, 0.0, 1.0, Fy, 0.0, 1.0
 
 
-def meet(m, px, py):
+def touch(m, px, py):
     """Finds what touches the tool at rest, in clay whose numbers have changed."""
     cut(m, math.nan, math.nan, px, py)

@@ -3,7 +3,7 @@
 
 def load(m, k):
     """Adds it to the load of a kick."""
-    if m.longer or not (k.before > 0.0 and k.after > 0.0):
+    if m.spring_uses_longer_step or not (k.before > 0.0 and k.after > 0.0):
         h = max(k.before, k.after)  # at the start and the end the kick is half of one
     else:
         h = k.H

@@ -16,8 +16,8 @@ cdef void drive(Model m, State s, double t1, double t2) noexcept nogil
 cdef (double, double) couple(Model m, State s, Kick k, double bx, double by) noexcept nogil
 cdef double guarded(Model m, State s, Kick k, long i, double f) noexcept nogil
 cdef void note_force(Model m, State s) noexcept nogil
-cdef void queue(Model m, State s, double now) noexcept nogil
+cdef void advance_queue(Model m, State s, double now) noexcept nogil
 cdef void hold(Machine machine, double *of, long long j) noexcept nogil
-cdef void ask(State s) noexcept nogil
-cdef double entry(Model m, long long first, long long n, long i, long long waits, double time) noexcept nogil
-cdef void note_hold(Model m, State s) noexcept nogil
+cdef void note_request(State s) noexcept nogil
+cdef double due_time(Model m, long long first, long long n, long i, long long waits, double time) noexcept nogil
+cdef void enqueue(Model m, State s) noexcept nogil

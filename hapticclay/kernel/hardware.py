@@ -118,20 +118,20 @@ def guarded(m, s, k, i, f):
 def note_force(m, s):
     """Stores the force that a sample requests."""
     row = 2 * s.next.newest
-    m.forces[row], m.forces[row + 1] = s.asked[2], s.asked[3]
+    m.forces[row], m.forces[row + 1] = s.requested[2], s.requested[3]
 
 
 # ---- delay ---------------------------------------------------------------------------------------
 
 
-def queue(m, s, now):
+def advance_queue(m, s, now):
     """Advances the queue of torques, and holds those that are due."""
     ring, q, after = m.queue, s.now, s.next
     time, n = q.when + m.delay, 0
     while n < q.n and ring[QUEUED * ((q.first + n) % m.queue_rows)] <= now:
         n += 1
-    waits = s.shown
-    if n == q.n and s.shown and time <= now:
+    waits = s.responded
+    if n == q.n and s.responded and time <= now:
         waits = 0
     elif n > 0:
         hold(after, ring, QUEUED * ((q.first + n - 1) % m.queue_rows) + 1)
@@ -141,8 +141,8 @@ def queue(m, s, now):
             to.tau, to.force, to.guard = z.tau, z.force, z.guard
             to.pull, to.pull_rate = z.pull, z.pull_rate
     after.first, left = q.first + n, q.n - n
-    after.due = entry(m, after.first, left, 0, waits, time)
-    after.due_then = entry(m, after.first, left, 1, waits, time)
+    after.due = due_time(m, after.first, left, 0, waits, time)
+    after.due_then = due_time(m, after.first, left, 1, waits, time)
     after.n = left + 1 if waits else left
 
 
@@ -154,27 +154,27 @@ def hold(machine, of, j):
         to.pull, to.pull_rate = of[j + 6 + i], of[j + 8 + i]
 
 
-def ask(s):
+def note_request(s):
     """Notes the output that a sample requests."""
     for i in range(2):
-        z, to = s.next.axis[i], s.asked
+        z, to = s.next.axis[i], s.requested
         to[i], to[2 + i], to[4 + i], to[6 + i], to[8 + i] = (
             z.tau, z.force, z.guard, z.pull, z.pull_rate
         )  # fmt: skip
 
 
-def entry(m, first, n, i, waits, time):
-    """When the i-th of n entries is due, with one behind them where one waits [s]."""
+def due_time(m, first, n, i, waits, time):
+    """When the i-th of n entries is due [s]; after them, the one that waits, if any."""
     if i < n:
         return m.queue[QUEUED * ((first + i) % m.queue_rows)]
     return time if i == n and waits else math.inf
 
 
-def note_hold(m, s):
+def enqueue(m, s):
     """Writes the output that a sample requests into the queue, where it comes later."""
     end = s.next.first + s.next.n
     if end != s.now.first + s.now.n:
         ring, j = m.queue, QUEUED * ((end - 1) % m.queue_rows)
         ring[j] = s.now.when + m.delay
         for i in range(QUEUED - 1):
-            ring[j + 1 + i] = s.asked[i]
+            ring[j + 1 + i] = s.requested[i]

@@ -9,6 +9,6 @@ from . cimport viscous
 cdef double GROWTH
 
 @cython.locals(halved=cython.bint)
-cdef double strike(Model m, State s, double after) noexcept nogil
+cdef double first_step(Model m, State s, double after) noexcept nogil
 cdef void swap(Model m, State s, Kick e) noexcept nogil
 cdef void grow(Model m, State s) noexcept nogil

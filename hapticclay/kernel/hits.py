@@ -7,28 +7,28 @@ from . import kick, ledger, memory, viscous
 GROWTH = 1.01  # growth of each step of a hit over the one before
 
 
-def strike(m, s, after):
+def first_step(m, s, after):
     """Length of the first step in clay that the handle has entered; short where it hits [s].
 
     The step that led here then ends with its half of the kick, and the next begins at rest.
     """
-    if s.struck == 0.0 or after <= 0.0:
+    if s.entered == 0.0 or after <= 0.0:
         return after
-    s.fine, s.struck = math.inf, 0.0
-    b = max(viscous.now(m, s, 0, 0), viscous.now(m, s, 1, 0))
+    s.max_step, s.entered = math.inf, 0.0
+    b = max(viscous.damping(m, s, 0, 0), viscous.damping(m, s, 1, 0))
     first = m.first_hit / b if b > 0.0 else math.inf
     if first >= after:
         return after
     e, halved = s.e, s.before > 0.0
     if halved:
         kick.by_servo(m, s, e, 0.0)
-        ledger.add_work(m, s.work, s.early, e, e.o1, e.o2, s.now)
+        ledger.add_work(m, s.work, s.work_at_event, e, e.o1, e.o2, s.now)
         swap(m, s, e)
     kick.by_servo(m, s, s.k, first)
     if kick.is_limited(m, s.k):
         if halved:
-            memory.copied(s.work, s.early)
-        s.fine = first
+            memory.copied(s.work, s.work_at_event)
+        s.max_step = first
         return first
     if halved:
         swap(m, s, e)
@@ -36,7 +36,7 @@ def strike(m, s, after):
 
 
 def swap(m, s, e):
-    """Swaps a state with that behind the half kick that ends at its sample."""
+    """Swaps a state with that after the half kick that ends at its sample."""
     s.w1, e.w1, s.w2, e.w2 = e.w1, s.w1, e.w2, s.w2
     s.g1, e.g1, s.g2, e.g2 = e.g1, s.g1, e.g2, s.g2
     s.before, e.after = e.after, s.before  # which is 0
@@ -53,5 +53,5 @@ def swap(m, s, e):
 
 def grow(m, s):
     """The longest next step after a hit."""
-    if s.fine < math.inf:
-        s.fine = s.fine * GROWTH if kick.is_limited(m, s.k) else math.inf
+    if s.max_step < math.inf:
+        s.max_step = s.max_step * GROWTH if kick.is_limited(m, s.k) else math.inf

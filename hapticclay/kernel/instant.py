@@ -26,7 +26,7 @@ def evaluate(m, s, z, since, row, out):
     if m.command:
         dx, dy = signals.command_at(m, t, near, row)
         x.delta, y.delta = x.delta + dx, y.delta + dy
-    a.b, b.b = viscous.at_place(m, s, t, x.p, y.p)
+    a.b, b.b = viscous.damping_at_place(m, s, t, x.p, y.p)
     clayx, clayy = viscous.force(m, a.b, b.b, x.v, y.v)
     lawx = lawy = 0.0
     if m.laws:
@@ -37,15 +37,15 @@ def evaluate(m, s, z, since, row, out):
             o = k.axis[i]
             o.f, o.d = o.f - hand.resistance(m, o.p, o.v, o.c, i), m.axis[i].mass
     servo_law(m, k, z)
-    modes.answer(m, s, k, out)
-    wanted(m, k, out)
+    modes.respond(m, s, k, out)
+    compute_torques(m, k, out)
     if abs(k.tau1) > m.limit1 or abs(k.tau2) > m.limit2:
         if m.modal and (m.shaping or m.formed) and modes.rests_somewhere(s):
             hold(m, s, k, out)
         k.tau1, k.tau2 = arm.clipped(k.tau1, m.limit1), arm.clipped(k.tau2, m.limit2)
         torque_law(m, k, k.tau1, k.tau2)
-        modes.answer(m, s, k, out)
-    respond(m, k, z, out)
+        modes.respond(m, s, k, out)
+    finish(m, k, z, out)
     a.fe, b.fe = clayx + (lawx + a.r), clayy + (lawy + b.r)
     a.fh, b.fh = x.net + clayx + (lawx + a.r), y.net + clayy + (lawy + b.r)
     powers(m, k, z, out)
@@ -53,9 +53,7 @@ def evaluate(m, s, z, since, row, out):
 
 def servo_law(m, k, z):
     """The law of compensator and servo at an instant."""
-    k.Sxx, k.Sxy, k.Syy = k.Wxx, k.Wxy, k.Wyy
-    if m.shaping:
-        k.Sxx, k.Sxy, k.Syy = m.x.servo[3], 0.0, m.y.servo[3]
+    servo.put_mobility(m, k)
     for i in range(2):
         o, q, c = k.axis[i], z.axis[i], m.axis[i].servo
         o.delta, o.feed = servo.output_now(m, i, o.delta, q.z)
@@ -74,13 +72,13 @@ def torque_law(m, k, t1, t2):
     k.Sxx, k.Sxy, k.Syy = k.Wxx, k.Wxy, k.Wyy
 
 
-def wanted(m, k, out):
-    """Torques that produce a response."""
+def compute_torques(m, k, out):
+    """Torques that give the handle its response."""
     k.g1, k.g2 = arm_law.joint_velocity(out.x.acc, out.y.acc, k.u, 1.0)
     arm.link_torques(m, k)
 
 
-def respond(m, k, z, out):
+def finish(m, k, z, out):
     """Torques, and the rates of compensator and reference."""
     out.tau1, out.tau2 = k.tau1, k.tau2
     out.push1, out.push2 = arm_law.joint_torques(k.x.net, k.y.net, k.u)
@@ -115,9 +113,9 @@ def hold(m, s, k, out):
     """
     x, y = k.x, k.y
     law = x.a, y.a, k.Sxx, k.Sxy, k.Syy
-    b1, b2 = wanted_under(m, s, k, out, law, 0.0, 0.0)
-    xx, yx = wanted_under(m, s, k, out, law, 1.0, 0.0)
-    xy, yy = wanted_under(m, s, k, out, law, 0.0, 1.0)
+    b1, b2 = requested_under(m, s, k, out, law, 0.0, 0.0)
+    xx, yx = requested_under(m, s, k, out, law, 1.0, 0.0)
+    xy, yy = requested_under(m, s, k, out, law, 0.0, 1.0)
     xx, yx, xy, yy = xx - b1, yx - b2, xy - b1, yy - b2
     best1, best2, least = 0.0, 0.0, math.inf
     for case in range(9):
@@ -145,14 +143,14 @@ def side(case):
     return 0.0 if case == 0 else 1.0 if case == 1 else -1.0
 
 
-def wanted_under(m, s, k, out, law, t1, t2):
-    """Torques that the servo requests where clay holds an axis under other torques [N.m]."""
+def requested_under(m, s, k, out, law, t1, t2):
+    """Torques that the servo requests where clay holds an axis under torques t1 and t2 [N.m]."""
     x, y, fx, fy = k.x, k.y, k.x.f, k.y.f
     torque_law(m, k, t1, t2)
-    modes.answer(m, s, k, out)
+    modes.respond(m, s, k, out)
     x.f, y.f = fx - out.x.r, fy - out.y.r
     x.a, y.a, k.Sxx, k.Sxy, k.Syy = law
-    modes.plain_answer(k, out)
-    wanted(m, k, out)
+    modes.plain_response(k, out)
+    compute_torques(m, k, out)
     x.f, y.f = fx, fy
     return k.tau1, k.tau2

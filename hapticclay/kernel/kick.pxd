@@ -11,9 +11,9 @@ from . cimport viscous
 from . cimport yielding
 
 cdef void begin(Kick k, double before, double after) noexcept nogil
-cdef void take_up(Model m, State s, Kick k) noexcept nogil
-cdef void act(Model m, State s, Kick k) noexcept nogil
-cdef void stop(Model m, Kick k) noexcept nogil
+cdef void take_over(Model m, State s, Kick k) noexcept nogil
+cdef void load(Model m, State s, Kick k) noexcept nogil
+cdef void end_path(Model m, Kick k) noexcept nogil
 cdef void move(Model m, State s, Kick k) noexcept nogil
 cdef void damped(Kick k) noexcept nogil
 @cython.locals(owing=cython.bint)

@@ -14,8 +14,8 @@ def begin(k, before, after):
     k.H, k.L, k.R, k.before, k.after = 0.5 * span, before / span, after / span, before, after
 
 
-def take_up(m, s, k):
-    """What the kick before left behind."""
+def take_over(m, s, k):
+    """Takes over what the kick before left."""
     k.o1, k.o2 = s.w1, s.w2
     if m.special:
         for i in range(2):
@@ -26,14 +26,14 @@ def take_up(m, s, k):
 # ---- what acts on the handle ---------------------------------------------------------------------
 
 
-def act(m, s, k):
+def load(m, s, k):
     """Load of the handle that is linear in its velocity after the kick: f - d u."""
     signals.push(m, s, k)
-    k.over = k.dxy = k.clay_dxy = 0.0
+    k.splits = k.dxy = k.clay_dxy = 0.0
     if m.acts:
         viscous.damp(m, s, k)
         if m.special:
-            stop(m, k)
+            end_path(m, k)
         viscous.load(m, k)
     else:
         for i in range(2):
@@ -43,10 +43,10 @@ def act(m, s, k):
         hand.load(m, k)
 
 
-def stop(m, k):
-    """The path of a handle that clay stops."""
-    if m.stiff and k.over != 0.0:
-        viscous.rest_behind_sample(k)
+def end_path(m, k):
+    """Straightens the path of a handle that clay stops."""
+    if m.stiff and k.splits != 0.0:
+        viscous.rest_after_sample(k)
     if m.flow and k.o1 == 0.0 and k.o2 == 0.0:
         k.x.c = k.y.c = 0.0
 
@@ -74,14 +74,14 @@ def move(m, s, k):
 
 
 def damped(k):
-    """Force of the dampers behind the sample."""
+    """Force of the dampers after the sample."""
     x, y = k.x, k.y
     x.damped = x.clay_d * x.u + k.clay_dxy * y.u
     y.damped = y.clay_d * y.u + k.clay_dxy * x.u
 
 
 def move_in_clay(m, s, k):
-    """The same in clay of more laws than plain damping."""
+    """As `move`, in clay of more laws than plain damping."""
     x, y = k.x, k.y
     for i in range(2):
         o = k.axis[i]
@@ -94,7 +94,7 @@ def move_in_clay(m, s, k):
     if m.laws:
         own_laws.load(m, k)
     ownx, owny, own_dx, own_dy, own_dxy = x.f, y.f, x.d, y.d, k.dxy
-    owing = m.stiff and k.over != 0.0
+    owing = m.stiff and k.splits != 0.0
     owesx = owesy = softx = softy = 0.0
     if owing:
         gx, gy = viscous.slow_force(m, k)
@@ -129,11 +129,11 @@ def move_in_clay(m, s, k):
 def by_servo(m, s, k, after):
     """The kick of the continuous law at a sample, before a step of length `after`."""
     begin(k, s.before, after)
-    take_up(m, s, k)
+    take_over(m, s, k)
     half, r1, r2 = 0.5 * s.before, s.w1, s.w1 + s.w2
     arm.handle_at(m, k, s.q1, s.q2, r1, r2)
     arm.turning(k, r1 + half * s.g1, r2 + half * s.g2)
-    act(m, s, k)
+    load(m, s, k)
     servo.servo_law(m, s, k)
     move(m, s, k)
     arm.link_torques(m, k)
@@ -142,7 +142,7 @@ def by_servo(m, s, k, after):
         k.tau1, k.tau2 = arm.clipped(t1, m.limit1), arm.clipped(t2, m.limit2)
         servo.torque_law(m, k, k.tau1, k.tau2)
         move(m, s, k)
-    servo.behind(m, s, k)
+    servo.advance(m, s, k)
 
 
 def is_limited(m, k):

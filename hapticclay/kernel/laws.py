@@ -8,14 +8,12 @@
 | of a user | `own_laws` | | x | | x | x |
 """
 
-import math
-
 from ..formulas import flow
 from . import groove, own_laws, springs, viscous, yielding
 
 
 def enter(m, s, px, py, crossed):
-    """In a region that the handle enters over a border of coordinate `crossed`, -1 for none."""
+    """Begins in a region entered over a border of coordinate `crossed`; -1 at the start."""
     if m.flow and not m.groove:
         yielding.enter(m, s)
     if m.springs:
@@ -27,7 +25,7 @@ def enter(m, s, px, py, crossed):
 
 
 def moved(m, s, px, py, vx, vy, h):
-    """After a step of length h that led the handle there."""
+    """Their states after a step of length h to a place and velocity."""
     if m.springs:
         springs.move(m, s, px, py, h)
     if m.groove:
@@ -46,7 +44,7 @@ def moved(m, s, px, py, vx, vy, h):
 def without_clay(m, s, k, fx, fy):
     """A force on the handle less that of the clay before the sample that does not yield [N]."""
     x, y = k.x, k.y
-    bx, by = viscous.force(m, viscous.now(m, s, 0, 1), viscous.now(m, s, 1, 1), x.v, y.v)
+    bx, by = viscous.force(m, viscous.damping(m, s, 0, 1), viscous.damping(m, s, 1, 1), x.v, y.v)
     fx, fy = fx - bx, fy - by
     if m.special and (m.springs or m.laws):
         ax = ay = gx = gy = 0.0
@@ -58,19 +56,20 @@ def without_clay(m, s, k, fx, fy):
     return fx, fy
 
 
-def seen_force(m, s, k):
+def force_for_controller(m, s, k):
     """Force of the clay as the controller evaluates it at the handle in k, (x, y) [N]."""
     if not m.clay:
         return 0.0, 0.0
     px, py, vx, vy = k.x.p, k.y.p, k.x.v, k.y.v
-    x, y = viscous.force(m, viscous.now(m, s, 0, 0), viscous.now(m, s, 1, 0), vx, vy)
+    x, y = viscous.force(m, viscous.damping(m, s, 0, 0), viscous.damping(m, s, 1, 0), vx, vy)
     if not m.special:
         return x, y
     fx = fy = 0.0
     if m.flow:
         fx, fy = motion_force(m, s, vx, vy, k.x.pull, k.y.pull)
     if m.springs:
-        fx, fy = fx + springs.seen_force(m, s, 0, px), fy + springs.seen_force(m, s, 1, py)
+        fx = fx + springs.force_for_controller(m, s, 0, px)
+        fy = fy + springs.force_for_controller(m, s, 1, py)
     if m.laws:
         gx, gy = own_laws.force(m, px, py, vx, vy, 0.0)
         fx, fy = fx + gx, fy + gy
@@ -88,8 +87,3 @@ def motion_force(m, s, vx, vy, pullx, pully):
     ax, ay = viscous.along(m, vx, vy)
     ax, ay = flow.motion_force(law, m.flow == 2, ax, ay)
     return viscous.across(m, ax, ay)
-
-
-def is_calm(s):
-    """Whether no law needs short steps."""
-    return s.resolved == math.inf

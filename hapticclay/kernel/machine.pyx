@@ -33,10 +33,10 @@ def look(size_t model, size_t state, long first, long n):
     return bool((<State_s *>state).watch.quiet)
 
 
-def advance(size_t models, size_t states, size_t which, Py_ssize_t n, size_t rooms, bint watched):
+def advance(size_t models, size_t states, size_t which, Py_ssize_t n, size_t rooms, bint tests):
     """Makes steps of rows until as many rows of theirs are filled as `rooms` says, by row.
 
-    watched: the quick test of the monitor looks at the rows made.
+    tests: the quick test of the monitor looks at the rows made.
     """
     cdef Model_s *m = <Model_s *>models
     cdef State_s *s = <State_s *>states
@@ -50,7 +50,7 @@ def advance(size_t models, size_t states, size_t which, Py_ssize_t n, size_t roo
             first = s[k].row
             arm.put(&m[k], &s[k])
             path.advance(&m[k], &s[k], room[k])
-            if watched:
+            if tests:
                 watch.look(&m[k], &s[k], first, s[k].row)
 
 
@@ -74,7 +74,7 @@ def peek(size_t models, size_t states, size_t which, Py_ssize_t n, size_t spare,
             path.peek(&m[k], &s[k], <State_s *>spare)
             for i in range(16):
                 out[18 * k + i] = m[k].rows[16 * at + i]
-            if m[k].told or m[k].holds:
+            if m[k].records_clay_force:
                 out[18 * k + 16], out[18 * k + 17] = m[k].rendered[3 * at], m[k].rendered[3 * at + 1]
 
 

@@ -30,21 +30,21 @@ def pace(m, s, target, after, on_grid):
     if m.ahead:
         target, after = before_break(m, s.t, target, after)
     rest, n = target - s.t, substeps(m, s.i)
-    if on_grid or s.left == 0:
-        s.left, s.share = n, after / n
+    if on_grid or s.steps_left == 0:
+        s.steps_left, s.step_length = n, after / n
     if n > modes.SUBSTEPS:
         s.code = UNRESOLVED
     if after == 0.0:
         return after
-    step = s.share if s.left > 1 else rest
+    step = s.step_length if s.steps_left > 1 else rest
     if m.modal:  # steps in yielding clay end anywhere
         count = math.ceil(rest / m.dt * n - NEAR)
         return rest / count if count > 1.0 else rest
     return step
 
 
-def place_in(times, count, t):
-    """Index of the first of ascending times behind a time."""
+def index_after(times, count, t):
+    """Index of the first of ascending times after a time."""
     low, high = 0, count
     while low < high:
         middle = (low + high) // 2
@@ -57,7 +57,7 @@ def place_in(times, count, t):
 
 def next_break(m, t):
     """The next time at which a signal jumps, infinite for none [s]."""
-    return m.breaks[place_in(m.breaks, m.breaks_count, t + m.slack)]
+    return m.breaks[index_after(m.breaks, m.breaks_count, t + m.slack)]
 
 
 def before_break(m, t, target, after):
@@ -73,12 +73,12 @@ def is_even(m, t, target):
     return not m.ahead or next_break(m, t) >= target + m.slack
 
 
-def row_of(m, t, h):
+def signal_row(m, t, h):
     """Row of the signals ahead for a step of length h, -1 for none."""
     if not m.ahead:
         return -1
     times, near = m.times, EVEN * m.slack
-    i = place_in(times, m.times_count, t - near)
+    i = index_after(times, m.times_count, t - near)
     if h == 0.0 or i + 2 >= m.times_count or next_break(m, t) < t + h + m.slack:
         return -1
     far = max(abs(times[i] - t), abs(times[i + 1] - t - 0.5 * h), abs(times[i + 2] - t - h))
@@ -94,13 +94,13 @@ def march(m, s, h):
     a.length, still = h, m.modal and modes.rests(s)
     start(m, s, a.begin)
     memory.copied(z, a.begin)
-    no_sums(sums)
-    row = row_of(m, t, h)
+    clear_sums(sums)
+    row = signal_row(m, t, h)
     for i in range(4):
         at = 0.0 if i == 0 else h if i == 3 else 0.5 * h
         instant.evaluate(m, s, z, at, row + (i + 1) // 2 if row >= 0 else row, now)
         if i == 0:
-            show(s)
+            keep_start(s)
             if h == 0.0:
                 break
         a1, a2 = arm.accelerations(m, z, now)
@@ -125,15 +125,15 @@ def start(m, s, z):
             memory.copied4(o.z, a.z)
 
 
-def show(s):
-    """Keeps what a row shows of the start of a step."""
+def keep_start(s):
+    """Keeps the instant at the start of a step, which its row shows."""
     a, k = s.a, s.k
     memory.copied(a.shown, a.now)
     a.p1, a.p2, a.v1, a.v2 = k.x.p, k.y.p, k.x.v, k.y.v
 
 
-def no_sums(sums):
-    """Sums over no stage."""
+def clear_sums(sums):
+    """Puts the sums to 0."""
     for j in range(6):
         sums.first[j] = sums.last[j] = 0.0
     for j in range(8):
@@ -147,12 +147,8 @@ def add_stage(m, sums, i, now, a1, a2):
     first, last = 0.0 if i == 3 else 1.0, 0.0 if i == 0 else 1.0
     weight = 1.0 if i == 0 or i == 3 else 2.0
     f, e = sums.first, sums.last
-    f[0], f[1], e[0], e[1] = (
-        f[0] + first * a1,
-        f[1] + first * a2,
-        e[0] + last * a1,
-        e[1] + last * a2,
-    )
+    f[0], f[1] = f[0] + first * a1, f[1] + first * a2
+    e[0], e[1] = e[0] + last * a1, e[1] + last * a2
     for j in range(2):
         o, at = now.axis[j], 2 + 2 * j
         f[at], f[at + 1] = f[at] + first * o.ddelta, f[at + 1] + first * o.dy
@@ -220,7 +216,7 @@ def write(m, s):
     row[n + 4], row[n + 5], row[n + 6], row[n + 7] = a.v1, a.v2, o.x.fh, o.y.fh
     row[n + 8], row[n + 9], row[n + 10], row[n + 11] = o.tau1, o.tau2, o.x.shown, o.y.shown
     row[n + 12], row[n + 13], row[n + 14], row[n + 15] = o.x.b, o.y.b, s.w1, s.w2
-    if m.told:
+    if m.records_clay_force:
         out = m.rendered
         out[3 * s.row], out[3 * s.row + 1] = o.x.fe, o.y.fe
 
@@ -236,13 +232,13 @@ def take(m, s):
         if m.formed:
             memory.copied4(a.z, o.z)
     memory.copied(s.work, s.a.work)
-    s.left -= 1
+    s.steps_left -= 1
     if m.modal:
         age_modes(m, s)
 
 
 def age_modes(m, s):
-    """Modes behind a step: what ended it, and whether the clay has stopped the handle."""
+    """Modes after a step: what ended it, and whether the clay has stopped the handle."""
     for i in range(2):
         a = s.mode[i]
         before, a.stuck = a.stuck, modes.is_stopped(s, i)
@@ -251,6 +247,6 @@ def age_modes(m, s):
             yielding.note_stop(m, s, 2.0 if m.modal == 2 else 1.0 * i, a.stuck, 0.0)
 
 
-def feel_behind(m, s, h):
+def evaluate_end(m, s, h):
     """What yielding clay does at the end of the step tried, of length h, in its modes."""
     instant.evaluate(m, s, s.a.end, h, -1, s.a.now)

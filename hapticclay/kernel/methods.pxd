@@ -12,9 +12,9 @@ from . cimport yielding
 
 cdef long CONTINUOUS, SAMPLED, ACCURATE
 
-cdef void act(Model m, State s) noexcept nogil
+cdef void control(Model m, State s) noexcept nogil
 cdef void attempt(Model m, State s, double after) noexcept nogil
-cdef (double, double) place_behind(Model m, State s, double after) noexcept nogil
+cdef (double, double) place_after(Model m, State s, double after) noexcept nogil
 cdef bint is_sound(Model m, State s) noexcept nogil
 cdef void keep(Model m, State s, double after, bint shows) noexcept nogil
 @cython.locals(even=cython.bint)

@@ -3,7 +3,7 @@
 | | continuous | sampled | accurate |
 |---|---|---|---|
 | a step is tried by | `kick.by_servo` | `sampled.by_hold` | `march.march` |
-| into | `s.k` | `s.k`, behind `s.e` | `s.a` |
+| into | `s.k` | `s.k`, after `s.e` | `s.a` |
 | it may end | at a sample | at an event too | within a sample |
 """
 
@@ -12,8 +12,8 @@ from . import arm, kick, march, onset, rows, sampled, servo, signals, yielding
 CONTINUOUS, SAMPLED, ACCURATE = range(3)
 
 
-def act(m, s):
-    """What a controller does at the beginning of a step."""
+def control(m, s):
+    """Lets sampled control act at the beginning of a step."""
     if m.method == SAMPLED:
         sampled.act(m, s)
 
@@ -28,8 +28,8 @@ def attempt(m, s, after):
         kick.by_servo(m, s, s.k, after)
 
 
-def place_behind(m, s, after):
-    """Position of the handle behind the step tried, (x, y) [m]."""
+def place_after(m, s, after):
+    """Position of the handle after the step tried, (x, y) [m]."""
     if m.method == ACCURATE:
         return arm.place(m, s.a.end.q1, s.a.end.q2)
     k = s.k
@@ -54,13 +54,13 @@ def keep(m, s, after, shows):
 
 
 def take(m, s, after):
-    """Takes the step tried: the engine makes it; controller and arm are those behind it."""
+    """Takes the step tried: the engine makes it; controller and arm become those after it."""
     if m.method == ACCURATE:
         march.take(m, s)
         return
     k, even = s.k, m.method == CONTINUOUS and s.before == after
     if m.acts and m.special and m.flow:
-        if s.on:
+        if s.at_event:
             yielding.note(m, s, s.e)
         yielding.note(m, s, k)
     if m.method == SAMPLED:
@@ -107,5 +107,5 @@ def pace(m, s, target, after, on_grid):
 def bound(m, s, after):
     """Length of a step, bounded by what begins with it [s]."""
     if m.method == ACCURATE and m.modal:
-        return onset.act(m, s, after)
+        return onset.choose_modes(m, s, after)
     return after

@@ -4,7 +4,7 @@ import math
 
 from ..formulas import arm as arm_law
 from ..formulas import controller, flow
-from . import arm, servo
+from . import arm, servo, viscous
 
 STABLE_STEP = 0.5  # fastest rate times step up to which an explicit step is trusted
 SUBSTEPS = 1000  # most substeps of one sample
@@ -95,44 +95,20 @@ def is_stopped(s, i):
     return 1.0 if a.mode == 0.0 and (a.Fy > 0.0 or (a.Kn > 0.0 and a.n < 1.0)) else 0.0
 
 
-# ---- along the axes of the clay ------------------------------------------------------------------
-
-
-def along(m, x, y):
-    """Components along the axes along which the clay yields."""
-    if m.modal_rotated:
-        return controller.along_axes(m.cosine, m.sine, x, y)
-    return x, y
-
-
-def across(m, x, y):
-    """The inverse of `along`."""
-    if m.modal_rotated:
-        return controller.along_axes(m.cosine, -m.sine, x, y)
-    return x, y
-
-
-def rotated_matrix(m, B):
-    """A matrix along these axes, R' B R."""
-    if not m.modal_rotated:
-        return B
-    xx, yx = along(m, B[0], B[2])
-    xy, yy = along(m, B[1], B[3])
-    first, second = along(m, xx, xy), along(m, yx, yy)
-    return first[0], first[1], second[0], second[1]
+# ---- along the axes along which the clay yields --------------------------------------------------
 
 
 def velocity(m, s, q1, q2, w1, w2):
     """Velocity of the handle along these axes [m/s]."""
     arm.handle_at(m, s.e, q1, q2, w1, w1 + w2)
-    return along(m, s.e.x.v, s.e.y.v)
+    return viscous.along(m, s.e.x.v, s.e.y.v)
 
 
 def joint_rates(m, s, q1, q2, vx, vy):
     """Joint rates that move the handle at a velocity along these axes [rad/s]."""
     u = s.e.u
     u[0], u[1], u[2], u[3] = arm_law.jacobian(q1, q2, m.links)
-    x, y = across(m, vx, vy)
+    x, y = viscous.across(m, vx, vy)
     r1, r2 = arm_law.joint_velocity(x, y, u, 1.0)
     return r1, r2 - r1
 
@@ -140,7 +116,7 @@ def joint_rates(m, s, q1, q2, vx, vy):
 def place_of(m, q1, q2):
     """Place of the handle along these axes [m]."""
     x, y = arm.place(m, q1, q2)
-    return along(m, x, y)
+    return viscous.along(m, x, y)
 
 
 # ---- at an instant -------------------------------------------------------------------------------
@@ -148,12 +124,12 @@ def place_of(m, q1, q2):
 
 def stop(m, s, k):
     """Takes the velocity along an axis that rests from the handle."""
-    x, y = along(m, k.x.v, k.y.v)
+    x, y = viscous.along(m, k.x.v, k.y.v)
     x, y = 0.0 if s.mode[0].mode == 0.0 else x, 0.0 if s.mode[1].mode == 0.0 else y
-    k.x.v, k.y.v = across(m, x, y)
+    k.x.v, k.y.v = viscous.across(m, x, y)
 
 
-def plain_answer(k, out):
+def plain_response(k, out):
     """Response of the handle to its load where nothing yields."""
     out.x.acc, out.y.acc = servo.solve(k)
     out.x.r = out.y.r = 0.0
@@ -167,19 +143,19 @@ def net(k, out):
     y.net = y.f - b.r - y.d * b.acc - k.dxy * a.acc
 
 
-def answer(m, s, k, out):
+def respond(m, s, k, out):
     """Response of the handle to its load in any clay, in the modes of the step."""
     if not m.modal:
-        plain_answer(k, out)
+        plain_response(k, out)
         return
     x, y, grip, B = k.x, k.y, out.grip, out.grip.B
     gx, gy = servo.solve(k)
-    B[0], B[1], B[2], B[3] = rotated_matrix(
+    B[0], B[1], B[2], B[3] = viscous.rotated_matrix(
         m,
         controller.velocity_per_force((x.n, y.n), (k.Sxx, k.Sxy, k.Syy), (x.d, y.d, k.dxy)),
     )
-    grip.x.v, grip.y.v = along(m, x.v, y.v)
-    grip.x.a, grip.y.a = along(m, gx - x.c, gy - y.c)
+    grip.x.v, grip.y.v = viscous.along(m, x.v, y.v)
+    grip.x.a, grip.y.a = viscous.along(m, gx - x.c, gy - y.c)
     if rests(s):
         grip.x.f, grip.y.f = holding(grip)
         leftx = lefty = 0.0
@@ -187,8 +163,8 @@ def answer(m, s, k, out):
         leftx, lefty = resist_along(s, grip)
     else:
         leftx, lefty = resist_axes(s, grip)
-    out.x.r, out.y.r = across(m, grip.x.f, grip.y.f)
-    leftx, lefty = across(m, leftx, lefty)
+    out.x.r, out.y.r = viscous.across(m, grip.x.f, grip.y.f)
+    leftx, lefty = viscous.across(m, leftx, lefty)
     out.x.acc, out.y.acc = leftx + x.c, lefty + y.c
     net(k, out)
 
@@ -200,7 +176,7 @@ def holding(grip):
     return (B[3] * x - B[1] * y) / det, (B[0] * y - B[2] * x) / det
 
 
-def left_of(ax, ay, B, fx, fy):
+def remaining_acceleration(ax, ay, B, fx, fy):
     """The acceleration that remains under a force, (x, y) [m/s^2]."""
     return ax - B[0] * fx - B[1] * fy, ay - B[2] * fx - B[3] * fy
 
@@ -213,7 +189,7 @@ def resist_axes(s, grip):
         x.f = (x.a - B[1] * y.f) / B[0]
     elif sy == 0.0:
         y.f = (y.a - B[2] * x.f) / B[3]
-    ax, ay = left_of(x.a, y.a, B, x.f, y.f)
+    ax, ay = remaining_acceleration(x.a, y.a, B, x.f, y.f)
     return 0.0 if sx == 0.0 else ax, 0.0 if sy == 0.0 else ay
 
 
@@ -226,11 +202,11 @@ def resist_along(s, grip):
         speed, ex, ey = way_of(s, x.v, y.v)
     f = strength(s, 0, speed)
     x.f, y.f = f * ex, f * ey
-    gx, gy = left_of(x.a, y.a, B, x.f, y.f)
+    gx, gy = remaining_acceleration(x.a, y.a, B, x.f, y.f)
     if slides:
         return gx, gy
     off = (ex * gy - ey * gx) / turning(B, ex, ey)  # a transverse force keeps it on its path
-    ax, ay = left_of(gx, gy, B, -off * ey, off * ex)
+    ax, ay = remaining_acceleration(gx, gy, B, -off * ey, off * ex)
     size = ax * ex + ay * ey
     x.f, y.f = x.f - off * ey, y.f + off * ex
     return size * ex, size * ey
@@ -251,7 +227,7 @@ def turning(B, ex, ey):
 
 def acceleration(grip):
     """Acceleration of the handle that the clay sees, along its axes [m/s^2]."""
-    return left_of(grip.x.a, grip.y.a, grip.B, grip.x.f, grip.y.f)
+    return remaining_acceleration(grip.x.a, grip.y.a, grip.B, grip.x.f, grip.y.f)
 
 
 def back_to_rest(m, s, z):
@@ -368,7 +344,7 @@ def gap_of_hold(most, f):
 # ---- what a mode demands -------------------------------------------------------------------------
 
 
-def misfit(m, s, grip, i):
+def violation(m, s, grip, i):
     """How far an axis without velocity violates its mode, 0 or less where it does not."""
     mode = s.mode[i].mode
     if mode == 0.0:
@@ -407,7 +383,7 @@ def nearly_rests(m, s, i, speed, forward, size, need):
     return strength(s, i, 0.5 * speed) < need and need <= holding_force(m, s, i)
 
 
-def set_out(s, grip):
+def direction_of_onset(s, grip):
     """Direction in which a handle at rest begins to slide in clay along the motion."""
     B = grip.B[0], grip.B[1], grip.B[2], grip.B[3]
     ex, ey = flow.slowed(B, grip.x.a, grip.y.a, 1.0, s.mode[0].Fy, 0.0, 1.0)
@@ -433,7 +409,7 @@ def turned_in(s, grip, speed, ex, ey):
     """That direction: the one across which no force is left."""
     f = strength(s, 0, speed)
     for _ in range(8):  # Newton's method on the angle
-        gx, gy = left_of(grip.x.a, grip.y.a, grip.B, f * ex, f * ey)
+        gx, gy = remaining_acceleration(grip.x.a, grip.y.a, grip.B, f * ex, f * ey)
         slope = ex * gx + ey * gy + f * turning(grip.B, ex, ey)
         turn = (ex * gy - ey * gx) / slope if slope > 0.0 else 0.0
         turn = max(-0.5, min(turn, 0.5))

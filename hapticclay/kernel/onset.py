@@ -13,14 +13,14 @@ def evaluate(m, s):
     return s.a.now.grip
 
 
-def turn(m, s, vx, vy):
+def set_velocity(m, s, vx, vy):
     """Gives the arm another velocity of the handle along the axes of the clay."""
     s.w1 = s.w2 = 0.0
     if vx != 0.0 or vy != 0.0:
         s.w1, s.w2 = modes.joint_rates(m, s, s.q1, s.q2, vx, vy)
 
 
-def act(m, s, after):
+def choose_modes(m, s, after):
     """Puts the modes of the next step into the state; the step length that they allow [s]."""
     for i in range(2):
         a = s.mode[i]
@@ -73,11 +73,11 @@ def choose_axes(m, s):
     if resty and y.mode != 0.0:
         y.anchor = py
     if (restx and vx != 0.0) or (resty and vy != 0.0):
-        turn(m, s, 0.0 if restx else vx, 0.0 if resty else vy)
-    fit(m, s, restx, resty)
+        set_velocity(m, s, 0.0 if restx else vx, 0.0 if resty else vy)
+    fit_modes(m, s, restx, resty)
 
 
-def fit(m, s, restx, resty):
+def fit_modes(m, s, restx, resty):
     """Puts the consistent ones of the nine pairs of modes; where none is, those that fit best."""
     x, y, endx, endy = s.mode[0], s.mode[1], s.mode[0].ended, s.mode[1].ended
     nowx, nowy = x.mode, y.mode
@@ -89,8 +89,8 @@ def fit(m, s, restx, resty):
             continue
         modes.put(s, tried_mode(j, restx, endx, nowx), tried_mode(k, resty, endy, nowy))
         grip = evaluate(m, s)
-        wrongx = modes.misfit(m, s, grip, 0) if openx else 0.0
-        wrongy = modes.misfit(m, s, grip, 1) if openy else 0.0
+        wrongx = modes.violation(m, s, grip, 0) if openx else 0.0
+        wrongy = modes.violation(m, s, grip, 1) if openy else 0.0
         wrong = max(wrongx, wrongy)
         if wrong < least:
             least, bestx, besty = wrong, x.mode, y.mode
@@ -116,11 +116,11 @@ def choose_way(m, s):
         modes.put(s, 0.0, 0.0)
     if rests:
         vx = vy = 0.0
-        turn(m, s, 0.0, 0.0)
+        set_velocity(m, s, 0.0, 0.0)
         grip = evaluate(m, s)
         if ended != modes.FREE and modes.gap(m, s, grip, 0) >= 0.0:
             return
-        wayx, wayy = modes.set_out(s, grip)
+        wayx, wayy = modes.direction_of_onset(s, grip)
         modes.put_way(s, modes.SLIDING, wayx, wayy)
         grip = evaluate(m, s)
     speed, wayx, wayy = modes.way_of(s, vx, vy)
@@ -130,5 +130,5 @@ def choose_way(m, s):
     wayx, wayy = modes.turned_in(s, grip, speed, wayx, wayy)
     modes.put_way(s, modes.TURNED_IN, wayx, wayy)
     if speed > 0.0:
-        turn(m, s, speed * wayx, speed * wayy)
+        set_velocity(m, s, speed * wayx, speed * wayy)
     evaluate(m, s)

@@ -10,9 +10,8 @@ from ..formulas import regions
 from . import arm, borders, ends, hits, laws, march, memory, methods, sampled, springs, viscous
 
 OPEN, FINISHED, TIME_LIMIT, NOT_FINITE, UNRESOLVED = range(5)  # status of a run
-# times that the handle comes back to a region within one sample; a handle that slides along a
-# border then completes the step
-LANDINGS = 4
+# to a region within one sample: a handle that slides along a border then completes the step
+MOST_RETURNS = 4
 MOST_STEPS = 20_000  # from one sample to the next; a run that needs more ends as unresolved
 
 
@@ -25,7 +24,7 @@ def grid_after(m, i):
 
 
 def next_sample(m, s):
-    """The next sample, the length of the step to it [s], 0 at the end; whether now is a sample."""
+    """Time of the next sample, length of the step to it, 0 at the end [s]; whether now is one."""
     on_grid = s.t == s.i * m.dt
     if s.i > m.last:
         return s.t, 0.0, on_grid
@@ -46,22 +45,22 @@ def next_stop(m, s):
 
 
 def begin(s, after, on_grid):
-    """Status at the beginning of a step with event detection."""
+    """Begins a step with event detection: counts it, and detects the end of the run."""
     seen = s.seen
     if s.closing == OPEN and after == 0.0:
         s.closing = TIME_LIMIT
     if on_grid:
-        s.careful, s.landings = 1, 0
+        s.checked_steps, s.returns = 1, 0
         seen[0] = seen[1] = s.x.index
         seen[2] = seen[3] = s.y.index
     else:
-        if s.careful >= MOST_STEPS:
+        if s.checked_steps >= MOST_STEPS:
             s.code = UNRESOLVED
-        s.careful += 1
+        s.checked_steps += 1
 
 
 def take(m, s, after, target):
-    """Takes the step tried: the state becomes that behind it."""
+    """Takes the step tried: the state becomes that after it."""
     methods.take(m, s, after)
     s.steps += 1
     if m.hits:
@@ -81,7 +80,7 @@ def take(m, s, after, target):
 
 
 def cross(m, s, i, up):
-    """Beyond a border, which is noted; at the end of the path the run is to close."""
+    """Notes a crossing and enters the clay beyond; at the end of the path the run is to close."""
     border, out, n, speed = borders.place_of(s, i, up), m.crossings, 4 * s.crossing, 0.0
     if s.before > 0.0:
         vx, vy = methods.arrive(m, s)
@@ -92,24 +91,24 @@ def cross(m, s, i, up):
         s.closing = FINISHED
         return
     x, y = arm.place(m, s.q1, s.q2)
-    borders.move_on(m, s, x, y, i, up, 1.0)
+    borders.enter_beyond(m, s, x, y, i, up, 1.0)
 
 
 def bound(m, s, after):
-    """Length of a step, bounded by what begins with it [s]."""
-    methods.act(m, s)
+    """Length of a step [s], bounded by a hit and by the method."""
+    methods.control(m, s)
     if m.hits:
-        after = hits.strike(m, s, min(after, s.fine))
+        after = hits.first_step(m, s, min(after, s.max_step))
     return methods.bound(m, s, after)
 
 
-def towards(m, s, after, overx, overy, first):
+def try_step(m, s, after, overx, overy, first):
     """Tries the next step, shortened to the first border ahead."""
     axis, up = -1, 0
     herex, herey = arm.place(m, s.q1, s.q2)
     while True:
         if m.special and m.springs:
-            after = springs.longest(s, after)
+            after = springs.longest_step(s, after)
         if s.closing != OPEN:
             after = 0.0
         elif first:
@@ -119,35 +118,38 @@ def towards(m, s, after, overx, overy, first):
         if after == 0.0 or axis >= 0 or not methods.is_sound(m, s):
             return after, axis, up, False
         if m.modal:
-            after, again = ends.meet(m, s, after)
+            after, again = ends.shorten_to_end(m, s, after)
             if again:
                 continue
         length, i, at, standing = border_ahead(m, s, after, herex, herey, overx, overy)
         if i < 0:
             return after, axis, up, False
-        if borders.is_same_beyond(m, s, i, at):
-            borders.move_on(m, s, herex, herey, i, at, 0.0)
+        if borders.is_identical_beyond(m, s, i, at):
+            borders.enter_beyond(m, s, herex, herey, i, at, 0.0)
         elif standing:
             return after, i, at, True
         else:
             after, axis, up = length, i, at
             if m.modal:
-                ends.put(s, 0.0, 0.0)
+                ends.put_ends(s, 0.0, 0.0)
 
 
 def border_ahead(m, s, after, herex, herey, overx, overy):
-    """The border that the step tried crosses first."""
-    px, py = methods.place_behind(m, s, after)
+    """The first border that the step tried crosses: step to it [s], coordinate, side.
+
+    The last value tells whether the handle already is on it.
+    """
+    px, py = methods.place_after(m, s, after)
     if borders.side(s.x, px) == 0 and borders.side(s.y, py) == 0:
         return after, -1, 0, False
-    borders.pass_alike(m, s, herex, herey, px, py)
+    borders.skip_identical_regions(m, s, herex, herey, px, py)
     sx, sy = borders.side(s.x, px), borders.side(s.y, py)
     sx = sx if overx == 0 or overx == sx else 0
     sy = sy if overy == 0 or overy == sy else 0
-    i, at = borders.stood_on(s, herex, herey, sx, sy)
+    i, at = borders.border_at_handle(s, herex, herey, sx, sy)
     if at != 0:
         return 0.0, i, at, True
-    if (sx == 0 and sy == 0) or s.landings >= LANDINGS:
+    if (sx == 0 and sy == 0) or s.returns >= MOST_RETURNS:
         return after, -1, 0, False
     length, i, at = borders.first_border(m, s, after, px, py, sx, sy)
     return length, i, at, False
@@ -162,7 +164,7 @@ def step_to_event(m, s):
         return
     after, overx, overy, first = most, 0, 0, True
     while True:
-        after, axis, up, standing = towards(m, s, after, overx, overy, first)
+        after, axis, up, standing = try_step(m, s, after, overx, overy, first)
         if not standing:
             break
         if axis == 0:
@@ -195,7 +197,7 @@ def step_to_event(m, s):
 # ---- whole steps ---------------------------------------------------------------------------------
 
 
-def may_follow(m, s):
+def may_step_whole(m, s):
     """Whether the next step needs no check but that of its end.
 
     This is a whole step between whole steps; where events lie between the samples, any step but
@@ -203,9 +205,9 @@ def may_follow(m, s):
     """
     if s.code != OPEN or s.closing != OPEN or s.i >= m.last:
         return False
-    if m.hits and (s.fine < math.inf or s.struck != 0.0):
+    if m.hits and (s.max_step < math.inf or s.entered != 0.0):
         return False
-    if m.springs and not laws.is_calm(s):
+    if m.springs and s.spring_step < math.inf:
         return False
     if m.uneven:
         return s.before > 0.0
@@ -215,28 +217,28 @@ def may_follow(m, s):
 def has_room(m, s, room):
     """Whether a step may write its row, crossings and stops; between samples it has no row."""
     fits = s.row < room or s.t != s.i * m.dt
-    return fits and s.crossing < m.most_crossings and s.stopped < m.most_stops
+    return fits and s.crossing < m.max_crossings and s.stopped < m.max_stops
 
 
-def is_calm_end(m, s, after):
+def ends_in_region(m, s, after):
     """Whether the step tried ends within its region."""
     if not methods.is_sound(m, s):
         return False
     zx, zy = s.x, s.y
-    x, y = methods.place_behind(m, s, after)
+    x, y = methods.place_after(m, s, after)
     return zx.low <= x and x <= zx.high and zy.low <= y and y <= zy.high
 
 
 def whole_step(m, s):
-    """A step within one region; whether it was possible."""
+    """Makes a step within one region; returns whether it was possible."""
     target, after, on_grid = next_stop(m, s)
     if after < m.dt:
         begin(s, after, on_grid)
-    methods.act(m, s)
+    methods.control(m, s)
     if s.code != OPEN:
         return False
     methods.attempt(m, s, after)
-    if not is_calm_end(m, s, after):
+    if not ends_in_region(m, s, after):
         return False
     methods.keep(m, s, after, on_grid)
     take(m, s, after, target)
@@ -244,16 +246,16 @@ def whole_step(m, s):
 
 
 def whole_steps(m, s, room):
-    """Whole steps within one region, up to one that `step_to_event` must handle."""
+    """Makes whole steps within one region, until one needs `step_to_event`."""
     if m.method == methods.ACCURATE:
-        whole_strides(m, s, room)
+        accurate_whole_steps(m, s, room)
         return
-    while has_room(m, s, room) and may_follow(m, s) and whole_step(m, s):
+    while has_room(m, s, room) and may_step_whole(m, s) and whole_step(m, s):
         pass
 
 
-def whole_strides(m, s, room):
-    """The same of the accurate method."""
+def accurate_whole_steps(m, s, room):
+    """As `whole_steps`, by the accurate method."""
     if s.t != s.i * m.dt or s.closing != OPEN:
         return
     allowed = math.inf
@@ -281,7 +283,7 @@ def advance(m, s, room):
         whole_steps(m, s, room)
         if s.code == OPEN and has_room(m, s, room):
             step_to_event(m, s)
-        if m.unread:
+        if m.drops_events:
             s.crossing = s.stopped = 0
 
 

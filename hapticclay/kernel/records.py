@@ -9,7 +9,6 @@ without that part, and no function reads it then.
 
 from .layout import Kind, floats, many, real, record, thing, whole, wholes
 
-CONTROLLER_ORDER = 4  # most states of a compensator
 LAWS = 4  # most laws of the clay of a user in a scene
 engine_step, engine_bias = Kind("engine_step"), Kind("engine_bias")
 own_control, law_load = Kind("own_control"), Kind("law_load")
@@ -60,9 +59,7 @@ class Engine:
 class ModelAxis:
     """One axis of the handle."""
 
-    servo: real[
-        6
-    ]  # static gain, damping [1/s], stiffness [1/s^2] of G; gain, damping, stiffness of Sh
+    servo: real[6]  # gain, damping [1/s], stiffness [1/s^2] of G, then of Sh
     K: real  # gain of the compensator [1/kg]
     pole: real  # of the compensator K/(s (s + pole)) [rad/s]
     z0: real[4]  # states of one of another shape, of a handle in steady motion
@@ -116,7 +113,7 @@ class Model:
     order: whole  # of these, the higher one
     form: real[50]  # of these, compensator.form_numbers of x and of y
     hand: whole
-    longer: whole  # a kick counts the spring of the hand by the longer step around it
+    spring_uses_longer_step: whole  # the hand's spring acts over the longer step around a kick
     push_since: real  # [s]
     # signals over the next steps, see Drives
     muscle: whole
@@ -134,6 +131,7 @@ class Model:
     special: whole  # more than viscous
     table: floats  # regions
     rotated: whole
+    yields_rotated: whole  # it yields along its rotated axes
     cosine: real  # of the angle between its axes and x, y
     sine: real
     grows: whole
@@ -159,15 +157,15 @@ class Model:
     ratio: whole  # steps in a control sample
     Ts: real  # [s]
     uneven: whole  # events may lie between the steps
-    unread: whole  # nobody reads crossings and stops: they are written over
-    told: whole  # the force of the clay is recorded: b v does not give it
-    holds: whole  # it is recorded as the motors hold it
+    drops_events: whole  # crossings and stops are overwritten, since nothing reads them
+    records_clay_force: whole  # fe is recorded, since it is not b v
+    records_held_force: whole  # as the motors hold it
     chance: whole
     chances: floats  # four numbers a sample
     chance_first: whole
     encoder: whole  # counts per turn, 0 for none
     window: whole  # samples of the difference, 0 for exact rates
-    cutoff: real  # of the low-pass behind it [Hz], 0 for none
+    cutoff: real  # of the low-pass after it [Hz], 0 for none
     angles: floats  # ring of past angles
     filtered: whole
     filter: real[6]
@@ -204,7 +202,6 @@ class Model:
     breaks_count: whole
     slack: real  # times that differ by no more are equal [s]
     modal: whole  # clay that yields: 1 by axis, 2 along the motion
-    modal_rotated: whole
     lightness: real  # largest acceleration per unit of force, by way of C too [1/kg]
     # what a run fills
     engine: engine_of
@@ -214,8 +211,8 @@ class Model:
     crossings: floats
     stops: floats
     rendered: floats
-    most_crossings: whole
-    most_stops: whole
+    max_crossings: whole
+    max_stops: whole
     axis: many(ModelAxis, 2)
 
 
@@ -235,7 +232,7 @@ class KickAxis:
     d: real  # [N.s/m]
     clay: real  # force of the clay on the velocity before [N]
     clay_d: real  # and damping on that after [N.s/m]
-    damped: real  # force of the dampers behind the sample [N]
+    damped: real  # force of the dampers after the sample [N]
     n: real  # law n u = a + S (f - d u) [1/s]
     a: real  # [m/s^2]
     rest: real  # a of a handle at rest
@@ -258,11 +255,11 @@ class KickAxis:
     feed: real  # what each unit of that force adds [m/N]
     ref: real  # rate of the reference, without that force [m/s]
     ref_feed: real  # and with each unit of it [m/(N.s)]
-    next_delta: real  # compensator and reference behind the step
+    next_delta: real  # compensator and reference after the step
     next_rate: real
     next_y: real
     next_yrate: real
-    z: real[4]  # compensator of another shape, behind the step
+    z: real[4]  # compensator of another shape, after the step
 
 
 @record
@@ -283,7 +280,7 @@ class Kick:
     Syy: real
     dxy: real  # of the load [N.s/m]
     clay_dxy: real  # of it, of the clay
-    over: real  # whether stiff clay is split
+    splits: real  # whether stiff clay is split
     still: real  # whether clay holds the handle
     o1: real  # joint rates before [rad/s]
     o2: real
@@ -299,14 +296,20 @@ class Kick:
 
 
 @record
-class StateAxis:
-    """One axis of controller and clay."""
+class LoopAxis:
+    """Compensator and reference model of an axis."""
 
-    delta: real  # compensator [m]; of another shape, start and command alone
+    delta: real  # compensator [m]; of another shape, its start and the command alone
     rate: real
     y: real  # reference model [m]
     yrate: real
     z: real[4]  # states of a compensator of another shape
+
+
+@record
+class StateAxis(LoopAxis):
+    """One axis of controller and clay."""
+
     index: whole  # of the region
     low: real  # its borders [m]
     high: real
@@ -338,14 +341,9 @@ class StateAxis:
 
 
 @record
-class MachineAxis:
+class MachineAxis(LoopAxis):
     """One axis, or joint, of controller and hardware."""
 
-    delta: real  # compensator
-    rate: real
-    y: real  # reference model
-    yrate: real
-    z: real[4]  # compensator of another shape
     start: real  # its start and command [m]
     tau: real  # that a joint holds [N.m]
     force: real  # of the clay as rendered [N]
@@ -392,17 +390,6 @@ class Work:
 
 
 @record
-class PointAxis:
-    """One axis of compensator and reference at a stage of a step."""
-
-    delta: real
-    rate: real
-    y: real
-    yrate: real
-    z: real[4]
-
-
-@record
 class Point:
     """A stage of a step of the accurate method."""
 
@@ -410,7 +397,7 @@ class Point:
     q2: real
     w1: real
     w2: real
-    axis: many(PointAxis, 2)
+    axis: many(LoopAxis, 2)
 
 
 @record
@@ -507,9 +494,8 @@ class Watch:
     """What the quick test of the monitor carries from one look to the next."""
 
     quiet: whole  # nothing to report so far
-    seen: whole[
-        4
-    ]  # samples; last one that moved, last one below the torque limits; samples at them
+    # samples; the last one that moved, the last one below the torque limits; samples at them
+    seen: whole[4]
     swings: real[32]  # 16 of x, then of y
 
 
@@ -526,11 +512,11 @@ class State:
     w2: real
     g1: real
     g2: real
-    fine: real  # longest step after a hit [s]
-    struck: real  # the handle has just entered this clay
-    lost: real  # energy of springs [J]
-    stored: real
-    resolved: real  # longest step that resolves them [s]
+    max_step: real  # after a hit [s]
+    entered: real  # 1.0 if the handle has just entered this clay
+    springs_dissipated: real  # energy [J]
+    springs_stored: real
+    spring_step: real  # longest step that resolves the springs here [s]
     drag: real  # damping of a groove [N.s/m]
     form_kick: real[50]  # compensator.form_kick of x and of y, for these steps:
     form_before: real
@@ -538,29 +524,29 @@ class State:
     form_work: real[64]
     code: whole
     closing: whole  # why the next row is the last, OPEN where it is not
-    careful: whole  # steps with event detection since the last sample
-    landings: whole  # returns to a region since then
+    checked_steps: whole  # with event detection, since the last sample
+    returns: whole  # to a region, since then
     seen: whole[4]  # regions since then: least and most index along x, then y
     steps: whole  # since the last look
     row: whole
     crossing: whole
     stopped: whole
     # sampled control
-    on: whole  # an event begins the step
-    shown: whole  # its sample asks torques
-    asked: real[10]  # torques, force, guard, pull and velocity of its tool asked
+    at_event: whole  # an event begins the step
+    responded: whole  # the controller responded to its sample
+    requested: real[10]  # its response: torques, force, guard, pull and velocity of the tool
     fh1: real  # force of the hand in the kick to the event
     fh2: real
-    show1: real  # compensator at the sample
-    show2: real
+    delta1: real  # compensator at the sample [m]
+    delta2: real
     # accurate method
-    left: whole  # steps to the next sample; 0 where they must be counted again
-    share: real  # length of each but the last [s]
+    steps_left: whole  # to the next sample; 0 where they must be counted again
+    step_length: real  # of each but the last [s]
     mode_step: real  # longest step that the modes allow [s]
     axis: many(StateAxis, 2)
     mode: many(ModeAxis, 2)
     work: Work
-    early: Work  # with the kick to the event
+    work_at_event: Work  # the ledger including the kick to the event
     now: Machine
     next: Machine  # after the event
     k: Kick  # of the step
@@ -583,7 +569,7 @@ class Summary:
 
 
 RECORDS = (
-    Engine, ModelAxis, KickAxis, Kick, LawSlot, Span, Model, StateAxis, MachineAxis, Machine, Work,
-    PointAxis, Point, GripAxis, Grip, InstantAxis, Instant, Sums, ModeAxis, Stride, Watch, State,
-    Summary,
+    Engine, ModelAxis, KickAxis, Kick, LawSlot, Span, Model, LoopAxis, StateAxis, MachineAxis,
+    Machine, Work, Point, GripAxis, Grip, InstantAxis, Instant, Sums, ModeAxis, Stride, Watch,
+    State, Summary,
 )  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import functools
 import math
 from typing import Any, NamedTuple
 
@@ -40,7 +39,7 @@ class Buffers:
         """Makes room for what a scene records in addition to its rows."""
         if (m.flow or m.modal) and len(self.stops) < STOPS:
             self.stops = np.empty((STOPS, 3))
-        if (m.told or m.holds) and len(self.rendered) <= CHUNK:
+        if m.records_clay_force and len(self.rendered) <= CHUNK:
             self.rendered = np.empty((CHUNK + 1, 3))
 
     @property
@@ -53,20 +52,25 @@ class Buffers:
 class Row:
     """A run: the model of its scene, its state, and the arrays that they name.
 
-    `m` and `s` have the attributes of records.Model and records.State, whoever advances the row.
+    CPython advances it. `m` and `s` have the attributes of records.Model and records.State, as
+    those of a `NativeRow` do.
 
     Attributes:
-        caller: of the user's own controller, None without any.
+        caller: calls the user's own controller; None without one.
         failed: what functions of the user's laws raised.
     """
 
+    engine = "python"
     m: Any
     s: Any
-    engine: str
-    failed: list[BaseException]
 
     def __init__(self, scenario: Scenario, mover: Mover, buffers: Buffers):
-        self.buffers, self.mover, self.failed = buffers, mover, []
+        self.s, self.spare = records.State(), records.State()
+        self._start(scenario, mover, buffers)
+
+    def _start(self, scenario: Scenario, mover: Mover, buffers: Buffers) -> None:
+        self.buffers, self.mover = buffers, mover
+        self.failed: list[BaseException] = []
         self.take(scenario)
         self.begin(scenario)
 
@@ -77,10 +81,8 @@ class Row:
         made = scene.compile_scene(scenario, controller)
         self.arrays, self.caller, self.laws = made.arrays, made.caller, made.laws
         self.buffers.make_room(made.m)
-        made.m.most_crossings, made.m.most_stops = (
-            CROSSINGS - 3,
-            max(len(self.buffers.stops) - 8, 1),
-        )
+        made.m.max_crossings = CROSSINGS - 3
+        made.m.max_stops = max(len(self.buffers.stops) - 8, 1)
         self.names = [name for name in made.written if name in self.arrays]
         self.written = [self.arrays[name].reshape(-1) for name in self.names]
         self.written += [law.z for law in self.laws]
@@ -92,6 +94,26 @@ class Row:
         for span, at, kept in zip(self.m.span, self.written, self.kept, strict=False):
             span.at, span.kept, span.size = self.place(at), self.place(kept), len(at)
         self.put_functions()
+
+    def model_of(self, m: Any) -> Any:
+        """The model, as this row reads it."""
+        return m
+
+    def place(self, array: np.ndarray) -> Any:
+        """An array, as a record names it."""
+        return memoryview(array)  # type: ignore[arg-type]
+
+    def put_engine(self, mover: Mover) -> None:
+        """Lets the model name the engine that moves the arm."""
+        self.mover, self.m.engine = mover, mover.plain
+
+    def put_functions(self) -> None:
+        """Lets the model name the functions of the user."""
+        self.m.control = self.caller
+        for slot, law in zip(self.m.law, self.laws, strict=False):
+            slot.load, slot.moved, slot.force = kept(law.module, self.failed)
+            slot.z, slot.scratch = memoryview(law.z), memoryview(law.z.copy())
+            slot.size = len(law.z)
 
     def replace(self, arrays: dict[str, np.ndarray]) -> None:
         """Lets the model name other arrays."""
@@ -119,35 +141,11 @@ class Row:
             law.z[law.first :] = z[law.first :]
         self.go_on()
 
-    @property
-    def is_called(self) -> bool:
-        """Whether steps call functions of the user, which may fail."""
-        return self.caller is not None or bool(self.laws)
+    def go_on(self) -> None:
+        """Continues in a changed scene."""
+        begin.change(self.m, self.s)
 
-    def check(self) -> None:
-        """Raises what functions of the user raised."""
-        if self.failed:
-            raise self.failed[0]
-        if self.caller is not None:
-            self.caller.check()
-
-    # ---- what depends on who advances it
-
-    def model_of(self, m: Any) -> Any:
-        """The model, as this row reads it."""
-        raise NotImplementedError
-
-    def put_engine(self, mover: Mover) -> None:
-        """Lets the model name the engine that moves the arm."""
-        raise NotImplementedError
-
-    def place(self, array: np.ndarray) -> Any:
-        """An array, as a record names it."""
-        raise NotImplementedError
-
-    def put_functions(self) -> None:
-        """Lets the model name the functions of the user."""
-        raise NotImplementedError
+    # ---- the run
 
     def begin(self, scenario: Scenario) -> None:
         """Puts the state to the start of a run."""
@@ -160,33 +158,60 @@ class Row:
 
     def put_start(self, px: float, py: float, vx: float, vy: float) -> None:
         """Puts the state to the start of a run, the handle at p with velocity v."""
-        raise NotImplementedError
-
-    def go_on(self) -> None:
-        """Continues in a changed scene."""
-        raise NotImplementedError
+        begin.begin(self.m, self.s, px, py, vx, vy)
 
     def advance(self, room: int) -> None:
         """Makes steps until so many rows are filled, other buffers are full, or the run is over."""
-        raise NotImplementedError
+        arm.put(self.m, self.s)
+        self._step(path.advance, self.m, self.s, room)
 
     def peek(self) -> np.ndarray:
         """The row that the next step would write, and the force of the clay, shape (18,)."""
-        raise NotImplementedError
+        m, n = self.m, self.s.row
+        arm.put(m, self.s)
+        self._step(path.peek, m, self.s, self.spare)
+        rendered = self.buffers.rendered[n, :2] if m.records_clay_force else (0.0, 0.0)
+        return np.concatenate((self.buffers.rows[n], rendered))
+
+    def _step(self, make: Any, *arguments: Any) -> None:
+        """Makes steps, where the step of an exactly straight arm raises."""
+        try:
+            make(*arguments)
+        except ArithmeticError:
+            self.s.code = path.NOT_FINITE
+        except ValueError:  # from the sine of an infinite angle
+            if np.isfinite(self.mover.data.qpos).all() and np.isfinite(self.mover.data.qvel).all():
+                raise
+            self.s.code = path.NOT_FINITE
+
+    @property
+    def is_called(self) -> bool:
+        """Whether steps call functions of the user, which may fail."""
+        return self.caller is not None or bool(self.laws)
+
+    def check(self) -> None:
+        """Raises what functions of the user raised."""
+        if self.failed:
+            raise self.failed[0]
+        if self.caller is not None:
+            self.caller.check()
 
     def is_quiet(self, first: int, n: int) -> bool:
         """Whether the monitor can have nothing to report on rows, nor had it before."""
-        raise NotImplementedError
+        watch.look(self.m, self.s, first, n)
+        return bool(self.s.watch.quiet)
+
+    # ---- to return to
 
     def state(self) -> np.ndarray:
         """A copy of the state, shape (1,)."""
-        raise NotImplementedError
+        made = one(records.State)
+        layout.save(self.s, made)
+        return made
 
     def put_state(self, state: np.ndarray) -> None:
         """Puts a state back."""
-        raise NotImplementedError
-
-    # ---- to return to
+        layout.load(self.s, state)
 
     def saved(self) -> Saved:
         """The run at its sample."""
@@ -199,92 +224,23 @@ class Row:
             x[:] = before
 
 
-class PlainRow(Row):
-    """A row that CPython advances."""
-
-    engine = "python"
-
-    def __init__(self, scenario: Scenario, mover: Mover, buffers: Buffers):
-        self.s, self.spare = records.State(), records.State()
-        super().__init__(scenario, mover, buffers)
-
-    def model_of(self, m: Any) -> Any:
-        return m
-
-    def put_engine(self, mover: Mover) -> None:
-        self.mover, self.m.engine = mover, mover.plain
-
-    def place(self, array: np.ndarray) -> Any:
-        return memoryview(array)  # type: ignore[arg-type]
-
-    def put_functions(self) -> None:
-        self.m.control = self.caller
-        for slot, law in zip(self.m.law, self.laws, strict=False):
-            slot.load, slot.moved, slot.force = kept(law.module, self.failed)
-            slot.z, slot.scratch = memoryview(law.z), memoryview(law.z.copy())
-            slot.size = len(law.z)
-
-    def put_start(self, px: float, py: float, vx: float, vy: float) -> None:
-        begin.begin(self.m, self.s, px, py, vx, vy)
-
-    def go_on(self) -> None:
-        begin.change(self.m, self.s)
-
-    def advance(self, room: int) -> None:
-        arm.put(self.m, self.s)
-        self._made(path.advance, self.m, self.s, room)
-
-    def peek(self) -> np.ndarray:
-        n = self.s.row
-        arm.put(self.m, self.s)
-        self._made(path.peek, self.m, self.s, self.spare)
-        rendered = self.buffers.rendered[n, :2] if self.m.told or self.m.holds else (0.0, 0.0)
-        return np.concatenate((self.buffers.rows[n], rendered))
-
-    def _made(self, make: Any, *arguments: Any) -> None:
-        """Makes steps, where the step of an exactly straight arm raises."""
-        try:
-            make(*arguments)
-        except ArithmeticError:
-            self.s.code = path.NOT_FINITE
-        except ValueError:  # of the sine of an infinite angle
-            if np.isfinite(self.mover.data.qpos).all() and np.isfinite(self.mover.data.qvel).all():
-                raise
-            self.s.code = path.NOT_FINITE
-
-    def is_quiet(self, first: int, n: int) -> bool:
-        watch.look(self.m, self.s, first, n)
-        return bool(self.s.watch.quiet)
-
-    def state(self) -> np.ndarray:
-        made = np.zeros(1, layout.dtype_of(records.State))
-        layout.save(self.s, made[0])
-        return made
-
-    def put_state(self, state: np.ndarray) -> None:
-        layout.load(self.s, state[0])
-
-
 class NativeRow(Row):
     """A row that the compiled kernel advances."""
 
     engine = "native"
 
-    def __init__(
-        self, scenario: Scenario, mover: Mover, buffers: Buffers, at: Any = None
-    ):  # fmt: skip
-        """Makes a row."""
-        self.machine = native.machine()
+    def __init__(self, scenario: Scenario, mover: Mover, buffers: Buffers, at: Any = None):
+        self.machine, self.spare = native.machine(), one(records.State)
         self.models, self.states = at or (one(records.Model), one(records.State))
         self.s = layout.view_of(records.State, self.states)
         self.addresses = self.models.ctypes.data, self.states.ctypes.data
         self.rooms, self.which = np.zeros(1, np.int64), np.zeros(1, np.int64)
         self.call = *self.addresses, self.which.ctypes.data, 1
-        super().__init__(scenario, mover, buffers)
+        self._start(scenario, mover, buffers)
 
     def model_of(self, m: Any) -> Any:
         bytes_of(self.models)[:] = 0
-        layout.save(m, self.models[0])
+        layout.save(m, self.models)
         return layout.view_of(records.Model, self.models)
 
     def put_engine(self, mover: Mover) -> None:
@@ -318,11 +274,6 @@ class NativeRow(Row):
     def advance(self, room: int) -> None:
         self.rooms[0] = room
         self.machine.advance(*self.call, self.rooms.ctypes.data, False)
-
-    @functools.cached_property
-    def spare(self) -> np.ndarray:
-        """A state to try the next step in."""
-        return one(records.State)
 
     def peek(self) -> np.ndarray:
         shown = np.zeros(SHOWN)

@@ -14,10 +14,10 @@ def write(m, s, k, after):
     fx, fy = x.sf if yields else 0.0, y.sf if yields else 0.0
     if end:
         vx, vy, fx, fy = arrived(m, s, vx, vy, fx, fy)
-    bx, by = viscous.now(m, s, 0, end), viscous.now(m, s, 1, end)
+    bx, by = viscous.damping(m, s, 0, end), viscous.damping(m, s, 1, end)
     hx, hy = hand.force(m, k, 0), hand.force(m, k, 1)
     if m.ratio:
-        dx, dy, share = sampled.shown(s, after)
+        dx, dy, share = sampled.shown_output(s, after)
         hx, hy = hx + share * (s.fh1 - hx), hy + share * (s.fh2 - hy)
         if m.special and m.flow:
             fx, fy = x.sf + share * (s.e.x.sf - x.sf), y.sf + share * (s.e.y.sf - y.sf)
@@ -30,9 +30,9 @@ def write(m, s, k, after):
     row[n + 4], row[n + 5], row[n + 6], row[n + 7] = vx, vy, hx, hy
     row[n + 8], row[n + 9], row[n + 10], row[n + 11] = k.tau1, k.tau2, dx, dy
     row[n + 12], row[n + 13], row[n + 14], row[n + 15] = bx, by, r1, r2 - r1
-    if m.told:
+    if m.records_clay_force:
         write_force(m, s, k, end, vx, vy, fx, fy)
-    if m.holds:
+    if m.records_held_force:
         machine, out = sampled.machine_of(s, after), m.rendered
         out[3 * s.row], out[3 * s.row + 1] = machine.x.force, machine.y.force
 
@@ -40,7 +40,7 @@ def write(m, s, k, after):
 def write_force(m, s, k, end, vx, vy, fx, fy):
     """Writes the force of the clay where b v does not give it; f is that of yielding."""
     out, n = m.rendered, 3 * s.row
-    x, y = viscous.force(m, viscous.now(m, s, 0, end), viscous.now(m, s, 1, end), vx, vy)
+    x, y = viscous.force(m, viscous.damping(m, s, 0, end), viscous.damping(m, s, 1, end), vx, vy)
     x, y = x + fx, y + fy
     if m.springs:
         x, y = x + springs.force(s, 0, k.L), y + springs.force(s, 1, k.L)
@@ -83,6 +83,6 @@ def keep(m, s, k, after, shows):
         write(m, s, k, after)
         s.row += 1
     if sampled.is_early(s, after):
-        ledger.add_work(m, s.early, s.work, k, s.e.w1, s.e.w2, s.next)
+        ledger.add_work(m, s.work_at_event, s.work, k, s.e.w1, s.e.w2, s.next)
     else:
         ledger.add_work(m, s.work, s.work, k, s.w1, s.w2, s.now)

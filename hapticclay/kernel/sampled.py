@@ -1,4 +1,4 @@
-"""Sampled control: a machine around the kick. It senses, computes, queues and holds.
+"""Sampled control around the kick: it senses, computes, queues and holds torques.
 
 At an event (a control sample or a change of the torques) the kick is split in two. The first, under
 the old torques, brings the velocity to the sample, where it is measured. The second is under the
@@ -35,7 +35,7 @@ NOT_FINITE = 3
 
 def is_early(s, after):
     """Whether the kick before a step begins at an event."""
-    return s.on and after > 0.0
+    return s.at_event and after > 0.0
 
 
 def machine_of(s, after):
@@ -48,24 +48,24 @@ def by_hold(m, s, k, after):
     if is_early(s, after):
         kick.begin(k, 0.0, after)
         from_event(s.e, k)
-        push(m, s, k, s.next)
+        move_under(m, s, k, s.next)
     else:
         across(m, s, k, after)
 
 
 def across(m, s, k, after):
-    """The same across the sample, whatever begins there."""
+    """The kick across the sample, even if an event begins there."""
     kick.begin(k, s.before, after)
-    kick.take_up(m, s, k)
+    kick.take_over(m, s, k)
     r1, r2 = s.w1, s.w1 + s.w2
     arm.handle_at(m, k, s.q1, s.q2, r1, r2)
     arm.turning(k, r1, r2)
-    push(m, s, k, s.now)
+    move_under(m, s, k, s.now)
 
 
-def push(m, s, k, machine):
+def move_under(m, s, k, machine):
     """Motion in a kick under the torques of a machine."""
-    kick.act(m, s, k)
+    kick.load(m, s, k)
     k.tau1, k.tau2 = machine.x.tau, machine.y.tau
     k.slip1 = k.slip2 = 0.0
     if m.friction:
@@ -89,13 +89,13 @@ def from_event(e, k):
 
 
 def act(m, s):
-    """What the controller does at the beginning of a step."""
+    """Lets the controller sample, and changes the torques, at the beginning of a step."""
     now = s.t + SLACK * m.dt
     samples = s.now.when <= now
     if samples or (m.delay > 0.0 and s.now.due <= now):
         event(m, s, 1 if samples else 0, now)
     else:
-        s.on = 0
+        s.at_event = 0
 
 
 def event(m, s, samples, now):
@@ -103,27 +103,27 @@ def event(m, s, samples, now):
     e = s.e
     s.fh1 = s.fh2 = 0.0
     e.tau1 = e.tau2 = e.slip1 = e.slip2 = 0.0
-    s.on = 0
+    s.at_event = 0
     if s.before > 0.0:
         across(m, s, e, 0.0)
         s.fh1, s.fh2 = hand.force(m, e, 0), hand.force(m, e, 1)
-        ledger.add_work(m, s.work, s.early, e, e.o1, e.o2, s.now)
+        ledger.add_work(m, s.work, s.work_at_event, e, e.o1, e.o2, s.now)
     else:
         rest(m, s, e)
-        memory.copied(s.early, s.work)
+        memory.copied(s.work_at_event, s.work)
     arm.at_rates(e, e.w1, e.w2)
     memory.copied(s.next, s.now)
-    s.show1, s.show2 = s.now.x.delta, s.now.y.delta
-    s.on, s.shown = 1, 0
+    s.delta1, s.delta2 = s.now.x.delta, s.now.y.delta
+    s.at_event, s.responded = 1, 0
     if samples:
         sample(m, s)
     if m.delay > 0.0:
-        hardware.queue(m, s, now)
+        hardware.advance_queue(m, s, now)
 
 
 def rest(m, s, e):
     """A kick of no length."""
-    kick.take_up(m, s, e)
+    kick.take_over(m, s, e)
     arm.handle_at(m, e, s.q1, s.q2, s.w1, s.w1 + s.w2)
     e.w1, e.w2 = s.w1, s.w2
     for i in range(2):
@@ -141,28 +141,28 @@ def put_times(m, machine, k):
 def sample(m, s):
     """Sense, compute, hold."""
     seen = s.k
-    w1, w2 = see(m, s, seen)
+    w1, w2 = sense(m, s, seen)
     ux, uy = signals.push_now(m, s)
     fx, fy = on_sensor(m, s, seen, ux, uy)
     fx, fy = hardware.measured(m, s, 0, fx), hardware.measured(m, s, 1, fy)
     dx, dy = signals.command_over_sample(m, s)
     if not hardware.is_lost(m, s.now.k):
-        s.shown = 1
-        answer(m, s, seen, w1, w2, fx, fy)
-        hardware.ask(s)
+        s.responded = 1
+        respond(m, s, seen, w1, w2, fx, fy)
+        hardware.note_request(s)
     if not m.own:
         advance(m, s, 0, dx)
         advance(m, s, 1, dy)
     put_times(m, s.next, s.now.k + 1)
 
 
-def answer(m, s, k, w1, w2, fx, fy):
+def respond(m, s, k, w1, w2, fx, fy):
     """Response of the controller to a sample that is not lost."""
     q1, q2 = hardware.encoded(m, s.q1), hardware.encoded(m, s.q2)
     if m.window > 0:
         w1, w2 = hardware.differenced(m, s, q1, q2)
     if m.own:
-        own(m, s, q1, q2, w1, w2, fx, fy)
+        call_own_controller(m, s, q1, q2, w1, w2, fx, fy)
         return
     if m.encoder > 0:
         arm.handle_at(m, k, q1, q2, w1, w1 + w2)
@@ -175,7 +175,7 @@ def answer(m, s, k, w1, w2, fx, fy):
 # ---- sense ---------------------------------------------------------------------------------------
 
 
-def see(m, s, k):
+def sense(m, s, k):
     """The handle at a sample, into k; returns the joint rates [rad/s].
 
     Half a kick holds too little of stiff clay: the velocity there is that of a whole kick, with the
@@ -264,20 +264,20 @@ def reaction(m, s, k, fx, fy, t1, t2):
 def compute(m, s, k, fx, fy):
     """Response of compensator and servo to a sample of the handle in k."""
     now, after, x, y = s.now, s.next, k.x, k.y
-    fex, fey = laws.seen_force(m, s, k)
+    fex, fey = laws.force_for_controller(m, s, k)
     if m.coupling:
-        fex, fey = hardware.couple(m, s, k, viscous.now(m, s, 0, 0), viscous.now(m, s, 1, 0))
+        fex, fey = hardware.couple(
+            m, s, k, viscous.damping(m, s, 0, 0), viscous.damping(m, s, 1, 0)
+        )
     if m.guard:
         fex, fey = hardware.guarded(m, s, k, 0, fex), hardware.guarded(m, s, k, 1, fey)
         after.newest = (now.newest + 1) % (m.guard_whole + 2)
     x.net, y.net = fx - fex, fy - fey
-    s.show1, s.show2 = output(m, now.x, 0, x.net), output(m, now.y, 1, y.net)
-    ax, _ = servo.acceleration(m, 0, s.show1, now.x.y, now.x.yrate, x.p, x.v, x.c)
-    ay, _ = servo.acceleration(m, 1, s.show2, now.y.y, now.y.yrate, y.p, y.v, y.c)
-    xx, xy, yy = k.Wxx, k.Wxy, k.Wyy
-    if m.shaping:
-        xx, xy, yy = m.x.servo[3], 0.0, m.y.servo[3]
-    ax, ay = ax + xx * x.net + xy * y.net, ay + xy * x.net + yy * y.net
+    s.delta1, s.delta2 = output(m, now.x, 0, x.net), output(m, now.y, 1, y.net)
+    ax, _ = servo.acceleration(m, 0, s.delta1, now.x.y, now.x.yrate, x.p, x.v, x.c)
+    ay, _ = servo.acceleration(m, 1, s.delta2, now.y.y, now.y.yrate, y.p, y.v, y.c)
+    servo.put_mobility(m, k)
+    ax, ay = ax + k.Sxx * x.net + k.Sxy * y.net, ay + k.Sxy * x.net + k.Syy * y.net
     k.g1, k.g2 = arm_law.joint_velocity(ax, ay, k.u, 1.0)
     arm.link_torques(m, k)
     t1, t2 = k.tau1, k.tau2
@@ -297,14 +297,14 @@ def output(m, z, i, f):
     return out + c[j] * a[0] + c[j + 1] * a[1] + c[j + 2] * a[2] + c[j + 3] * a[3]
 
 
-def own(m, s, q1, q2, w1, w2, fx, fy):
+def call_own_controller(m, s, q1, q2, w1, w2, fx, fy):
     """The user's own controller: a function of a buffer, which it fills with torques and state."""
     b, z = m.buffer, s.next
     b[0], b[1], b[2], b[3], b[4], b[5], b[6] = s.t, q1, q2, w1, w2, fx, fy
-    b[7] = b[8] = math.nan  # left behind by a call that fails
+    b[7] = b[8] = math.nan  # stays so where the call fails
     m.control(b)
     t1, t2 = b[7], b[8]
-    s.show1 = s.show2 = 0.0
+    s.delta1 = s.delta2 = 0.0
     if not abs(t1) + abs(t2) < math.inf:
         s.code = NOT_FINITE
         z.x.tau, z.y.tau = t1, t2
@@ -317,7 +317,7 @@ def own(m, s, q1, q2, w1, w2, fx, fy):
 
 
 def advance(m, s, i, shift):
-    """One axis a sample later, under a force that is held; `shift`: of the command."""
+    """An axis a sample later, under a held force; `shift`: change of the command [m]."""
     a, z, to = m.axis[i].memory, s.now.axis[i], s.next.axis[i]
     if m.formed:
         advance_form(m, i, z, to, shift)
@@ -330,15 +330,13 @@ def advance(m, s, i, shift):
 
 
 def advance_form(m, i, z, to, shift):
-    """The same of a compensator of another shape."""
+    """As `advance`, of a compensator of another shape."""
     c, a, f = m.axis[i].memory, z.z, to.net
     for r in range(4):
         to.z[r] = form_row(c, 8 * r, a, z.y, z.yrate, z.start, f)
     to.start, to.rate = z.start + shift, 0.0
-    to.y, to.yrate = (
-        form_row(c, 32, a, z.y, z.yrate, z.start, f),
-        form_row(c, 40, a, z.y, z.yrate, z.start, f),
-    )
+    to.y = form_row(c, 32, a, z.y, z.yrate, z.start, f)
+    to.yrate = form_row(c, 40, a, z.y, z.yrate, z.start, f)
     to.delta = output(m, to, i, f)
 
 
@@ -354,7 +352,7 @@ def form_row(c, j, z, y, yrate, start, f):
 # ---- a step --------------------------------------------------------------------------------------
 
 
-def shown(s, after):
+def shown_output(s, after):
     """Compensator output that a row shows, (x, y) [m], and the share in it of a kick to an event.
 
     Force of hand and clay are the means of both kicks, half of each step, interpolated at the
@@ -363,14 +361,14 @@ def shown(s, after):
     if not is_early(s, after):
         return s.now.x.delta, s.now.y.delta, 0.0
     share = after / (s.before + after) if s.before > 0.0 else 0.0
-    return s.show1, s.show2, share
+    return s.delta1, s.delta2, share
 
 
 def take(m, s):
-    """Keeps what an event did, once the step behind it is taken."""
-    if not s.on:
+    """Keeps the results of an event, once the step after it is taken."""
+    if not s.at_event:
         return
-    if s.shown:
+    if s.responded:
         if m.window > 0:
             hardware.note_angles(m, s)
         if m.guard:
@@ -378,9 +376,9 @@ def take(m, s):
         if m.own:
             keep_own_state(m)
         if m.delay > 0.0:
-            hardware.note_hold(m, s)
+            hardware.enqueue(m, s)
     memory.copied(s.now, s.next)
-    s.on = 0
+    s.at_event = 0
 
 
 def keep_own_state(m):
@@ -409,5 +407,5 @@ def before_event(m, s, target, after):
 
 
 def first_after(t, when, target):
-    """A time, if it lies between t and a later one; else that one."""
+    """`when` if it lies between t and target, else target."""
     return when if t < when and when < target else target

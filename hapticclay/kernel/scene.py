@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..formulas import compensator as form
 from ..formulas import groove as groove_law
 from ..formulas import pieces
 from ..formulas.constants import B_MAX
-from ..model import compensator, regions
+from ..model import compensator, controller, regions
 from ..model import hardware as devices
+from ..model.controller import Servo
 from ..model.sampled_controller import BUFFER, Controller, LawCaller
 from ..scene.scenario import Scenario
-from . import hardware, methods, modes, pace, records, user_laws
+from . import hardware, methods, modes, pace, records, sampled, user_laws
 from .march import GROWTH_BLOCK
-from .memories import delay_in_samples, formed_memory, held_memory
 
 QUEUE = 4  # rows of the queue of torques in addition to the whole samples of their delay
 STIFF, HITTING = 1.0, 0.02  # see `hardness`
@@ -41,15 +43,15 @@ class Compiled(NamedTuple):
     laws: tuple[Any, ...]
 
 
-def compile_scene(s: Scenario, controller: Controller | None = None) -> Compiled:
-    """The model of a scene."""
+def compile_scene(s: Scenario, own: Controller | None = None) -> Compiled:
+    """The model of a scene; `own`: the user's controller, in place of the scenario's."""
     m, arrays = records.Model(), {"table": regions.region_table(s.clay, s.length)}
     put_arm(m, s)
     put_axes(m, s)
     put_clay(m, arrays, s)
     caller = None
     if s.control == "sampled":
-        caller = put_sampler(m, arrays, s, controller or s.controller)
+        caller = put_sampler(m, arrays, s, own or s.controller)
     elif s.integrator != "fast":
         put_accurate(m, arrays, s)
     laws = user_laws.of_scene(s)
@@ -73,7 +75,7 @@ def put_arm(m: Any, s: Scenario) -> None:
 
 def put_axes(m: Any, s: Scenario) -> None:
     """Compensator, servo, hand and muscle of each axis."""
-    m.hand, m.longer = int(any(s.operators)), int(s.control == "sampled")
+    m.hand, m.spring_uses_longer_step = int(any(s.operators)), int(s.control == "sampled")
     force = s.steady_force
     for i, a in enumerate(m.axis):
         a.servo[:] = map(float, s.servo[i].numbers)
@@ -131,6 +133,7 @@ def put_clay(m: Any, arrays: dict[str, np.ndarray], s: Scenario) -> None:
     m.smooth = int(clay.smooth or 0)
     if clay.yields and (s.integrator == "fast" or s.control == "sampled"):
         m.flow = 2 if clay.isotropic or clay.groove else 1
+        m.yields_rotated = m.rotated
     if clay.springs:
         m.springs, m.spring_step = 2 if is_held(s) else 1, float(pace.spring_step(s))
     stiff, hits = hardness(s, largest_damping(s))
@@ -151,11 +154,12 @@ def put_groove(m: Any, arrays: dict[str, np.ndarray], g: Any) -> None:
 
 
 def put_special(m: Any, s: Scenario, has_laws: bool) -> None:
-    """Whether the clay has more laws than plain damping, and which record tells their force."""
+    """Whether the clay has more laws than plain damping, and which force is recorded."""
     more = m.flow or m.springs or has_laws
     m.special = int(bool(m.smooth or m.stiff or m.groove or more))
-    m.told = int(bool(m.modal or more))
-    m.holds = int(is_held(s) and (s.hardware is not None or (not m.own and bool(more))))
+    holds = is_held(s) and (s.hardware is not None or (not m.own and bool(more)))
+    m.records_held_force = int(holds)
+    m.records_clay_force = int(bool(m.modal or more or holds))
 
 
 # ---- the accurate method -------------------------------------------------------------------------
@@ -169,7 +173,7 @@ def put_accurate(m: Any, arrays: dict[str, np.ndarray], s: Scenario) -> None:
         arrays["blocks"] = substeps_of_blocks(s)
     if s.clay and s.clay.yields:
         m.modal = 2 if s.clay.isotropic else 1
-        m.modal_rotated = int(m.modal == 1 and m.rotated)
+        m.yields_rotated = int(m.modal == 1 and m.rotated)
         m.lightness = float(pace.largest_lightness(s))
 
 
@@ -189,22 +193,42 @@ def substeps_of_blocks(s: Scenario) -> np.ndarray:
 
 
 def put_sampler(
-    m: Any, arrays: dict[str, np.ndarray], s: Scenario, controller: Controller | None
+    m: Any, arrays: dict[str, np.ndarray], s: Scenario, own: Controller | None
 ) -> LawCaller | None:
     """Sampled control and its hardware; returns the caller of the user's own controller."""
     m.method, m.ratio = methods.SAMPLED, round((s.Ts or s.dt) / s.dt)
     m.Ts, caller = m.ratio * float(s.dt), None
     put_memory(m, s)
-    if controller is not None:
-        state = controller.state
-        buffer = np.array([0.0] * BUFFER + [*state, *state, *controller.params])
-        m.own, m.buffer_size, arrays["buffer"] = 1, len(state), buffer
-        caller = LawCaller(controller, buffer)
+    if own is not None:
+        buffer = np.array([0.0] * BUFFER + [*own.state, *own.state, *own.params])
+        m.own, m.buffer_size, arrays["buffer"] = 1, len(own.state), buffer
+        caller = LawCaller(own, buffer)
     if s.hardware is not None:
         put_hardware(m, arrays, s, s.hardware)
     m.renders = int(m.clay and not m.acts and not m.own)
     m.hardware = int(m.renders or s.hardware is not None)
     return caller
+
+
+@functools.lru_cache(maxsize=256)
+def formed_memory(servo: Servo, shape: compensator.Compensator, K: float, T: float) -> np.ndarray:
+    """Rows of `sampled.form_row` of one axis, exact under a held force."""
+    n, most = shape.order, form.ORDER
+    A, B = controller.controller_matrices(servo, shape, K)
+    m = np.zeros((n + 4, n + 4))
+    m[: n + 2, : n + 2], m[: n + 2, n + 3] = A, B
+    m[n + 1, n + 2] = servo.G.gain  # the start adds to delta
+    e = controller.matrix_exponential(T * m)
+    used = [*range(n), *range(most, most + 2)]
+    out = np.zeros((most + 2, most + 4))
+    out[np.ix_(used, [*used, most + 2, most + 3])] = e[: n + 2]
+    return out
+
+
+@functools.lru_cache(maxsize=256)
+def held_memory(servo: Servo, shape: compensator.Compensator, K: float, T: float) -> np.ndarray:
+    """Rows of `sampled.advance` of one axis."""
+    return np.column_stack(controller.held_compensator(servo, shape, K, T))
 
 
 def put_memory(m: Any, s: Scenario) -> None:
@@ -238,8 +262,15 @@ def put_hardware(m: Any, arrays: dict[str, np.ndarray], s: Scenario, io: Any) ->
         m.coupling_spring, m.coupling_damper = float(io.coupling.spring), float(io.coupling.damper)
 
 
+def delay_in_samples(delay: float, Ts: float) -> tuple[int, float]:
+    """A delay in whole samples, and the remaining share of a sample."""
+    delay /= Ts
+    whole = math.floor(delay + sampled.SLACK)
+    return whole, max(delay - whole, 0.0)
+
+
 def put_delay(m: Any, arrays: dict[str, np.ndarray], delay: float, guarded: bool) -> None:
-    """The delay of the torques, and the passivity controller behind it."""
+    """The delay of the torques, and the passivity controller that accounts for it."""
     late, share = delay_in_samples(delay, m.Ts)
     m.delay = delay
     if delay > 0.0:

@@ -6,7 +6,7 @@ from . import arm, memory
 # ---- the compensator -----------------------------------------------------------------------------
 
 
-def ready_form(m, s, k):
+def prepare_form(m, s, k):
     """Makes compensator.form_kick for the steps around a sample, unless it is ready."""
     if s.form_before != k.before or s.form_after != k.after:
         for i in range(2):
@@ -17,7 +17,7 @@ def ready_form(m, s, k):
 def output(m, s, k):
     """Output at the sample without the force of the kick [m], and what each unit adds [m/N]."""
     if m.formed:
-        ready_form(m, s, k)
+        prepare_form(m, s, k)
     for i in range(2):
         z, o = s.axis[i], k.axis[i]
         o.delta, o.feed = z.delta, 0.0
@@ -36,8 +36,8 @@ def output_now(m, i, delta, z):
     return delta, m.axis[i].K * c[j + 4]
 
 
-def states_behind(m, s, k, i):
-    """States of a compensator of another shape behind the step after a kick."""
+def advance_states(m, s, k, i):
+    """States of a compensator of another shape after the step."""
     z, o = s.axis[i], k.axis[i]
     c, j, g = s.form_kick, compensator.KICK * i + 5, compensator.KICK * i + 21
     f = m.axis[i].K * o.net
@@ -59,14 +59,14 @@ def state_rates(m, i, z, f, out):
         )
 
 
-def behind(m, s, k):
-    """Compensator and reference model behind the step after a kick."""
+def advance(m, s, k):
+    """Compensator and reference model after the step."""
     for i in range(2):
         a, z, o = m.axis[i], s.axis[i], k.axis[i]
         yrate = o.ref + o.ref_feed * o.net if m.formed else o.ref
         if m.formed:
             o.next_delta, o.next_rate = z.delta, 0.0
-            states_behind(m, s, k, i)
+            advance_states(m, s, k, i)
         else:
             n = 1.0 / k.H + a.pole * k.R
             o.next_rate = (1.0 / k.H - a.pole * k.L) / n * z.rate + 1.0 / n * a.K * o.net
@@ -75,7 +75,7 @@ def behind(m, s, k):
 
 
 def take(m, s, k):
-    """The loop after a step."""
+    """Takes the step: compensator and reference model become those after it."""
     for i in range(2):
         z, o = s.axis[i], k.axis[i]
         z.delta, z.rate, z.y, z.yrate = o.next_delta, o.next_rate, o.next_y, o.next_yrate
@@ -86,12 +86,17 @@ def take(m, s, k):
 # ---- the continuous law --------------------------------------------------------------------------
 
 
-def servo_law(m, s, k):
-    """The law of a kick: n u = a + S (f - d u), by compensator and servo."""
-    output(m, s, k)
+def put_mobility(m, k):
+    """Mobility of the law: of the shaped inertia, else of the arm."""
     k.Sxx, k.Sxy, k.Syy = k.Wxx, k.Wxy, k.Wyy
     if m.shaping:
         k.Sxx, k.Sxy, k.Syy = m.x.servo[3], 0.0, m.y.servo[3]
+
+
+def servo_law(m, s, k):
+    """The law of a kick: n u = a + S (f - d u), by compensator and servo."""
+    output(m, s, k)
+    put_mobility(m, k)
     for i in range(2):
         z, o, c = s.axis[i], k.axis[i], m.axis[i].servo
         n = 1.0 / k.H + c[1] * k.R
@@ -105,10 +110,8 @@ def servo_law(m, s, k):
             o.ref_feed = take * c[2] * c[0] * o.feed
     if m.formed:
         x, y, c, e = k.x, k.y, m.x.servo, m.y.servo
-        tx, ty = (
-            1.0 / (1.0 / k.H + c[1] * k.R) * c[2] * c[0],
-            1.0 / (1.0 / k.H + e[1] * k.R) * e[2] * e[0],
-        )
+        tx = 1.0 / (1.0 / k.H + c[1] * k.R) * c[2] * c[0]
+        ty = 1.0 / (1.0 / k.H + e[1] * k.R) * e[2] * e[0]
         k.Sxx, k.Syy = k.Sxx + x.n * tx * x.feed, k.Syy + y.n * ty * y.feed
 
 

@@ -29,13 +29,12 @@ class Drives:
 
     def prepare(self, row: Any, n: int) -> int:
         """Prepares the signals over the next whole steps; returns how many."""
-        m, i, dt, further, tables = row.m, row.s.i, row.m.dt, 2, self.signals.values()
+        m, i, dt, tables = row.m, row.s.i, row.m.dt, self.signals.values()
         if m.method == methods.ACCURATE:
             counts = row.substeps(i)
             cosines = max(1, *(x.cosines for x in tables))
             n = min(n, max(1, COSINES // (2 * counts * cosines)))
-        further += m.ratio
-        begin, end = max(i - 1, 0) * dt, min((i + n + further) * dt, m.t_max)
+        begin, end = max(i - 1, 0) * dt, min((i + n + 2 + m.ratio) * dt, m.t_max)
         for drive in tables:
             drive.prepare(begin, end)
         if m.method == methods.ACCURATE:
@@ -135,7 +134,7 @@ class Drive:
         self._pieces = made
 
     def breaks(self, begin: float, end: float) -> np.ndarray:
-        """Times in the part made ready where a step must end: jumps, and kinks off the samples."""
+        """Times in the prepared part at which a step must end: jumps, and kinks between samples."""
         t = self.signal.breaks(begin, end)
         t = t[(t > begin) & (t < end)]
         if not len(t):
@@ -161,7 +160,7 @@ class Drive:
         return self.mean(t, 0.0)
 
     def around(self, t: np.ndarray, h: float) -> np.ndarray:
-        """Value at times, of pieces the mean over h before and after, or less next to t = 0."""
+        """Value at times; of pieces the mean over h before and after, or less next to t = 0."""
         out = self.signal.mean_of_multisines(t, 0.0)
         if len(self._pieces):
             out = out + pieces.pieces_mean(self._pieces, t, np.minimum(h, t))

@@ -56,7 +56,7 @@ def push_now(m, s):
 
 
 def add_command(m, s, k):
-    """Adds the change of the command over the step behind a kick to the compensators' output."""
+    """Adds the change of the command over a step to the compensators' output."""
     if is_on_grid(m, s) and k.before == m.dt and k.after == m.dt:
         j = 2 * (s.i - m.command_first)
         x, y = m.command_ahead[j], m.command_ahead[j + 1]

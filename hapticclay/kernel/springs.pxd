@@ -8,10 +8,10 @@ cdef double NEAR
 
 cdef double force(State s, long i, double L) noexcept nogil
 cdef void load(State s, Kick k) noexcept nogil
-cdef double longest(State s, double after) noexcept nogil
-cdef double seen_force(Model m, State s, long i, double p) noexcept nogil
+cdef double longest_step(State s, double after) noexcept nogil
+cdef double force_for_controller(Model m, State s, long i, double p) noexcept nogil
 cdef void move(Model m, State s, double px, double py, double h) noexcept nogil
 cdef long dent_place(Model m, State s, long i) noexcept nogil
 cdef void enter(Model m, State s, double px, double py, long crossed) noexcept nogil
 @cython.locals(up=cython.bint)
-cdef (double, double) entered(double *table, StateAxis z, long at, double p, bint crosses, bint begins) noexcept nogil
+cdef (double, double) rest_on_entry(double *table, StateAxis z, long at, double p, bint crosses, bint begins) noexcept nogil

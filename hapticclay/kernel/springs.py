@@ -22,14 +22,14 @@ def load(s, k):
         o.f -= o.pull
 
 
-def longest(s, after):
+def longest_step(s, after):
     """The step in equal parts that resolve the springs [s]."""
-    if after <= s.resolved:
+    if after <= s.spring_step:
         return after
-    return after / math.ceil(after / s.resolved - NEAR)
+    return after / math.ceil(after / s.spring_step - NEAR)
 
 
-def seen_force(m, s, i, p):
+def force_for_controller(m, s, i, p):
     """Force of an axis as the controller evaluates it [N].
 
     Springs that the motors render are evaluated at the place that encoders read; what gave way and
@@ -57,7 +57,7 @@ def move(m, s, px, py, h):
             z.force_before = z.force
         if z.way != 0.0 and z.rest != before:
             table[dent_place(m, s, i)] = z.rest
-    s.lost, s.stored = s.lost + lost, kept
+    s.springs_dissipated, s.springs_stored = s.springs_dissipated + lost, kept
 
 
 def dent_place(m, s, i):
@@ -71,17 +71,17 @@ def enter(m, s, px, py, crossed):
     for i in range(2):
         z, p = s.axis[i], py if i else px
         at = regions.spring_place(m.table, i, s.x.index, s.y.index)
-        z.rest, z.way = entered(m.table, z, at, p, i == crossed, crossed < 0)
+        z.rest, z.way = rest_on_entry(m.table, z, at, p, i == crossed, crossed < 0)
         z.k, z.k_limit, z.k1, z.tau = m.table[at], m.table[at + 1], m.table[at + 2], m.table[at + 3]
         z.stretch, z.at, z.force_before, z.force = 0.0, p, z.force, 0.0
         most = max(most, z.k + z.k1)
-    s.lost, s.stored = s.lost + s.stored, 0.0
-    s.resolved = m.spring_step if most > 0.0 and m.springs == 1 else math.inf
+    s.springs_dissipated, s.springs_stored = s.springs_dissipated + s.springs_stored, 0.0
+    s.spring_step = m.spring_step if most > 0.0 and m.springs == 1 else math.inf
     if most > 0.0:
         move(m, s, px, py, 0.0)
 
 
-def entered(table, z, at, p, crosses, begins):
+def rest_on_entry(table, z, at, p, crosses, begins):
     """Rest of the spring of an axis [m], and the direction in which a surface pushes."""
     if table[at + 4] <= 0.0:
         return p, 0.0

@@ -49,5 +49,5 @@ def look(m, s, out):
         for j in range(rows.ROW):
             out.row[j] = m.rows[rows.ROW * (n - 1) + j]
         for i in range(2):
-            out.force[i] = m.rendered[3 * (n - 1) + i] if m.told or m.holds else 0.0
+            out.force[i] = m.rendered[3 * (n - 1) + i] if m.records_clay_force else 0.0
     s.row = 0

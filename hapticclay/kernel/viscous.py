@@ -13,7 +13,7 @@ def damp(m, s, k):
         b0 = law.damping_at(b0, (zx.old_rate, zy.old_rate), s.t - 0.25 * k.before)
         b1 = law.damping_at(b1, (zx.b_rate, zy.b_rate), s.t + 0.25 * k.after)
     if m.stiff:
-        x.b0, x.b1, y.b0, y.b1, k.over, x.share, y.share, x.soft, y.soft = law.split_damping(
+        x.b0, x.b1, y.b0, y.b1, k.splits, x.share, y.share, x.soft, y.soft = law.split_damping(
             b0, b1, k.H, k.L, k.R, m.mobility, m.x.damper, m.y.damper
         )
     else:
@@ -21,7 +21,7 @@ def damp(m, s, k):
 
 
 def load(m, k):
-    """Its load of a kick, beside the muscle force."""
+    """Load of a kick by the muscle and the damping."""
     x, y = k.x, k.y
     if m.rotated:
         c, s = m.cosine, m.sine
@@ -37,8 +37,8 @@ def load(m, k):
 # ---- at an instant -------------------------------------------------------------------------------
 
 
-def now(m, s, i, before):
-    """Damping of an axis at a sample, or that before it [N.s/m]."""
+def damping(m, s, i, before):
+    """Damping of an axis at a sample, of the present clay or of that before it [N.s/m]."""
     z = s.axis[i]
     b = z.old if before else z.b
     if m.grows:
@@ -46,7 +46,7 @@ def now(m, s, i, before):
     return b
 
 
-def at_place(m, s, t, px, py):
+def damping_at_place(m, s, t, px, py):
     """Damping at a time and a place of its region, (x, y) [N.s/m]."""
     b = s.x.b, s.y.b
     if m.grows:
@@ -67,14 +67,14 @@ def force(m, bx, by, vx, vy):
 
 
 def age(s):
-    """The clay before the sample is the present one."""
+    """Makes the present clay that before the next sample."""
     for i in range(2):
         z = s.axis[i]
         z.old, z.old_rate = z.b, z.b_rate
 
 
 def smoothed(m, s, px, py):
-    """Smooth clay at the place of the handle; that before the sample too."""
+    """Puts the damping of smooth clay at the handle into the state."""
     zx, zy = s.x, s.y
     zx.b, zy.b = regions.smooth_clay(m.table, m.smooth, px, py, zx.b, zy.b)
     if m.smooth != 2:
@@ -83,26 +83,26 @@ def smoothed(m, s, px, py):
         zy.old, zy.old_rate = zy.b, 0.0
 
 
-# ---- along the axes of the clay ------------------------------------------------------------------
+# ---- along the axes along which the clay yields --------------------------------------------------
 
 
 def along(m, x, y):
-    """Components along the axes of the clay."""
-    if m.rotated:
+    """Components along the axes along which the clay yields."""
+    if m.yields_rotated:
         return controller.along_axes(m.cosine, m.sine, x, y)
     return x, y
 
 
 def across(m, x, y):
     """The inverse of `along`."""
-    if m.rotated:
+    if m.yields_rotated:
         return controller.along_axes(m.cosine, -m.sine, x, y)
     return x, y
 
 
 def rotated_matrix(m, B):
-    """A matrix along the axes of the clay, R' B R."""
-    if not m.rotated:
+    """A matrix along these axes, R' B R."""
+    if not m.yields_rotated:
         return B
     xx, yx = along(m, B[0], B[2])
     xy, yy = along(m, B[1], B[3])
@@ -113,15 +113,15 @@ def rotated_matrix(m, B):
 # ---- so stiff that a step overshoots -------------------------------------------------------------
 
 
-def rest_behind_sample(k):
-    """The handle comes to rest at the sample along axes of stiff clay; its path ends to bend."""
+def rest_after_sample(k):
+    """Straightens the path of a handle that comes to rest at the sample in stiff clay."""
     x, y = k.x, k.y
     vx, vy = 0.0 if x.share > 0.0 else x.v, 0.0 if y.share > 0.0 else y.v
     x.c, y.c = arm_law.centripetal_about_sample(k.L, x.c, y.c, vx, vy, k.u)
 
 
 def slow_force(m, k):
-    """The force that stiff clay bears in slow motion, (x, y) [N]."""
+    """Force of stiff clay in slow motion, (x, y) [N]."""
     x, y = k.x, k.y
     hx, hy = x.uh - m.x.spring * x.p - x.pull, y.uh - m.y.spring * y.p - y.pull
     gx, gy = x.rest + k.Sxx * hx + k.Sxy * hy, y.rest + k.Sxy * hx + k.Syy * hy
@@ -130,7 +130,7 @@ def slow_force(m, k):
 
 
 def velocity_over(o, slow):
-    """Velocity at the sample [m/s]: in stiff clay what its damping feels."""
+    """Velocity at the sample [m/s]; in stiff clay its mean force over its damping."""
     if o.soft > 0.0:
         return o.soft * (o.b0 * o.v + o.b1 * o.u + o.back)
     return slow

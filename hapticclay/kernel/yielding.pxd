@@ -17,7 +17,7 @@ cdef bint flows_freely(Model m, State s) noexcept nogil
 @cython.locals(B=(cython.double, cython.double, cython.double, cython.double))
 cdef void resist(Model m, State s, Kick k) noexcept nogil
 cdef void flow_on(Kick k) noexcept nogil
-cdef double back(KickAxis o, double place, double on) noexcept nogil
+cdef double return_velocity(KickAxis o, double place, double on) noexcept nogil
 cdef void settle(Kick k, KickAxis o, double place, double w, double Fy, double stop) noexcept nogil
 cdef (double, double) creeping(Model m, State s, Kick k, double gx, double gy) noexcept nogil
 cdef double creep(double size, double b, double Fy, double K, double n, double g) noexcept nogil

@@ -18,7 +18,7 @@ def law_now(m, s, k, i, speed):
 
 
 def is_same(s):
-    """Whether the clay before the sample yields alike."""
+    """Whether the clay before the sample yields by the same law."""
     for i in range(2):
         z = s.axis[i]
         if z.Fy != z.old_Fy or z.Kn != z.old_Kn or z.n != z.old_n:
@@ -85,7 +85,7 @@ def resist(m, s, k):
     B = viscous.rotated_matrix(m, B)
     ex, ey = viscous.along(m, ux, uy)
     px, py = viscous.along(m, x.p, y.p)
-    backx, backy = back(x, px, on), back(y, py, on)
+    backx, backy = return_velocity(x, px, on), return_velocity(y, py, on)
     rx, ry, wx, wy, sx, sy, fx, fy, stopx, stopy = resist_by(
         m, B, (ax, ay), (ex - backx, ey - backy), fyk, k.L
     )
@@ -114,7 +114,7 @@ def flow_on(k):
     k.still = 0.0
 
 
-def back(o, place, on):
+def return_velocity(o, place, on):
     """Velocity that returns an axis at rest beside one that slides to its place [m/s]."""
     if on > 0.0 and o.stuck0 > 0.0 and o.anchor0 == o.anchor0:
         return 0.5 * (o.anchor0 - place) / on
@@ -122,7 +122,7 @@ def back(o, place, on):
 
 
 def settle(k, o, place, w, Fy, stop):
-    """Whether, where and when an axis rests behind the kick."""
+    """Whether, where and when an axis rests after the kick."""
     o.stuck = 1.0 if w == 0.0 and Fy > 0.0 else 0.0
     if k.still > 0.0 or o.stuck0 == 0.0 or o.stuck == 0.0:
         o.anchor = math.nan
@@ -180,7 +180,7 @@ def enter(m, s):
 
 
 def age(s):
-    """The clay before the sample is the present one."""
+    """Makes the present clay that before the next sample."""
     for i in range(2):
         z = s.axis[i]
         z.old_Fy, z.old_Kn, z.old_n = z.Fy, z.Kn, z.n

@@ -10,21 +10,19 @@ its mobility [1/kg]; see `Arm.links`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import named
-from ..errors import Bound, check_fields
+from ..arguments import part
+from ..errors import Bound
 from .constants import L1, L2, S
 
 Columns = tuple[float, float, float, float]
 Links = tuple[float, float, float, float, float]
 
 
-@named
-@dataclass(frozen=True)
+@part("arm.")
 class Arm:
     """A two-link arm in a horizontal plane, link 2 balanced about the elbow; the paper's.
 
@@ -40,9 +38,6 @@ class Arm:
     l2: Annotated[float, Bound(1e-3, 100.0, "m")] = L2
     I1: Annotated[float, Bound(1e-9, 1e6, "kg.m^2")] = L1 * L1 / S[0].gain
     I2: Annotated[float, Bound(1e-9, 1e6, "kg.m^2")] = L2 * L2 / S[1].gain
-
-    def __post_init__(self):
-        check_fields(self, "arm.")
 
     @property
     def links(self) -> Links:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from collections.abc import Callable, Iterable
+from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, number, numbers_of, pair, table_of
+from ..arguments import checked, part
+from ..errors import Bound, ParameterError, numbers_of
+from ..fields import Axis
 from ..formulas.constants import B_MAX
 from .constants import AXES
 from .flow import Consistency, FlowIndex, YieldForce
@@ -20,6 +20,11 @@ from .traits import (
 )
 
 OPTIONAL = ("growth", "Fy", "K", "n")  # further values of each region or cell
+Edges = Annotated[tuple[float, ...], Bound(unit="m")]
+Span = Annotated[tuple[float, float], Bound(unit="m")]
+Image = Annotated[tuple[tuple[float, ...], ...], Bound(0.0, 1.0)]
+BlackWhite = Annotated[tuple[float, float], Bound(0.0, B_MAX, "N.s/m", names=("black", "white"))]
+Outside = Annotated[float, Bound(0.0, B_MAX, "N.s/m")]
 
 
 class CellLaw:
@@ -120,8 +125,7 @@ class CellLaw:
         return self.damping[i : k + 1, j : m + 1].ravel().tolist()
 
 
-@named
-@dataclass(frozen=True)
+@part("clay.")
 class Profile(CellLaw):
     """Damping b of one axis as a piecewise constant function of one coordinate.
 
@@ -140,7 +144,7 @@ class Profile(CellLaw):
 
     edges: Annotated[tuple[float, ...], Bound(unit="m")]
     values: Annotated[tuple[float, ...], Bound(0.0, B_MAX, "N.s/m")]
-    along: Literal["x", "y"] = "x"
+    along: Axis = "x"
     growth: Annotated[tuple[float, ...], Bound(0.0, B_MAX, "N.s/m per s")] = ()
     Fy: Annotated[tuple[float, ...], YieldForce] = ()
     K: Annotated[tuple[float, ...], Consistency] = ()
@@ -148,7 +152,6 @@ class Profile(CellLaw):
     springs: tuple[Spring, ...] = ()
 
     def __post_init__(self):
-        check_fields(self, "clay.")
         regions = range(len(self.edges) + 1)
         if self.springs and len(self.springs) != len(regions):
             bound = f"must be {len(regions)} springs, one a region, got {len(self.springs)}"
@@ -196,8 +199,7 @@ class Profile(CellLaw):
         return np.array([values]).T if self.along == "x" else np.array([values])
 
 
-@named
-@dataclass(frozen=True)
+@part("clay.")
 class Grid(CellLaw):
     """Damping b of one axis on a grid of cells, constant in each.
 
@@ -215,8 +217,8 @@ class Grid(CellLaw):
         n: flow index of each cell, as values, 0.05 to 4; empty for 1, and without K.
     """
 
-    x_edges: Annotated[tuple[float, ...], Bound(unit="m")]
-    y_edges: Annotated[tuple[float, ...], Bound(unit="m")]
+    x_edges: Edges
+    y_edges: Edges
     values: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m")]
     growth: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m per s")] = ()
     Fy: Annotated[tuple[tuple[float, ...], ...], YieldForce] = ()
@@ -224,7 +226,6 @@ class Grid(CellLaw):
     n: Annotated[tuple[tuple[float, ...], ...], FlowIndex] = ()
 
     def __post_init__(self):
-        check_fields(self, "clay.")
         check_ascending("clay.x_edges", self.x_edges)
         check_ascending("clay.y_edges", self.y_edges)
         shape = len(self.x_edges) + 1, len(self.y_edges) + 1
@@ -271,9 +272,9 @@ class Grid(CellLaw):
     def of_function(
         cls,
         b: Callable[[float, float], float],
-        x_edges: Sequence[float],
-        y_edges: Sequence[float],
-        outside: float = 0.0,
+        x_edges: Edges,
+        y_edges: Edges,
+        outside: Outside = 0.0,
     ) -> Grid:
         """Makes a grid with the values of a function at the centres of its cells.
 
@@ -287,27 +288,23 @@ class Grid(CellLaw):
             ParameterError: there are fewer than two borders, or a value of the function is out of
                 bounds.
         """
-        names = ("clay.x_edges", x_edges), ("clay.y_edges", y_edges)
-        x, y = (
-            numbers_of(field, edges, [str(i) for i in range(len(edges))], unit="m")
-            for field, edges in names
-        )
-        for field, edges in names:
+        both = {"clay.x_edges": x_edges, "clay.y_edges": y_edges}
+        for field, edges in both.items():
             if len(edges) < 2:
                 raise ParameterError(field, edges, "must have at least two edges per axis")
-        middles = [[0.5 * (a + b) for a, b in zip(e, e[1:], strict=False)] for e in (x, y)]
+        middles = [[0.5 * (a + b) for a, b in zip(e, e[1:], strict=False)] for e in both.values()]
         inner = [[b(at, across) for across in middles[1]] for at in middles[0]]
-        return cls(x, y, _framed(inner, outside))
+        return cls(x_edges, y_edges, _framed(inner, outside))
 
     @classmethod
     @checked
     def of_image(
         cls,
-        image: Any,
-        x: tuple[float, float],
-        y: tuple[float, float],
-        b: tuple[float, float],
-        outside: float = 0.0,
+        image: Image,
+        x: Span,
+        y: Span,
+        b: BlackWhite,
+        outside: Outside = 0.0,
     ) -> Grid:
         """Makes a grid with one cell per pixel of an image; see also `gray_image`.
 
@@ -323,10 +320,10 @@ class Grid(CellLaw):
             ParameterError: the image is not a table of numbers from 0 to 1, or another argument
                 is out of bounds.
         """
-        (x0, x1), (y0, y1) = outline(x, y)
+        check_outline(x, y)
         inner = pixels(image, b)
         columns, rows = inner.shape
-        edges = np.linspace(x0, x1, columns + 1), np.linspace(y0, y1, rows + 1)
+        edges = np.linspace(*x, columns + 1), np.linspace(*y, rows + 1)
         along_x, along_y = (tuple(e.tolist()) for e in edges)
         return cls(along_x, along_y, _framed(inner, outside))
 
@@ -348,20 +345,15 @@ def _leave_out(law: Profile | Grid) -> None:
         object.__setattr__(law, "n", ())
 
 
-def outline(
-    x: tuple[float, float], y: tuple[float, float], prefix: str = ""
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Checks and returns the outline along x and along y [m]."""
-    spans = pair(f"{prefix}x", x, unit="m"), pair(f"{prefix}y", y, unit="m")
-    for field, span in zip(AXES, spans, strict=True):
-        check_ascending(prefix + field, span)
-    return spans
+def check_outline(x: tuple[float, float], y: tuple[float, float], prefix: str = "") -> None:
+    """Refuses an outline [m] that does not ascend."""
+    check_ascending(f"{prefix}x", x)
+    check_ascending(f"{prefix}y", y)
 
 
-def pixels(image: Any, b: tuple[float, float]) -> np.ndarray:
+def pixels(image: tuple[tuple[float, ...], ...], b: tuple[float, float]) -> np.ndarray:
     """Damping of the pixels of an image [N.s/m], starting at the lowest x and y, x first."""
-    gray = np.array(table_of("image", image, 0.0, 1.0))
-    black, white = pair("b", b, 0.0, B_MAX, unit="N.s/m")
+    gray, (black, white) = np.array(image), b
     if not gray.size:
         raise ParameterError("image", image, "must have pixels")
     return ((1.0 - gray) * black + gray * white)[::-1].T
@@ -369,8 +361,7 @@ def pixels(image: Any, b: tuple[float, float]) -> np.ndarray:
 
 def _framed(inner: Any, outside: float) -> Any:
     """Values of cells, surrounded by the values of the outer cells."""
-    value = number("outside", outside, 0.0, B_MAX, unit="N.s/m")
-    return np.pad(np.asarray(inner), 1, constant_values=value)
+    return np.pad(np.asarray(inner), 1, constant_values=outside)
 
 
 def check_ascending(field: str, edges: tuple[float, ...]) -> None:

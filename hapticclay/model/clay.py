@@ -5,13 +5,13 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, number
+from ..arguments import checked, part
+from ..errors import Bound, ParameterError, number
 from ..formulas.constants import B_MAX
 from ..units import is_quantity
 from . import flow, groove, spring
@@ -98,8 +98,7 @@ def _yield_alike(x: Profile | Grid | Smooth, y: Profile | Grid | Smooth) -> bool
     return x.borders == y.borders and all(map(np.array_equal, x.flows, y.flows))
 
 
-@named
-@dataclass(frozen=True)
+@part("clay.")
 class Clay:
     """Clay: fe = B v with B = R diag(bx, by) R' (Eqs. 3, 4 with m = k = 0, R = 1), or clay that
     also yields, with Fy_i sign v_i + K_i |v_i|^n_i sign v_i beside it along each axis.
@@ -121,7 +120,6 @@ class Clay:
     groove: Groove | None = None
 
     def __post_init__(self):
-        check_fields(self, "clay.")
         x, y = self.laws
         if self.isotropic and not (x is y or _yield_alike(x, y)):
             raise ParameterError(

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from ..arguments import named
-from ..errors import Bound, ParameterError, check_fields
+from ..arguments import part
+from ..errors import Bound, ParameterError
 from ..formulas.compensator import ORDER
 from .constants import C_DEN, C_NUM
 
@@ -21,8 +20,7 @@ from .constants import C_DEN, C_NUM
 CANCELLED = 1e-12  # of a sum, relative to that of the magnitudes
 
 
-@named
-@dataclass(frozen=True)
+@part("compensator.")
 class Compensator:
     """Shape of the compensator: C = K num(s)/den(s), proper, at most of order 4.
 
@@ -38,7 +36,6 @@ class Compensator:
     den: Annotated[tuple[float, ...], Bound()] = C_DEN
 
     def __post_init__(self):
-        check_fields(self, "compensator.")
         num, den = _without_leading_zeros(self.num), _without_leading_zeros(self.den)
         if not den or len(den) > ORDER + 1:
             bound = f"must be 1 to {ORDER + 1} numbers, not all of them 0: order {ORDER} at most"

@@ -6,17 +6,14 @@ Virtual Reality", Journal of Intelligent and Robotic Systems 35 (2002) 247-264.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated
 
-from ..arguments import named
-from ..errors import Bound, check_fields
+from ..arguments import part
+from ..errors import Bound
+from ..fields import AXES as AXES
 
-AXES = ("x", "y")
 
-
-@named
-@dataclass(frozen=True)
+@part("servo.")
 class SecondOrder:
     """The transfer function gain / (s^2 + damping s + stiffness), stable.
 
@@ -29,9 +26,6 @@ class SecondOrder:
     gain: Annotated[float, Bound(0.0, 1e12, above=True)]
     damping: Annotated[float, Bound(0.0, 1e6, "1/s", above=True)]
     stiffness: Annotated[float, Bound(0.0, 1e12, "1/s^2", above=True)]
-
-    def __post_init__(self):
-        check_fields(self, "servo.")
 
 
 CM = 1e-2  # the paper prints lengths in centimetres

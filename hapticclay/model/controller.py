@@ -10,20 +10,17 @@ pose. One kick of that law is in `kernel.servo`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..arguments import named
-from ..errors import check_fields
+from ..arguments import part
 from .compensator import Compensator
 from .constants import G, S, SecondOrder
 from .traits import Trait
 
 
-@named
-@dataclass(frozen=True)
+@part("servo.")
 class Servo:
     """The servo of one axis: its response to the commanded displacement and to the hand's force.
 
@@ -35,9 +32,6 @@ class Servo:
 
     G: SecondOrder
     S: SecondOrder
-
-    def __post_init__(self):
-        check_fields(self, "servo.")
 
     @property
     def numbers(self) -> tuple[float, float, float, float, float, float]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import named
-from ..errors import Bound, check_fields
+from ..arguments import part
+from ..errors import Bound
 from ..formulas.constants import B_MAX
 from .traits import LEAST, LEFT_OUT, Column, Hold, Law, Told, multiplied, told_pair, told_values
 
@@ -21,8 +21,7 @@ Consistency = Bound(0.0, CONSISTENCY_MAX, "N/(m/s)^n")
 FlowIndex = Bound(N_MIN, N_MAX)
 
 
-@named
-@dataclass(frozen=True)
+@part("flow.")
 class Flow:
     """Resistance of clay to a tool that moves at v: f = (Fy + K |v|^n) v/|v| + b v.
 
@@ -39,9 +38,6 @@ class Flow:
     K: Annotated[float, Consistency] = 0.0
     n: Annotated[float, FlowIndex] = 1.0
     b: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 0.0
-
-    def __post_init__(self):
-        check_fields(self, "flow.")
 
     @property
     def kind(self) -> str:

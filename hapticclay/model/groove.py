@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields
+from ..arguments import checked, part
+from ..errors import Bound, ParameterError
 from ..formulas.constants import B_MAX
 from .constants import AXES
 from .flow import FY_MAX
@@ -25,8 +25,7 @@ MOST_CELLS = 4_000_000
 # quadrant; half of the angle of each [rad]
 
 
-@named
-@dataclass(frozen=True)
+@part("groove.")
 class Groove:
     """A block of clay that stays cut: a tool at the handle removes the clay under it.
 
@@ -60,7 +59,6 @@ class Groove:
     left: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, 1.0)] = ()
 
     def __post_init__(self):
-        check_fields(self, "groove.")
         for axis, (low, high) in zip(AXES, (self.x, self.y), strict=True):
             if high <= low:
                 raise ParameterError(f"groove.{axis}", (low, high), "must be strictly ascending")

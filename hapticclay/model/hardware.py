@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import sqrt, tau
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from ..arguments import named
-from ..errors import Bound, ParameterError, check_fields
+from ..arguments import part
+from ..errors import Bound, ParameterError
+from ..fields import JOINTS, Seed
 from .traits import LEFT_OUT, YES, Refusal, Told, Trait, present, told_values
 
 STIFF = 1e12  # [N/m, N.s/m] upper bound of a coupling
-JOINTS = ("shoulder", "elbow")
 
 
-@named
-@dataclass(frozen=True)
+@part("coupling.")
 class Coupling:
     """A virtual coupling: spring and damper between the handle and a massless tool in the clay.
 
@@ -31,12 +29,8 @@ class Coupling:
     spring: Annotated[float, Bound(0.0, STIFF, "N/m", above=True)]
     damper: Annotated[float, Bound(0.0, STIFF, "N.s/m", above=True)]
 
-    def __post_init__(self):
-        check_fields(self, "coupling.")
 
-
-@named
-@dataclass(frozen=True)
+@part("hardware.")
 class Hardware:
     """The hardware between computer and arm, part by part; ideal by default.
 
@@ -85,10 +79,9 @@ class Hardware:
     friction: Annotated[tuple[float, float], Bound(0.0, 1e6, "N.m", names=JOINTS)] = (0.0, 0.0)
     passivity: bool = False
     coupling: Coupling | None = None
-    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
+    seed: Seed = 0
 
     def __post_init__(self):
-        check_fields(self, "hardware.")
         if self.velocity == "exact" and (
             self.velocity_filter is not None or self.velocity_window != 1
         ):

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Annotated
 
-from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, choice
+from ..arguments import checked, part
+from ..errors import Bound, ParameterError, choice
 from ..formulas.constants import B_MAX
 from .constants import B_CONSTANT
 from .flow import Flow, FlowIndex
@@ -70,8 +69,7 @@ def _speed(rpm: float) -> float:
     return rpm * math.tau / 60.0  # [rad/s]
 
 
-@named
-@dataclass(frozen=True, kw_only=True)
+@part("material.", kw_only=True)
 class Material:
     """Resistance of a clay: the shear stress strength + K rate^n, or plain damping.
 
@@ -94,7 +92,6 @@ class Material:
     b: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 0.0
 
     def __post_init__(self):
-        check_fields(self, "material.")
         for name, span in (("strength", self.strength), ("rates", self.rates)):
             if span and span[0] > span[1]:
                 bound = "must be the lowest and the highest, in this order"

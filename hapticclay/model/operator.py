@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated
 
-from ..arguments import named
-from ..errors import Bound, check_fields
+from ..arguments import part
+from ..errors import Bound
 from ..formulas.constants import B_MAX
 from .traits import Trait
 
@@ -16,8 +15,7 @@ def mobility_with(trace, mass):
     return trace / (1.0 + mass * trace)
 
 
-@named
-@dataclass(frozen=True)
+@part("operator.")
 class Operator:
     """The arm of the person at the handle: Th = mass s^2 + damper s + spring (Eq. 19).
 
@@ -30,9 +28,6 @@ class Operator:
     mass: Annotated[float, Bound(0.0, 1e3, "kg")] = 0.25
     damper: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 2.0
     spring: Annotated[float, Bound(0.0, 1e9, "N/m")] = 6.0
-
-    def __post_init__(self):
-        check_fields(self, "operator.")
 
 
 NO_HAND = Operator(0.0, 0.0, 0.0)  # Th = 0

@@ -6,12 +6,12 @@ import math
 import pkgutil
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Annotated, Any, cast
 
-from ..arguments import function_name, named
+from ..arguments import part
 from ..display import one_line
-from ..errors import Bound, ParameterError, check_fields
+from ..errors import Bound, ParameterError
+from ..fields import function_name
 from .traits import NO, Refusal, Trait
 
 # floats that loop and law share: time [s], joint angles [rad] and rates [rad/s] as
@@ -25,8 +25,7 @@ Law = Callable[
 ]
 
 
-@named
-@dataclass(frozen=True, eq=False)
+@part("controller.", eq=False)
 class Controller:
     """A controller that replaces compensator and servo in a sampled loop.
 
@@ -56,7 +55,6 @@ class Controller:
                 raise self._refusal("must name a function as package.module:name")
         elif not callable(self.law):
             raise self._refusal("must be a function")
-        check_fields(self, "controller.")
 
     def __eq__(self, other: object) -> bool:
         return self._key == other._key if isinstance(other, Controller) else NotImplemented

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 
-from ..arguments import named
-from ..errors import Bound, check_fields, number
+from ..arguments import part
+from ..errors import Bound, number
 from . import pieces
 from .signals import Signal
 
@@ -18,8 +17,7 @@ Moment = Annotated[float, Bound(0.0, 1e5, "s")]
 BEFORE = 1.0  # [s] lead of the piece before the first break; any number works
 
 
-@named
-@dataclass(frozen=True)
+@part("constant.")
 class Constant(Signal):
     """A constant signal.
 
@@ -28,9 +26,6 @@ class Constant(Signal):
     """
 
     value: Size
-
-    def __post_init__(self):
-        check_fields(self, "constant.")
 
     @property
     def varies(self) -> bool:
@@ -48,8 +43,7 @@ class Constant(Signal):
         return pieces.straight_pieces([0.0], [self.value])
 
 
-@named
-@dataclass(frozen=True)
+@part("step.")
 class Step(Signal):
     """Zero, then constant.
 
@@ -60,9 +54,6 @@ class Step(Signal):
 
     value: Size
     time: Moment
-
-    def __post_init__(self):
-        check_fields(self, "step.")
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
         """As Signal.pieces.
@@ -75,8 +66,7 @@ class Step(Signal):
         return pieces.straight_pieces([self.time - BEFORE, self.time], [(0.0, 0.0), self.value])
 
 
-@named
-@dataclass(frozen=True)
+@part("ramp.")
 class Ramp(Signal):
     """Zero, then growing evenly, then constant.
 
@@ -89,9 +79,6 @@ class Ramp(Signal):
     rate: Size
     start: Moment
     end: Annotated[float | None, Bound("start", 1e5, "s", above=True)] = None
-
-    def __post_init__(self):
-        check_fields(self, "ramp.")
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
         """As Signal.pieces.
@@ -110,8 +97,7 @@ class Ramp(Signal):
         )
 
 
-@named
-@dataclass(frozen=True)
+@part("pulse.")
 class Pulse(Signal):
     """A rectangular pulse, or a train of them.
 
@@ -128,7 +114,6 @@ class Pulse(Signal):
     period: Annotated[float | None, Bound(1e-3, 1e5, "s")] = None
 
     def __post_init__(self):
-        check_fields(self, "pulse.")
         if self.period is not None:
             number("pulse.period", self.period, self.width, above=True, unit="s")
 
@@ -172,8 +157,7 @@ class Pulse(Signal):
         return share[:, None] * np.array(self.value)
 
 
-@named
-@dataclass(frozen=True)
+@part("chirp.")
 class Chirp(Signal):
     """A sine whose frequency goes from low to high; zero before and after.
 
@@ -196,9 +180,6 @@ class Chirp(Signal):
     phase: Annotated[float, Bound(-1e6, 1e6, "rad")] = 0.0
     log: bool = False
     start: Moment = 0.0
-
-    def __post_init__(self):
-        check_fields(self, "chirp.")
 
     def _wave(self, t: np.ndarray) -> np.ndarray:
         """The sine, without its ends."""

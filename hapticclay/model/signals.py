@@ -14,8 +14,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import named
-from ..errors import Bound, ParameterError, check_fields, integer, numbers_of
+from ..arguments import part
+from ..errors import Bound, ParameterError, integer
+from ..fields import Seed
 from . import pieces
 from .traits import LEFT_OUT, Trait
 
@@ -132,8 +133,7 @@ class Signal(ABC):
     __rmul__ = __mul__
 
 
-@named
-@dataclass(frozen=True)
+@part("sum.")
 class Sum(Signal):
     """Sum of signals: `a + b - 2 * c`.
 
@@ -143,20 +143,17 @@ class Sum(Signal):
     """
 
     parts: tuple[Signal, ...]
-    factors: tuple[float, ...] | None = None
+    factors: Annotated[tuple[float, ...] | None, Bound(-1e6, 1e6)] = None
 
     def __post_init__(self):
-        parts, factors = self.parts, self.factors
-        if not isinstance(parts, tuple | list) or not parts:
-            raise ParameterError("sum.parts", parts, "must be a sequence of signals")
-        for i, part in enumerate(parts):
-            if not isinstance(part, Signal):
-                raise ParameterError(f"sum.parts[{i}]", part, "must be a Signal")
-        factors = (1.0,) * len(parts) if factors is None else factors
-        names = [str(i) for i in range(len(parts))]
-        factors = numbers_of("sum.factors", factors, names, -1e6, 1e6)
-        flat = [x for pair in zip(parts, factors, strict=True) for x in _scaled_parts(*pair)]
-        object.__setattr__(self, "parts", tuple(part for part, _ in flat))
+        n = len(self.parts)
+        factors = (1.0,) * n if self.factors is None else self.factors
+        if not n:
+            raise ParameterError("sum.parts", self.parts, "must be a sequence of signals")
+        if len(factors) != n:
+            raise ParameterError("sum.factors", factors, f"must be {n} numbers, one a signal")
+        flat = [x for pair in zip(self.parts, factors, strict=True) for x in _scaled_parts(*pair)]
+        object.__setattr__(self, "parts", tuple(signal for signal, _ in flat))
         factors = tuple(k for _, k in flat)
         object.__setattr__(self, "factors", factors if set(factors) != {1.0} else None)
 
@@ -197,8 +194,8 @@ class Sum(Signal):
 
     def _means(self, t: np.ndarray, h: np.ndarray) -> np.ndarray:
         out = np.zeros((len(t), 2))
-        for part, k in self._terms():
-            out += k * part.mean(t, h)
+        for signal, k in self._terms():
+            out += k * signal.mean(t, h)
         return out
 
     def mean_of_multisines(self, t: Any, h: Any) -> Any:
@@ -218,8 +215,7 @@ def _scaled_parts(part: Signal, factor: float) -> list[tuple[Signal, float]]:
     return [(part, factor)]
 
 
-@named
-@dataclass(frozen=True)
+@part("multisine.")
 class Multisine(Signal):
     """A periodic signal: cosines of random phases at multiples of 1/period between low and high.
 
@@ -241,10 +237,9 @@ class Multisine(Signal):
     high: Annotated[float, Bound("low", 1e6, "Hz")] = 2.0
     period: Annotated[float, Bound(1e-3, 1e5, "s")] = 20.0
     lines: Annotated[int | None, Bound(1, MOST_LINES)] = None
-    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
+    seed: Seed = 0
 
     def __post_init__(self):
-        check_fields(self, "multisine.")
         first = math.ceil(self.low * self.period - 1e-9)
         most = math.floor(self.high * self.period + 1e-9) - first + 1
         if not 1 <= most <= MOST_LINES:

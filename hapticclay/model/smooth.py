@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, pair
+from ..arguments import checked, part
+from ..errors import Bound, ParameterError
 from ..formulas.constants import B_MAX
 from ..formulas.smooth import smooth_damping
-from .cells import CellLaw, outline, pixels
+from .cells import BlackWhite, CellLaw, Image, Span, check_outline, pixels
 from .constants import AXES
 
 
-@named
-@dataclass(frozen=True)
+@part("clay.")
 class Smooth(CellLaw):
     """Damping b of one axis that varies smoothly in space, by a cubic B-spline.
 
@@ -33,13 +31,12 @@ class Smooth(CellLaw):
             one node.
     """
 
-    x: Annotated[tuple[float, float], Bound(unit="m")]
-    y: Annotated[tuple[float, float], Bound(unit="m")]
+    x: Span
+    y: Span
     values: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m")]
 
     def __post_init__(self):
-        check_fields(self, "clay.")
-        outline(self.x, self.y, "clay.")
+        check_outline(self.x, self.y, "clay.")
         if not self.values or not self.values[0]:
             raise ParameterError("clay.values", self.values, "must have a node or more each way")
 
@@ -149,9 +146,9 @@ class Smooth(CellLaw):
     def of_function(
         cls,
         b: Callable[[float, float], float],
-        x: tuple[float, float],
-        y: tuple[float, float],
-        nodes: tuple[int, int],
+        x: Span,
+        y: Span,
+        nodes: Annotated[tuple[float, float], Bound(1.0, 1e6)],
     ) -> Smooth:
         """Smooth clay whose control points are the values of a function at its nodes.
 
@@ -164,22 +161,21 @@ class Smooth(CellLaw):
         Raises:
             ParameterError: an argument, or a value of the function, is out of bounds.
         """
-        ends = outline(x, y)
-        count = pair("nodes", nodes, 1.0, 1e6)
-        for name, k in zip(AXES, count, strict=True):
+        check_outline(x, y)
+        for name, k in zip(AXES, nodes, strict=True):
             if k != int(k):
                 raise ParameterError(f"nodes[{name}]", k, "must be a whole number")
-        at_x, at_y = (np.linspace(*e, int(k)).tolist() for e, k in zip(ends, count, strict=True))
-        return cls(*ends, tuple(tuple(b(at, across) for across in at_y) for at in at_x))
+        at_x, at_y = (np.linspace(*e, int(k)).tolist() for e, k in ((x, nodes[0]), (y, nodes[1])))
+        return cls(x, y, tuple(tuple(b(at, across) for across in at_y) for at in at_x))
 
     @classmethod
     @checked
     def of_image(
         cls,
-        image: Any,
-        x: tuple[float, float],
-        y: tuple[float, float],
-        b: tuple[float, float],
+        image: Image,
+        x: Span,
+        y: Span,
+        b: BlackWhite,
     ) -> Smooth:
         """Smooth clay with a node at the centre of each pixel of an image; see also `gray_image`.
 
@@ -194,9 +190,9 @@ class Smooth(CellLaw):
             ParameterError: the image is not a table of numbers from 0 to 1, or another argument
                 is out of bounds.
         """
-        spans, values = outline(x, y), pixels(image, b)
-        ends = []
-        for (low, high), n in zip(spans, values.shape, strict=True):
+        check_outline(x, y)
+        values, ends = pixels(image, b), []
+        for (low, high), n in zip((x, y), values.shape, strict=True):
             half = 0.5 * (high - low) / n if n > 1 else 0.0
             ends.append((low + half, high - half))
         return cls(ends[0], ends[1], values)  # pyright: ignore[reportArgumentType]

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import named
-from ..errors import Bound, ParameterError, check_fields
+from ..arguments import part
+from ..errors import Bound, ParameterError
 from .traits import LEFT_OUT, Law, Refusal, Told, told_pair, told_values
 
 STIFFNESS_MAX = 1e9  # [N/m]
 RESOLVED = 0.2  # [rad] limit of step times highest frequency of the springs in the loop
 
 
-@named
-@dataclass(frozen=True)
+@part("spring.")
 class Spring:
     """How clay springs back along one axis, in addition to its damping.
 
@@ -43,7 +41,6 @@ class Spring:
     unilateral: bool = False
 
     def __post_init__(self):
-        check_fields(self, "spring.")
         if self.limit is not None and not self.k:
             raise ParameterError("spring.limit", self.limit, "must be None without stiffness k")
         if self.tau != type(self).tau and not self.k1:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated
 
-from ..arguments import named
-from ..errors import Bound, check_fields
+from ..arguments import part
+from ..errors import Bound
 
 WIDTH_MIN = 4e-3  # [m] two of the largest cells of a picture's map (studies/removal.py)
 
 
-@named
-@dataclass(frozen=True)
+@part("tool.")
 class Tool:
     """The cutting tool at the handle.
 
@@ -23,6 +21,3 @@ class Tool:
 
     width: Annotated[float, Bound(WIDTH_MIN, 0.1, "m")] = 0.02
     depth: Annotated[float, Bound(1e-4, 0.025, "m")] = 0.01
-
-    def __post_init__(self):
-        check_fields(self, "tool.")

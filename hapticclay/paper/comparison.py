@@ -7,7 +7,6 @@ import re
 from typing import Any
 
 from ..files import versions
-from ..scene.virtual_wall import VirtualWall
 from ..studies.comparison import COMPARED_HANDS, PUSHED, Comparison, differing_fields
 from ..views.compare_plots import compare_figures
 from .report import template_environment
@@ -41,7 +40,7 @@ NOTES = {
 
 def comparison_page(found: Comparison) -> str:
     """Renders a comparison as a self-contained HTML page."""
-    walls = isinstance(found[0].subject, VirtualWall)
+    walls = found[0].loop is None
     (m0, m1), (d0, d1), (k0, k1) = COMPARED_HANDS.mass, COMPARED_HANDS.damper, COMPARED_HANDS.spring
     hands = f"Worst hand of {m0:g} to {m1:g} kg, {d0:g} to {d1:g} N.s/m, {k0:g} to {k1:g} N/m."
     context = {

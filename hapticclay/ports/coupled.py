@@ -9,11 +9,11 @@ Coupling: J. E. Colgate, M. C. Stanley, J. M. Brown, IROS 1995.
 from __future__ import annotations
 
 import statistics
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, NamedTuple
 
-from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, choice, number
+from ..arguments import checked, part
+from ..errors import Bound, ParameterError
 from ..model.operator import Operator
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
@@ -23,14 +23,13 @@ from .client_log import ClientLog, Timing
 from .commands import NOTHING, Pair
 from .device import ended_as_planned
 from .limits import PLAIN, Limits
-from .planes import PLANES, to_plane, to_space
+from .planes import Plane, to_plane, to_space
 
 SETTLING = 50  # exchanges without force to measure the period of the device
 LONGEST = 3600.0  # [s] longest session
 
 
-@named
-@dataclass(frozen=True)
+@part("coupling.")
 class Coupled:
     """A spring and a damper between the hand of a device and a simulated handle.
 
@@ -42,11 +41,7 @@ class Coupled:
 
     K: Annotated[float, Bound(0.0, 1e5, "N/m", above=True)] = 300.0
     B: Annotated[float, Bound(0.0, 1e3, "N.s/m", above=True)] = 5.0
-    plane: str = "xy"
-
-    def __post_init__(self):
-        check_fields(self, "coupling.")
-        choice("coupling.plane", self.plane, tuple(PLANES))
+    plane: Plane = "xy"
 
     def check(self, Ts: float) -> None:
         """Refuses a coupling whose damper is too small for the hold of its spring.
@@ -193,7 +188,7 @@ class Rendered(NamedTuple):
 def render(
     scenario: Scenario,
     url: str,
-    duration: float = 10.0,
+    duration: Annotated[float, Bound(0.0, LONGEST, "s", above=True)] = 10.0,
     *,
     coupling: Coupled = PLAIN_COUPLING,
     limits: Limits = PLAIN,
@@ -219,7 +214,6 @@ def render(
         ParameterError: there is no device, the coupling has B < K Ts/2 at its rate, or a value is
             out of its bounds.
     """
-    duration = number("duration", duration, 0.0, LONGEST, above=True, unit="s")
     coupling.check(limits.Ts)
     with DeviceClient(url, limits) as client:
         start = float(scenario.start[0]), float(scenario.start[1])

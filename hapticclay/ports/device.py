@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import checked, named
+from ..arguments import checked, part
 from ..columns import Sheet, unreadable
-from ..errors import Bound, ParameterError, check_fields, number
+from ..errors import Bound, ParameterError
 from ..model.constants import TS
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
@@ -24,8 +24,7 @@ LONGEST = 1e5  # [s] longest session
 FASTEST = 100.0  # [m/s] of a hand
 
 
-@named
-@dataclass(frozen=True)
+@part("hand.")
 class Trajectory:
     """Target of the hand over time: straight from point to point, at rest after the last.
 
@@ -39,7 +38,6 @@ class Trajectory:
     points: Annotated[tuple[tuple[float, ...], ...], Bound(-10.0, 10.0, "m")]
 
     def __post_init__(self):
-        check_fields(self, "hand.")
         if not self.t or len(self.t) != len(self.points):
             raise ParameterError("hand.t", self.t, "must have a place for each time")
         if any(len(p) != 2 for p in self.points):
@@ -195,8 +193,6 @@ def replace_scenario(record: Record, scenario: Scenario) -> Record:
 
 def device_scenario(scenario: Scenario, period: float | None, clay: bool) -> tuple[Scenario, int]:
     """The scenario of a device, and the number of control samples per period."""
-    if period is not None:
-        period = number("period", period, 1e-5, 1.0, unit="s")
     Ts = scenario.Ts
     if Ts is None and period is not None:
         Ts = period / math.ceil(period / TS - 1e-9)

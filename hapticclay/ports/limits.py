@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated
 
-from ..arguments import named
-from ..errors import Bound, check_fields
+from ..arguments import part
+from ..errors import Bound
 from .commands import NOTHING, Vector, shortening
 
 PATIENCE = 0.05  # [s] after which a sample counts as lost
 
 
-@named
-@dataclass(frozen=True)
+@part()
 class Limits:
     """Limits that protect the hand that holds the device.
 
@@ -40,9 +38,6 @@ class Limits:
     period: Annotated[float | None, Bound(1e-5, 1.0, "s")] = None
     slew_rate: Annotated[float, Bound(0.0, 1e6, "N/s", above=True)] = 500.0
     frozen: Annotated[float | None, Bound(1e-2, 60.0, "s")] = 0.5
-
-    def __post_init__(self):
-        check_fields(self)
 
     @property
     def Ts(self) -> float:

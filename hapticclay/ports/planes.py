@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from .commands import NOTHING, Pair, Vector
 
+Plane = Literal["xy", "xz"]
 PLANES = {"xy": (0, 1), "xz": (0, 2)}  # axes of the cursor that become x and y of the arm
 
 

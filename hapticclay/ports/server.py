@@ -11,11 +11,11 @@ import socket
 import threading
 from collections.abc import Iterator
 from http import HTTPStatus
-from typing import Any
+from typing import Annotated, Any, Literal
 from urllib.parse import urlsplit
 
-from ..arguments import checked, named
-from ..errors import choice, needing
+from ..arguments import checked
+from ..errors import Bound, needing
 from ..files import versions
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
@@ -26,7 +26,7 @@ from .inverse import LARGEST_MESSAGE
 from .service import Service
 from .sessions import PLAIN, Inverse3
 
-CLOCKS = ("wall", "tick")
+Clock = Literal["wall", "tick"]
 PUSH_PERIOD = 0.002  # [s] between two states pushed to a client
 LONGEST_QUEUE = 16  # longest queue of unanswered messages of a client
 
@@ -208,15 +208,15 @@ def _envelope(connection: Any, status: HTTPStatus, error: str = "", data: Any = 
     return response
 
 
-@named
+@checked
 @contextlib.contextmanager
 def serve(
     scenario: Scenario,
     *,
     host: str = "127.0.0.1",
     port: int = 0,
-    clock: str = "tick",
-    period: float | None = None,
+    clock: Clock = "tick",
+    period: Annotated[float | None, Bound(1e-5, 1.0, "s")] = None,
     hand: Trajectory | None = None,
     clay: bool = False,
     inverse3: Inverse3 = PLAIN,
@@ -249,7 +249,7 @@ def serve(
     most = inverse3.largest_force
     service = Service(
         SimulatedDevice(scenario, period=period, hand=hand, clay=clay, largest_force=most),
-        clock=choice("clock", clock, CLOCKS),
+        clock=clock,
         inverse3=inverse3,
     )
     with DeviceServer(service, host, port) as server:

@@ -7,8 +7,8 @@ import re
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, Protocol
 
-from ..arguments import named
-from ..errors import Bound, ParameterError, check_fields
+from ..arguments import part
+from ..errors import Bound, ParameterError
 from ..scene.scenario import Scenario
 from .buttons import ButtonScript
 from .commands import IDLE, Command, Pair
@@ -21,8 +21,7 @@ ID = re.compile("[0-9A-F]{1,16}")
 PORTS = {"inverse": 10_001, "rosbridge": 9090}  # default port of each protocol
 
 
-@named
-@dataclass(frozen=True)
+@part()
 class Inverse3:
     """Identity of the simulated device.
 
@@ -46,7 +45,6 @@ class Inverse3:
     origins: Any = ()  # texts, checked below
 
     def __post_init__(self):
-        check_fields(self)
         object.__setattr__(self, "origins", origins_of(self.origins))
         for name in ("device_id", "grip_id"):
             if not ID.fullmatch(getattr(self, name)):

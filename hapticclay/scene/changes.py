@@ -9,9 +9,7 @@ from typing import Any, TypeVar
 
 from ..arguments import checked
 from ..errors import ParameterError
-from ..model.constants import AXES
-from .field_kinds import ENTIRE, join_names
-from .given_values import laid_over, make_part, values_of
+from ..fields import AXES, ENTIRE, join_names, laid_over, make_part, value_of_text, values_of
 
 T = TypeVar("T")
 HAND = ["mass", "damper", "spring"]  # fields that add a hand
@@ -98,30 +96,19 @@ def _plant(tree: dict[Any, Any], names: Sequence[Any], value: Any) -> None:
         tree[name] = value
 
 
-def named_values(field: str, words: Iterable[str]) -> dict[str, Any]:
-    """Reads the words "arm.l1=0.3", "gain=1,0.5", "inertia_shaping=true", "dt=0.1ms"."""
-    out: dict[str, Any] = {}
+def split_words(field: str, words: Iterable[str], how: str) -> dict[str, str]:
+    """Splits words name=value; `how` describes them in the error."""
+    out: dict[str, str] = {}
     for word in words:
         name, equals, value = word.partition("=")
         name = name.strip()
         if not equals or not name or name in out:
-            raise ParameterError(field, word, "must be name=value, each name once")
-        out[name] = _value_of(value.strip())
+            raise ParameterError(field, word, how)
+        out[name] = value.strip()
     return out
 
 
-def _value_of(text: str) -> Any:
-    if text.lower() in ("true", "false"):
-        return text.lower() == "true"
-    items = text.split(",")
-    parts = [_number_or_text(x) for x in items]
-    if len(parts) > 1 and all(x.strip()[:1] in tuple("+-.0123456789") for x in items):
-        return parts
-    return parts[0] if len(parts) == 1 else text
-
-
-def _number_or_text(text: str) -> float | str:
-    try:
-        return float(text)
-    except ValueError:
-        return text
+def named_values(field: str, words: Iterable[str]) -> dict[str, Any]:
+    """Reads the words "arm.l1=0.3", "gain=1,0.5", "inertia_shaping=true", "dt=0.1ms"."""
+    texts = split_words(field, words, "must be name=value, each name once")
+    return {name: value_of_text(text) for name, text in texts.items()}

@@ -14,10 +14,27 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import cos, radians
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, ParamSpec, get_origin
+from typing import Annotated, Any, ClassVar, Literal, ParamSpec
 
-from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, field_types
+from ..arguments import checked, function_of, named
+from ..errors import Bound, ParameterError
+from ..fields import (
+    ENTIRE,
+    Axis,
+    Field,
+    Node,
+    Seed,
+    check_fields,
+    dotted_names,
+    field_descriptions,
+    field_unit,
+    make_part,
+    merged_values,
+    no_field,
+    node_of,
+    nodes_of,
+    values_of,
+)
 from ..formulas.constants import B_MAX
 from ..model.cells import Profile
 from ..model.clay import Clay, slab
@@ -44,16 +61,6 @@ from ..model.flow import Flow
 from ..model.operator import Operator
 from ..model.signals import Multisine
 from .changes import check_added_hand, nested
-from .field_kinds import ENTIRE, no_field, union_members
-from .fields import (
-    Field,
-    bounds_at,
-    dotted_names,
-    field_descriptions,
-    field_unit,
-    function_of,
-)
-from .given_values import make_part, merged_values, values_of
 from .scenario import (
     EXPERIMENTS,
     Control,
@@ -155,8 +162,8 @@ class Experiment:
             name: label of the scenario.
             **own: fields that differ from the parameters, or that have none.
         """
-        known = field_types(Scenario)
-        shared = {k: getattr(self, k) for k in field_types(type(self)) if k in known}
+        known = nodes_of(Scenario)
+        shared = {name: x for name, x in values_of(self).items() if name in known}
         values = {"name": name, **shared, **own}
         for changes in self._changes:
             values = merged_values(Scenario, changes, values)
@@ -168,7 +175,7 @@ class Experiment:
         The changes are made before the scenario is checked, so that another arm may go another way.
 
         Args:
-            *changes: plain data of the fields (`scene/plain_data.py`), the later ones on top.
+            *changes: plain data of the fields, the later ones on top.
 
         Raises:
             ParameterError: as `scenario`; or there is no such field.
@@ -303,9 +310,9 @@ class StabilityTest(Experiment):
 
     gain: Annotated[float, Bound(0.0, 1e6, "1/kg", above=True)] = GAINS_FIG11[1]
     b: Damping = B_STABILITY
-    axis: Literal["x", "y"] = "x"
+    axis: Axis = "x"
     rms: Annotated[float, Bound(0.0, 1e6, "N")] = 1.0
-    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
+    seed: Seed = 0
     _: dataclasses.KW_ONLY
     operator: Operator | None = Operator()
     t_max: Duration = 20.0
@@ -350,34 +357,15 @@ EXPERIMENTS |= {
 }
 
 
-class Parameter(NamedTuple):
-    """A parameter of an experiment in words, as the command line and sweeps take it.
-
-    Attributes:
-        kind: its type.
-        default: its default value.
-        unit: its unit, "" for none.
-        about: its description, unit and bounds included.
-    """
-
-    kind: Any
-    default: Any
-    unit: str
-    about: str
-
-
 @functools.cache
-def parameters(kind: type[Experiment]) -> dict[str, Parameter]:
-    """Parameters of an experiment by name; `operator` is a bool, true for the arm of the paper."""
-    types, told, out = field_types(kind), field_descriptions(kind), {}
+def parameters(kind: type[Experiment]) -> dict[str, Field]:
+    """Parameters of an experiment by name; `operator` is a flag: true for the arm of the paper."""
+    nodes, about, out = nodes_of(kind), field_descriptions(kind), {}
     for name, given in inspect.signature(kind).parameters.items():
-        hint, bound = types[name]
+        out[name] = Field(name, nodes[name], given.default, about[name])
         if name == "operator":
-            nominal = given.default is not None
-            about = "put the operator's arm Th (Eq. 19) in the loop."
-            out[name] = Parameter(bool, nominal, "", about)
-        else:
-            out[name] = Parameter(hint, given.default, bound.unit if bound else "", told[name])
+            about_hand = "put the operator's arm Th (Eq. 19) in the loop."
+            out[name] = Field(name, node_of(bool), given.default is not None, about_hand)
     return out
 
 
@@ -392,18 +380,14 @@ def _split_names(
     kind: type[Experiment], data: dict[Any, Any]
 ) -> tuple[dict[Any, Any], dict[Any, Any]]:
     """Plain data of the parameters of an experiment, and of other fields of the scenario."""
-    types, known = field_types(kind), field_types(Scenario)
+    nodes, known = nodes_of(kind), nodes_of(Scenario)
     data, own, other = dict(data), {}, {}
     if "operator" in data:
-        hand = (
-            data["operator"]
-            if isinstance(data["operator"], Mapping)
-            else {ENTIRE: data["operator"]}
-        )
+        given = data["operator"]
+        hand = given if isinstance(given, Mapping) else {ENTIRE: given}
         data["operator"] = {k: _operator(v) if k is ENTIRE else v for k, v in hand.items()}
     for name, value in data.items():
-        fits = name in types and not (_is_row(value) and _takes_one(types[name][0]))
-        if name in types and (name not in known or (fits and _reaches(types[name], value))):
+        if name in nodes and (name not in known or _reaches(nodes[name], value)):
             own[name] = value
         elif name in known:
             other[name] = value
@@ -412,37 +396,20 @@ def _split_names(
     return own, other
 
 
-def _is_row(value: Any) -> bool:
-    return isinstance(value, list | tuple)
-
-
-def _takes_one(hint: Any) -> bool:
-    """Whether a parameter is one number, where the field of its name is a pair."""
-    return not any(get_origin(kind) is tuple for kind in union_members(hint))
-
-
-def _reaches(field: tuple[Any, Bound | None], value: Any, *names: str) -> bool:
-    """Whether all that plain data names lies below a field."""
+def _reaches(node: Node, value: Any, *names: str) -> bool:
+    """Whether all that plain data names lies below a parameter, and has as many numbers."""
     if isinstance(value, Mapping):
         return all(
-            _reaches(field, v, *names, *([] if k is ENTIRE else [k])) for k, v in value.items()
+            _reaches(node, x, *names, *([] if key is ENTIRE else [key])) for key, x in value.items()
         )
-    return bool(bounds_at(*field, names))
+    one = not names and node.takes_numbers and node.arity == 1
+    return bool(node.bounds_at(names)) and not (one and isinstance(value, list | tuple))
 
 
 def parameter_names(kind: type[Experiment] | None) -> list[str]:
     """Names of all that can be set of an experiment: its parameters, and fields of the scenario."""
     own = parameters(kind) if kind else {}
     return list(dict.fromkeys([*own, *dotted_names(Scenario)]))
-
-
-def parameter_fields(kind: type[Experiment]) -> list[Field]:
-    """The parameters of an experiment as fields."""
-    bounds = {name: bound or Bound() for name, (_, bound) in field_types(kind).items()}
-    return [
-        Field(name, p.kind, bounds.get(name, Bound()), p.default, p.about)
-        for name, p in parameters(kind).items()
-    ]
 
 
 def parameter_unit(name: str) -> str:

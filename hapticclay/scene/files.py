@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ParameterError
+from ..fields import plain_data
 from ..files import MOST_SETTINGS, atomic, parse_json, parse_toml, read_text
 from .earlier_names import with_present_names
-from .plain_data import plain_data
 
 SCENARIO_FILES = (".toml", ".json")
 

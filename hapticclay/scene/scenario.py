@@ -11,23 +11,21 @@ from typing import Annotated, Any, Literal
 
 from ..arguments import checked, named
 from ..display import html_table, one_line
-from ..errors import Bound, ParameterError, check_fields, choice, number, quantity
+from ..errors import Bound, ParameterError, choice, number, quantity
+from ..fields import JOINTS, check_fields, dotted_names, merged_values, no_field, values_of
 from ..model import samples, shapes  # noqa: F401  # so that files and options know every Signal
 from ..model.arm import PAPER, Arm
 from ..model.clay import Clay
 from ..model.compensator import PRINTED, Compensator
 from ..model.constants import GAIN, ORIGIN, PATH_LENGTH, TORQUE_LIMIT, TS, each_axis
 from ..model.controller import SERVO, Servo
-from ..model.hardware import JOINTS, Hardware
+from ..model.hardware import Hardware
 from ..model.operator import Operator, mobility_with
 from ..model.sampled_controller import Controller
 from ..model.signals import Signal
 from ..model.support import check_scene
 from .changes import check_added_hand, nested
-from .field_kinds import no_field
-from .fields import dotted_names
 from .files import read_settings, write_part
-from .given_values import merged_values, values_of
 from .text import scenario_rows
 
 SERVO_STEP = 1.0  # radians of the servo's fastest mode in a step: stable below 2, and 4 % off at 1

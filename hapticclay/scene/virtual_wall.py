@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, choice, number
+from ..arguments import checked, part
+from ..errors import Bound, ParameterError, choice, number
+from ..fields import make_part
 from ..formulas.constants import B_MAX
 from ..model.arm import Arm
 from ..model.hardware import Hardware
@@ -19,7 +19,6 @@ from ..model.signals import Signal
 from ..model.spring import STIFFNESS_MAX
 from .changes import nested
 from .files import read_settings, write_part
-from .given_values import make_part
 from .scenario import Scenario
 
 LEVER = 0.24  # [m] link 1, which is the device: its motions are much smaller
@@ -30,8 +29,7 @@ SAMPLE_STEPS = 8  # engine steps per sample: the error of a step is far below th
 MASS_MAX = 1e6  # [kg]
 
 
-@named
-@dataclass(frozen=True)
+@part("device.")
 class Device:
     """A bare device of one axis: a mass behind a physical damper and Coulomb friction.
 
@@ -47,12 +45,8 @@ class Device:
     friction: Annotated[float, Bound(0.0, 1e6, "N")] = 0.0
     quantum: Annotated[float, Bound(0.0, 1e-2, "m")] = 0.0
 
-    def __post_init__(self):
-        check_fields(self, "device.")
 
-
-@named
-@dataclass(frozen=True)
+@part("wall.")
 class VirtualWall:
     """A virtual spring, damper and mass, rendered by the motor of a bare device every Ts.
 
@@ -88,7 +82,6 @@ class VirtualWall:
     unilateral: bool = False
 
     def __post_init__(self):
-        check_fields(self, "wall.")
         number("wall.delay", self.delay, 0.0, 100.0 * self.Ts, unit="s")
         if self.velocity == "exact" and (
             self.velocity_filter is not None or self.velocity_window != 1

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked
-from ..errors import ParameterError, array_of, field_types, integer, number
+from ..errors import ParameterError, array_of, integer, number
+from ..fields import nodes_of
 from ..kernel import scene
 from ..kernel.engine import warnings_caught
 from ..model.cells import Profile
 from ..model.constants import AXES
 from ..scene.changes import HAND, with_fields
-from ..scene.fields import bounds_at
 from ..scene.scenario import Scenario
 from . import batch
 from .engines import engine_for
@@ -172,8 +172,8 @@ def _column(name: str, given: Any) -> np.ndarray:
 
 def _check_bounds(base: Scenario, name: str, column: np.ndarray) -> None:
     """Refuses an unknown field, and a number out of bounds, with its row."""
-    (head, *rest), known = name.split("."), field_types(Scenario)
-    bounds = bounds_at(*known[head], rest) if head in known else []
+    (head, *rest), known = name.split("."), nodes_of(Scenario)
+    bounds = known[head].bounds_at(rest) if head in known else []
     if not bounds:
         with_fields(base, {name: float(column[0])})
     told = [float(x.low) for x in bounds if not isinstance(x.low, str)]

@@ -11,7 +11,6 @@ import numpy as np
 
 from ..formulas import regions
 from ..kernel import hardware, layout, native, path, records, scene, user_laws
-from ..kernel.memories import delay_in_samples
 from ..kernel.row import CHUNK, NativeRow
 from ..kernel.summary import CROSSINGS as SUMMARY_CROSSINGS
 from ..model import controller
@@ -116,7 +115,7 @@ class Pattern:
 
     def _put_delays(self, out: np.ndarray, delays: Sequence[float]) -> np.ndarray:
         """Puts delays of the torques into models; the ring that all use, one after the other."""
-        whole, share = np.array([delay_in_samples(x, self.row.m.Ts) for x in delays]).T
+        whole, share = np.array([scene.delay_in_samples(x, self.row.m.Ts) for x in delays]).T
         out["delay"], out["queue_rows"] = delays, whole + scene.QUEUE
         ring = np.zeros(int(hardware.QUEUED * (whole.max() + scene.QUEUE)))
         out["queue"] = ring.ctypes.data
@@ -267,5 +266,5 @@ def summary_columns(like: Scenario, m: Any, states: np.ndarray, outs: np.ndarray
         axis=np.zeros(len(states), "U1"), time=states["t"], step=states["i"], steps=outs["steps"],
         crossings=crossings, crossing_axis=crossed[:, :, 0].astype(np.int64),
         crossing_time=crossed[:, :, 1], crossing_speed=crossed[:, :, 2], p=row[:, 2:4], v=v,
-        fh=row[:, 6:8], fe=outs["force"] if m.told or m.holds else b * v, b=b, **energy,
+        fh=row[:, 6:8], fe=outs["force"] if m.records_clay_force else b * v, b=b, **energy,
     )  # fmt: skip

@@ -11,9 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..formulas import arm
-from ..kernel import layout, mover, path, records
+from ..kernel import layout, mover, path, records, scene
 from ..kernel.hardware import QUEUED
-from ..kernel.memories import delay_in_samples
 from ..kernel.row import Buffers, Row
 from ..model.sampled_controller import BUFFER
 from ..scene.scenario import Scenario
@@ -82,7 +81,7 @@ def has_map(s: Scenario, m: Any) -> bool:
 
 def warm_periods(m: Any) -> int:
     """Periods after which the rings of the hardware are full."""
-    late = delay_in_samples(m.delay, m.Ts)[0] if m.delay > 0.0 else -1
+    late = scene.delay_in_samples(m.delay, m.Ts)[0] if m.delay > 0.0 else -1
     return max(SETTLED, m.window, late + 1) if m.ratio else SETTLED
 
 

@@ -17,13 +17,12 @@ import numpy as np
 from ..arguments import checked, named
 from ..display import html_table, one_line
 from ..errors import ParameterError, choice
+from ..fields import make_part, plain_data
 from ..files import DAMAGED, atomic, check_regular, parse_json, versions
 from ..model.clay import Clay
 from ..model.constants import AXES
 from ..model.signals import Multisine
 from ..scene.earlier_names import with_present_names
-from ..scene.given_values import make_part
-from ..scene.plain_data import plain_data
 from ..scene.scenario import Scenario
 from ..scene.text import scenario_rows
 from ..theory import linear_loop

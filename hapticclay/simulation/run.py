@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arguments import named
 from ..kernel import arm, energy, modes, mover, path, rows, scene, viscous
-from ..kernel.row import CHUNK, Buffers, NativeRow, PlainRow, Row, Saved
+from ..kernel.row import CHUNK, Buffers, NativeRow, Row, Saved
 from ..kernel.scene import NOISE_AHEAD
 from ..model import hardware
 from ..model.constants import AXES
@@ -26,7 +26,7 @@ RECORDED = (  # of a run
     "steps", "watch", "looked", "kept", "rendered_kept", "last_rendered", "crossings", "stops",
     "outcome", "end_time", "calm", "first",
 )  # fmt: skip
-ROWS = {"python": PlainRow, "native": NativeRow}
+ROWS = {"python": Row, "native": NativeRow}
 
 
 @named
@@ -209,7 +209,7 @@ class Run:
     @property
     def rendered(self) -> bool:
         """Whether the force of the clay is recorded, because b v does not give it."""
-        return bool(self.row.m.told or self.row.m.holds)
+        return bool(self.row.m.records_clay_force)
 
     def sample_time(self) -> float:
         """Time of the present sample [s]; of the last good one after the end."""
@@ -220,7 +220,7 @@ class Run:
     def b(self) -> tuple[float, float]:
         """Damping of the clay in the present region, (x, y) [N.s/m]."""
         m, s = self.row.m, self.row.s
-        return viscous.now(m, s, 0, 0), viscous.now(m, s, 1, 0)
+        return viscous.damping(m, s, 0, 0), viscous.damping(m, s, 1, 0)
 
     # ---- steps
 
@@ -420,7 +420,7 @@ class Run:
 
     def give_up(self) -> None:
         """Ends the run at its last sample, because the steps after it become too short."""
-        cut_short = self.row.s.careful >= path.MOST_STEPS  # else divided by too many
+        cut_short = self.row.s.checked_steps >= path.MOST_STEPS  # else divided by too many
         most = path.MOST_STEPS if cut_short else modes.SUBSTEPS
         cause = f"more than {most} steps in one sample"
         other = "fast" if self.scenario.integrator == "accurate" else "accurate"
@@ -615,7 +615,10 @@ class Run:
         work = [getattr(s.work, name) for name in ("muscle", "motors", "clay", "hand", "through")]
         out = balance(work, self.first if self.looked else last, last)
         if m.springs:
-            out |= {"springs_stored": float(s.stored), "springs_dissipated": float(s.lost)}
+            out |= {
+                "springs_stored": float(s.springs_stored),
+                "springs_dissipated": float(s.springs_dissipated),
+            }
         return out | self._hardware(out)
 
     def _hardware(self, out: dict[str, float]) -> dict[str, float]:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import needing
+from ..fields import plain_data
 from ..model.constants import AXES
 from ..model.hardware import JOINTS
-from ..scene.plain_data import plain_data
 from .columns import ARRAYS, EXTRA, SCALAR, Recorded
 
 if TYPE_CHECKING:

@@ -74,7 +74,7 @@ class VectoredRuns:
     def _begin(self, k: int) -> None:
         """Notes that a run is at its start."""
         s, run = self.given[k], self.runs[k]
-        run.row.m.unread = 1
+        run.row.m.drops_events = 1
         self.over[k], self.changed[k], self.times[k] = False, False, 0.0
         self.force[k], self.gain[k] = s.force, s.gain
         self.looked_at[k], self.diverging[k] = -np.inf, False
@@ -116,7 +116,7 @@ class VectoredRuns:
             return
         run = self._sync(k)
         run.change(change(run.scenario))
-        run.row.m.unread = 1
+        run.row.m.drops_events = 1
         self.changed[k], self.is_shown = True, False
 
     def set_gain(self, which: np.ndarray, gain: np.ndarray) -> None:
@@ -130,7 +130,7 @@ class VectoredRuns:
                 row.m.axis[0].K, row.m.axis[1].K = K
             else:
                 self._sync(k)
-                row.m.unread = 1
+                row.m.drops_events = 1
         self.is_shown = self.is_shown and not len(which)
 
     # ---- steps
@@ -257,7 +257,7 @@ class VectoredRuns:
     def _put_force(self, which: np.ndarray) -> None:
         """Puts the force of clay that is not recorded beside the samples shown."""
         m, shown = self.models[which], self.shown
-        plain = (m["told"] == 0) & (m["holds"] == 0)
+        plain = m["records_clay_force"] == 0
         at = which[plain & (m["rotated"] == 0)]
         shown[at, ROW:] = shown[at, 12:14] * shown[at, 4:6]
         for k in which[plain & (m["rotated"] == 1)].tolist():

@@ -32,7 +32,6 @@ from .robustness import RiskMap as RiskMap
 from .robustness import monte_carlo as monte_carlo
 from .robustness import stored_runs as stored_runs
 from .sampling import Range as Range
-from .sampling import Sweep as Sweep
 from .sampling import parse_grid as parse_grid
 from .spectral_fit import identify_data as identify_data
 from .staircase import Observer as Observer
@@ -40,8 +39,9 @@ from .staircase import Staircase as Staircase
 from .staircase import StaircaseRun as StaircaseRun
 from .staircase import run_staircase as run_staircase
 from .staircase import staircase_mean as staircase_mean
+from .store import read_sweep as read_sweep
+from .sweep import Sweep as Sweep
 from .sweep import run_sweep as run_sweep
-from .sweep_store import read_sweep as read_sweep
 from .trials import Trials as Trials
 from .workspace import Drift as Drift
 from .workspace import drift_map as drift_map

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import hashlib
-import json
-import multiprocessing
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..arguments import checked
-from ..errors import integer
-from ..files import versions
+from ..errors import Bound
+from ..fields import plain_data
 from ..model.constants import AXES
-from ..scene.plain_data import plain_data
 from ..scene.scenario import Scenario
+from ..simulation.batch import SUMMARY
 from ..simulation.column_batch import Columns, simulate_columns
-from . import sweep
+from .store import Plan
+from .store_runs import run_plan
+from .sweep_rows import RESULT_COLUMNS
+from .workers import batch_threads
 
 SCHEMA = "hapticclay-columns-1"
 CHUNK = 10_000  # runs per file: one or two seconds of short runs
@@ -34,8 +34,8 @@ def run_columns(
     columns: Mapping[str, Any],
     out: str | os.PathLike[str],
     *,
-    chunk: int = CHUNK,
-    workers: int | None = None,
+    chunk: Annotated[int, Bound(1, 1_000_000)] = CHUNK,
+    workers: Annotated[int | None, Bound(1, 1024)] = None,
     scheduler: str | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> int:
@@ -64,19 +64,12 @@ def run_columns(
         ConnectionError: the connection to the scheduler is lost.
         FileNotFoundError: the folder, or a file in it, was removed while the runs were made.
     """
-    plan, folder, done = ColumnRuns(base, columns, chunk), Path(out), 0
-    with sweep.claimed(plan, folder) as (_, todo):
-        results = sweep.run_chunks(plan, folder, todo, workers, scheduler)
-        with contextlib.closing(results):
-            for n in results:
-                done += n
-                if progress:
-                    progress(n)
-    return done
+    plan = ColumnRuns(base, columns, chunk)
+    return run_plan(plan, Path(out), workers, scheduler, progress)
 
 
-class ColumnRuns:
-    """Runs as `sweep` stores them, see sweep.Stored.
+class ColumnRuns(Plan):
+    """Runs of a scenario with columns of numbers in place of some fields.
 
     Args:
         base: as in `run_columns`.
@@ -84,43 +77,42 @@ class ColumnRuns:
         chunk: as in `run_columns`.
     """
 
+    notes = {
+        **{name: RESULT_COLUMNS[name] for name in ("run", "status", "axis", "end_time")},
+        "steps": ("", "engine steps made"),
+        "p_x": ("m", "position at the end"),
+        "v_x": ("m/s", "velocity at the end"),
+        "fh_x": ("N", "force of the operator at the end"),
+        "fe_x": ("N", "resisting force of the clay at the end"),
+        "b_x": ("N.s/m", "damping of the clay at the end"),
+        "energy_residual": RESULT_COLUMNS["energy_residual"],
+    }
+
     def __init__(self, base: Scenario, columns: Mapping[str, Any], chunk: int):
-        self.chunk = integer("chunk", chunk, 1, 1_000_000)
-        drawn = Columns(base, columns)  # refuses bad ones
-        self.base, self.columns = base, drawn.columns
+        self.chunk, self.base = chunk, base
+        self.columns = Columns(base, columns).columns  # refuses bad ones
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
 
-    @property
-    def chunks(self) -> int:
-        """Number of files."""
-        return -(-len(self) // self.chunk)
-
-    def chunk_runs(self, number: int) -> range:
-        """The runs of one file."""
-        return range(number * self.chunk, min((number + 1) * self.chunk, len(self)))
-
-    def chunk_rows(self, number: int) -> list[dict[str, Any]]:
-        """Makes the runs of one file, one row per run."""
-        runs = self.chunk_runs(number)
-        part = {name: x[runs.start : runs.stop] for name, x in self.columns.items()}
-        # a worker is one of several processes, one per core
-        threads = None if multiprocessing.parent_process() is None else 1
-        made = table_of_ends(simulate_columns(self.base, part, threads=threads))
-        table = {"run": list(runs), **{name: x.tolist() for name, x in part.items()}, **made}
-        return [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
+    def rows(self, runs: range, late: Callable[[], bool]) -> list[dict[str, Any]]:
+        """Makes the runs of a file."""
+        columns = self._values(runs)
+        return _rows(runs, columns, simulate_columns(self.base, columns, threads=batch_threads()))
 
     def blank_row(self) -> dict[str, Any]:
         """A row, for the types of its columns."""
-        ends = {f"{name}_{axis}": 0.0 for name in ENDS for axis in AXES}
-        first = {"run": 0, **dict.fromkeys(self.columns, 0.0), "status": "", "axis": ""}
-        return {**first, "end_time": 0.0, "steps": 0, **ends, "energy_residual": 0.0}
+        return _rows(range(1), self._values(range(1)), np.zeros(1, SUMMARY))[0]
+
+    def _values(self, runs: range) -> dict[str, np.ndarray]:
+        return {name: x[runs.start : runs.stop] for name, x in self.columns.items()}
 
     def described(self) -> dict[str, Any]:
         """The runs as plain data; the columns by their names and a fingerprint."""
-        told = {"base": plain_data(self.base), "columns": list(self.columns), "runs": len(self)}
-        return {"schema": SCHEMA, **told, "chunk": self.chunk, "values": self._fingerprint}
+        return {
+            "schema": SCHEMA, "base": plain_data(self.base), "columns": list(self.columns),
+            "runs": len(self), "chunk": self.chunk, "values": self._fingerprint,
+        }  # fmt: skip
 
     @functools.cached_property
     def _fingerprint(self) -> str:
@@ -129,19 +121,15 @@ class ColumnRuns:
             values.update(x.tobytes())
         return values.hexdigest()
 
-    def digest(self) -> str:
-        """Fingerprint of the runs and of the hapticclay release."""
-        text = json.dumps({**self.described(), "release": versions()["hapticclay"]}, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
 
-
-def table_of_ends(made: np.ndarray) -> dict[str, list[Any]]:
-    """Columns of summaries."""
+def _rows(runs: range, columns: Mapping[str, np.ndarray], made: np.ndarray) -> list[dict[str, Any]]:
+    """Rows of the data set, of summaries."""
     through = np.where(made["throughput"] > 0.0, made["throughput"], np.nan)
-    out = {
-        "status": made["code"], "axis": made["axis"], "end_time": made["time"],
-        "steps": made["steps"],
+    table = {
+        "run": np.array(runs), **columns, "status": made["code"], "axis": made["axis"],
+        "end_time": made["time"], "steps": made["steps"],
+        **{f"{name}_{axis}": made[name][:, i] for name in ENDS for i, axis in enumerate(AXES)},
+        "energy_residual": np.abs(made["residual"]) / through,
     }  # fmt: skip
-    out |= {f"{name}_{axis}": made[name][:, i] for name in ENDS for i, axis in enumerate(AXES)}
-    out |= {"energy_residual": np.abs(made["residual"]) / through}
-    return {name: x.tolist() for name, x in out.items()}
+    values = zip(*(x.tolist() for x in table.values()), strict=True)
+    return [dict(zip(table, row, strict=True)) for row in values]

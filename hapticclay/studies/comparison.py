@@ -7,15 +7,15 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from ..arguments import checked, named
 from ..errors import ParameterError
+from ..fields import plain_data
 from ..results import Result
 from ..scene.files import read_settings
-from ..scene.plain_data import plain_data
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import WALL_SCHEMA, WALL_SCHEMA_0_2, VirtualWall
 from ..simulation.record import Record
@@ -63,15 +63,25 @@ class Compared:
     record: Record
     region: ZRegion | None = None
 
+    @property
+    def wall(self) -> VirtualWall:
+        """The subject that is not a scenario."""
+        assert self.loop is None
+        return cast(VirtualWall, self.subject)
+
+    @property
+    def top(self) -> float:
+        """Half the sampling frequency of a wall [Hz]; inf for a scenario."""
+        return math.inf if self.loop else 0.5 / self.wall.Ts
+
     def impedance(self, omega: np.ndarray) -> Impedance:
         """Impedance at a hand outside the loop; for a controller in continuous time.
 
         Args:
             omega: [rad/s], > 0, shape (n,).
         """
-        if isinstance(self.subject, VirtualWall):
-            return wall_response(replace(self.subject, operator=None), omega)
-        assert self.loop is not None
+        if self.loop is None:
+            return wall_response(replace(self.wall, operator=None), omega)
         return loop_response(replace(self.loop, operator=None, **TIMING), omega)
 
 
@@ -244,8 +254,7 @@ def _felt_numbers(found: Compared) -> dict[str, float]:
     """Effective stiffness, damping and mass at FELT_AT; NaN where a wall has no such frequency."""
     out: dict[str, float] = {}
     for f in FELT_AT:
-        known = not isinstance(found.subject, VirtualWall) or f < 0.5 / found.subject.Ts
-        Z = found.impedance(np.array([2.0 * math.pi * f])) if known else None
+        Z = found.impedance(np.array([2.0 * math.pi * f])) if f < found.top else None
         for part, unit in (("stiffness", "N/m"), ("damping", "N.s/m"), ("mass", "kg")):
             value = float(getattr(Z, part)[0]) if Z else math.nan
             out[f"effective {part} at {f:g} Hz [{unit}]"] = value

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
-from ..arguments import named
-from ..errors import ParameterError, check_fields, choice, number_in
+from ..arguments import part
+from ..errors import ParameterError, choice, number_in
+from ..scene.changes import split_words
 
 LawName = Literal["normal", "log-normal", "uniform", "log-uniform"]
 LAWS = get_args(LawName)
 SIDES = ("mean", "standard deviation", "low", "high")
 
 
-@named
-@dataclass(frozen=True)
+@part("distribution.")
 class Distribution:
     """Distribution of a random number. Both numbers have the unit of the parameter.
 
@@ -34,7 +33,6 @@ class Distribution:
     second: float
 
     def __post_init__(self):
-        check_fields(self, "distribution.")
         if self.law.startswith("log") and self.first <= 0.0:
             name = SIDES[0] if self.law == "log-normal" else SIDES[2]
             raise ParameterError(f"distribution {name}", self.first, f"must be > 0 ({self.law})")
@@ -160,13 +158,8 @@ def _normal_share(z: np.ndarray) -> np.ndarray:
 
 def parse_laws(text: str, unit_of: Callable[[str], str] = lambda _: "") -> dict[str, Distribution]:
     """Reads "delay=uniform:0:1e-3 pose.x=normal:0:0.02"."""
-    out: dict[str, Distribution] = {}
     if not isinstance(text, str):
         raise ParameterError("vary", text, "must be a text such as delay=uniform:0:1e-3")
-    for word in text.split():
-        name, equals, law = word.partition("=")
-        if not equals or not name or name in out:
-            bound = "must be name=law:number:number, as in delay=uniform:0:1e-3, each name once"
-            raise ParameterError("vary", word, bound)
-        out[name] = Distribution.parse(name, law, unit_of(name))
-    return out
+    how = "must be name=law:number:number, as in delay=uniform:0:1e-3, each name once"
+    laws = split_words("vary", text.split(), how).items()
+    return {name: Distribution.parse(name, law, unit_of(name)) for name, law in laws}

@@ -14,12 +14,12 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import ParameterError, choice, number, numbers_of
+from ..errors import Bound, ParameterError, choice
 from ..files import versions
 from ..model.constants import AXES
 from ..model.flow import N_MAX, N_MIN, Flow
@@ -226,15 +226,19 @@ class Fitted(Result):
         }
 
 
+Level = Annotated[float, Bound(0.5, 0.999)]
+Span = Annotated[tuple[float, float] | None, Bound(names=("low", "high"))]
+
+
 @checked
 def fit_flow(
     data: Measurement | Record | str | os.PathLike[str],
     axis: str | None = None,
     laws: Sequence[str] | str = tuple(FLOW_LAWS),
-    level: float = 0.95,
+    level: Level = 0.95,
     *,
-    time: tuple[float, float] | None = None,
-    place: tuple[float, float] | None = None,
+    time: Span = None,
+    place: Span = None,
 ) -> Fitted:
     """Fits a law of resistance, f = (Fy + K |v|^n) v/|v| + b v, and selects its terms.
 
@@ -257,7 +261,6 @@ def fit_flow(
             the samples of a Record lie in clays of several laws, or in elastic or rotated clay.
     """
     names = _law_names(laws)
-    level = number("level", level, 0.5, 0.999)
     if isinstance(data, Measurement):
         axis = choice("axis", "x" if axis is None else axis, AXES)
         t, p, v, f = data.t, data.output, None, data.input
@@ -272,7 +275,7 @@ def fit_flow(
         t = record.t
     for name, span, x in (("time", time, t), ("place", place, p)):
         if span is not None:
-            low, high = numbers_of(name, span, ("low", "high"))
+            low, high = span
             if not low < high:
                 raise ParameterError(name, (low, high), "must ascend")
             inside = inside & (low <= x) & (x <= high)

@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, asdict, dataclass, replace
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from ..arguments import checked, named
-from ..errors import ParameterError, choice, flag, integer, number, numbers_of, pair
+from ..arguments import function_of, named, part
+from ..errors import Bound, ParameterError, integer, numbers_of
+from ..fields import Axis, Seed
 from ..files import versions
 from ..formulas import arm as arm_law
 from ..model import arm
@@ -25,14 +26,14 @@ from ..model.constants import AXES, L1, L2, TS, G, S
 from ..model.operator import Operator
 from ..model.signals import Multisine
 from ..results import Result
-from ..scene.fields import function_of
-from ..scene.scenario import Control, Scenario
+from ..scene.scenario import Control, Position, Scenario
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 
 IDENTIFICATION_SCHEMA = "hapticclay-identify-1"
 NOMINAL_POSE = (L2, L1)  # world position of the handle where the elbow is square [m]
-BLOCK_KINDS = ("G", "S", "Th")
+Block = Literal["G", "S", "Th"]
+BLOCK_KINDS = get_args(Block)
 COEFFICIENT_NAMES = {
     "G": ("gain", "damping", "stiffness"),
     "S": ("gain", "damping", "stiffness"),
@@ -59,8 +60,12 @@ NOISE_ROUNDS = 3  # of a fit of the noise, each weighted by the one before; two 
 CONFIDENCE = 0.95
 
 
-@named
-@dataclass(frozen=True)
+Band = Annotated[
+    tuple[float, float] | None, Bound(0.0, unit="Hz", above=True, names=("low", "high"))
+]
+
+
+@part("noise.")
 class Noise:
     """Noise of the sensors. The paper prints no figure; these are ours.
 
@@ -69,13 +74,8 @@ class Noise:
         force: rms of the force sensor, white [N].
     """
 
-    encoder_counts: int = 65_536
-    force: float = 0.02
-
-    def __post_init__(self):
-        counts = integer("noise.encoder_counts", self.encoder_counts, 100, 2**40)
-        object.__setattr__(self, "encoder_counts", counts)
-        object.__setattr__(self, "force", number("noise.force", self.force, 0.0, 1e3, unit="N"))
+    encoder_counts: Annotated[int, Bound(100, 2**40)] = 65_536
+    force: Annotated[float, Bound(0.0, 1e3, "N")] = 0.02
 
 
 @named
@@ -273,8 +273,7 @@ def measured(
     return p, record.fh + rng.normal(0.0, noise.force, record.fh.shape)
 
 
-@checked
-@dataclass(frozen=True)
+@part()
 class Identification:
     """Identify one block of the loop on one axis; the compensator is off (K = 0).
 
@@ -302,19 +301,19 @@ class Identification:
         progress: called after each run with (runs made, runs in all).
     """
 
-    axis: str = "x"
-    what: str = "G"
+    axis: Axis = "x"
+    what: Block = "G"
     _: KW_ONLY
-    origin: tuple[float, float] = NOMINAL_POSE
+    origin: Position = NOMINAL_POSE
     inertia_shaping: bool = False
     noise: Noise | None = None
-    seed: int = 0
-    band: tuple[float, float] | None = None
-    period: float | None = None
-    periods: int = 2
-    realisations: int = REALISATIONS
-    lines: int = MULTISINE_LINES
-    amplitude: float | None = None
+    seed: Seed = 0
+    band: Band = None
+    period: Annotated[float | None, Bound(0.1, 1000.0, "s")] = None
+    periods: Annotated[int, Bound(1, 1000)] = 2
+    realisations: Annotated[int, Bound(1, 1000)] = REALISATIONS
+    lines: Annotated[int, Bound(3, 100_000)] = MULTISINE_LINES
+    amplitude: Annotated[float | None, Bound(0.0, 1.0, "m", above=True)] = None
     control: Control = "continuous"
     dt: float = TS
     progress: Callable[[int, int], None] | None = None
@@ -325,9 +324,9 @@ class Identification:
             name=f"identify {self.what} {self.axis}",
             gain=(0.0, 0.0),
             force=(0.0, 0.0),
-            origin=pair("origin", self.origin, unit="m"),
+            origin=self.origin,
             operator=Operator() if self.what == "Th" else None,
-            inertia_shaping=flag("inertia_shaping", self.inertia_shaping),
+            inertia_shaping=self.inertia_shaping,
             control=self.control,
             dt=self.dt,
             length=None,
@@ -338,17 +337,10 @@ class Identification:
         from scipy.fft import next_fast_len
 
         what, noise = self.what, self.noise
-        i = AXES.index(choice("axis", self.axis, AXES))
-        choice("what", what, BLOCK_KINDS)
-        if not isinstance(noise, Noise | None):
-            raise ParameterError("noise", noise, "must be a Noise or None")
-        seed = integer("seed", self.seed, 0, 2**32 - 1)
-        realisations = integer("realisations", self.realisations, 1, 1000)
+        i, seed, realisations = AXES.index(self.axis), self.seed, self.realisations
         periods = integer("periods", self.periods, 1 if realisations > 1 else 2, 1000)
         size = AMPLITUDE[what] if self.amplitude is None else self.amplitude
-        size = number("amplitude", size, 0.0, 1.0, above=True, unit="m")
         length = PERIOD[what] if self.period is None else self.period
-        length = number("period", length, 0.1, 1000.0, unit="s")
         base = self.scenario()
         n = int(next_fast_len(math.ceil(length / base.dt - 1e-9)))  # type: ignore[arg-type]
         gain = (
@@ -404,7 +396,6 @@ def _multisine(
 ) -> Multisine:
     """A multisine with the requested lines, or as many as fit into the period, at least three."""
     low, high = numbers_of("band", band, ("low", "high"), 0.0, limit, above=True, unit="Hz")
-    lines = integer("lines", lines, 3, 100_000)
     most = math.floor(high * period + 1e-9) - math.ceil(low * period - 1e-9) + 1
     if most < 3:
         bound = f"must contain at least 3 multiples of 1/period = {1.0 / period:.4g} Hz"

@@ -19,14 +19,10 @@ from ..model.constants import AXES
 from ..model.signals import Multisine
 from ..results import Result
 from ..scene.scenario import Scenario
-from ..scene.virtual_wall import VirtualWall
-from ..simulation.record import Record
 from ..simulation.simulate import simulate
-from ..theory import gain_crossings, gain_limits
-from ..theory.impedance import Impedance, loop_response, wall_response
-from ..theory.wall_limits import stable_wall, stiffness_band
-from .boundary import PushedLoop, of_scenario
+from ..theory.impedance import Impedance
 from .identification import _multisine, estimate_response
+from .wall import Port, Subject, Wall, as_wall
 
 IMPEDANCE_SCHEMA = "hapticclay-impedance-1"
 IMPEDANCE_BAND = (0.5, 30.0)  # [Hz]
@@ -38,8 +34,6 @@ STEPS_TRIED = 24  # step numbers per sample to try, until the delay falls on a s
 SETTLING_PERIODS = (2, 6, 22)  # periods discarded until the response has settled
 STEADY_RESPONSE = 1e-4  # relative deviation of the impedance from period to period
 LINEAR_MOTION = "must leave the motion linear: "
-
-Subject = PushedLoop | VirtualWall
 
 
 @named
@@ -114,9 +108,7 @@ class MeasuredImpedance(Result):
 
 def computed_impedance(subject: Subject, omega: np.ndarray) -> Impedance:
     """The computed impedance of a loop or a wall, at the nominal pose."""
-    if isinstance(subject, VirtualWall):
-        return wall_response(subject, omega)
-    return loop_response(subject.linear, omega)
+    return as_wall(subject).response(omega)
 
 
 @checked
@@ -149,34 +141,35 @@ def measure_impedance(
         ParameterError: a value is out of its bounds; the loop is unstable with this hand; or the
             run ends early, meets the limits of the motors, or does not settle.
     """
-    subject = of_scenario(subject, axis)
-    _check_subject(subject)
+    wall = as_wall(subject, axis)
+    wall.check_steady()
     amplitude = number("amplitude", amplitude, 0.0, 0.1, above=True, unit="m")
     length = number("period", period, 0.1, 1000.0, unit="s")
     seed = integer("seed", seed, 0, 2**32 - 1)
-    Ts, n, steps = _steps_of(subject, length)
+    Ts, n, steps = _steps_of(wall, length)
     dt = (Ts or LONGEST_STEP) / steps
-    i = 0 if isinstance(subject, VirtualWall) else AXES.index(subject.axis)
+    i = AXES.index(wall.axis)
     along = (1.0, 0.0) if i == 0 else (0.0, 1.0)
     wave = replace(_multisine(along, band, n * dt, lines, 0.1 / dt), seed=seed)
     omega = wave.omega
-    computed = computed_impedance(subject, omega)
-    th, s = subject.hand, 1j * omega
+    computed = wall.response(omega)
+    th, s = wall.hand, 1j * omega
     place = 1.0 / (s * computed.Z + th.mass * s * s + th.damper * s + th.spring)
     rms = amplitude / math.sqrt(np.mean(np.abs(place) ** 2))
     wave = replace(wave, rms=(rms * along[0], rms * along[1]))
     deviation, settling = np.array([math.inf]), 0
     for settling in SETTLING_PERIODS:
-        scenario = _driven_scenario(subject, wave, (settling + 2) * wave.period, dt)
+        scenario = wall.driven(wave, (settling + 2) * wave.period, dt)
         record = simulate(scenario)
         if record.outcome.code != "time limit" or record.outcome.cause:
             raise ParameterError("amplitude", amplitude, LINEAR_MOTION + record.status)
         part = slice(settling * n, (settling + 2) * n)
-        measured, deviation = _measured(subject, record, part, n, steps, i, wave)
-        if deviation.max() <= STEADY_RESPONSE or _rough(subject):
+        port, reference = wall.port(record, part, steps), wave(record.t[part])[:, i]
+        measured, deviation = _measured(port, reference, n, wave)
+        if deviation.max() <= STEADY_RESPONSE or not wall.linear:
             seen = replace(measured, rendered=computed.rendered)
-            notes = _notes(subject, dt)
-            return MeasuredImpedance(subject, seen, computed, deviation, scenario, notes)
+            notes = _notes(wall, dt)
+            return MeasuredImpedance(wall.subject, seen, computed, deviation, scenario, notes)
     bound = (
         f"must settle: from period to period its impedance differs by {deviation.max():.2g}, "
         f"after {settling} periods of {wave.period:.3g} s; give a longer period"
@@ -184,98 +177,51 @@ def measure_impedance(
     raise ParameterError("period", period, bound)
 
 
-def _check_subject(subject: Subject) -> None:
-    """Refuse a subject without a steady response."""
-    if isinstance(subject, VirtualWall):
-        if subject.unilateral:
-            bound = "must be False: a unilateral wall is not linear"
-            raise ParameterError("wall.unilateral", True, bound)
-        if not _rough(subject) and not stable_wall(subject):
-            bound = (
-                f"must leave the wall stable with this hand: between {{:.4g}} and {{:.4g}} N/m "
-                f"at B = {subject.B:g} N.s/m, M = {subject.M:g} kg"
-            )
-            bound = bound.format(*stiffness_band(subject))
-            raise ParameterError("wall.K", subject.K, bound)
-        return
-    if not isinstance(subject, PushedLoop):
-        raise ParameterError(
-            "subject", subject, "must be a Scenario, a PushedLoop or a VirtualWall"
-        )
-    if not gain_crossings.is_stable(subject.linear):
-        limit = gain_limits.gain_limit(subject.linear)
-        bound = f"must be stable with this hand: at most {limit:.4g}"
-        raise ParameterError("K", subject.K, bound)
-
-
-def _rough(subject: Subject) -> bool:
-    """Whether the run has friction or an encoder, which theory neglects."""
-    device = subject.device if isinstance(subject, VirtualWall) else None
-    return device is not None and bool(device.friction or device.quantum)
-
-
-def _steps_of(subject: Subject, length: float) -> tuple[float | None, int, int]:
+def _steps_of(wall: Wall, length: float) -> tuple[float | None, int, int]:
     """Control sample; engine steps per period, in whole samples; engine steps per sample."""
     from scipy.fft import next_fast_len
 
-    if subject.Ts is None:
+    if wall.Ts is None:
         n = int(next_fast_len(math.ceil(length / LONGEST_STEP - 1e-9)))  # type: ignore[arg-type]
         return None, n, 1
-    least = max(1, math.ceil(subject.Ts / LONGEST_STEP - 1e-9))
-    late = subject.delay / subject.Ts
+    least = max(1, math.ceil(wall.Ts / LONGEST_STEP - 1e-9))
+    late = wall.delay / wall.Ts
     tried = range(least, least + STEPS_TRIED)
     steps = next((x for x in tried if abs(x * late - round(x * late)) < 1e-9), least)
-    samples = int(next_fast_len(math.ceil(length / subject.Ts - 1e-9)))  # type: ignore[arg-type]
-    return subject.Ts, samples * steps, steps
-
-
-def _driven_scenario(subject: Subject, wave: Multisine, t_max: float, dt: float) -> Scenario:
-    if isinstance(subject, VirtualWall):
-        return subject.scenario(t_max, muscle=wave, steps=round(subject.Ts / dt))
-    still = dict(force=(0.0, 0.0), velocity=(0.0, 0.0), stop_when_unstable=True)
-    base = replace(subject, pose=(0.0, 0.0)).scenario(t_max)
-    return replace(base, name="impedance", muscle=wave, dt=dt, Ts=subject.Ts, **still)
+    samples = int(next_fast_len(math.ceil(length / wall.Ts - 1e-9)))  # type: ignore[arg-type]
+    return wall.Ts, samples * steps, steps
 
 
 def _measured(
-    subject: Subject, record: Record, part: slice, n: int, steps: int, i: int, wave: Multisine
+    port: Port, reference: np.ndarray, n: int, wave: Multisine
 ) -> tuple[Impedance, np.ndarray]:
     """The impedance over two whole periods of a record, and its relative deviation.
 
     A row of the record holds velocity and hand force at the sample, with the force interpolated
-    between the kicks on both sides. The motor force is held, so its rows form a staircase: its
-    fundamental is that of the rows times that of a hold.
+    between the kicks on both sides. A held motor force forms a staircase: its fundamental is that
+    of the rows times that of a hold.
     """
-    v, fh, fe = (x[part, i] for x in (record.v, record.fh, record.fe))
-    held = False
-    if isinstance(subject, VirtualWall):
-        fh = fh + subject.device.damper * v  # the run has it in the arm of the operator
-        fe, held = record.tau[part, 0] / record.scenario.arm.l1, True
-    elif subject.Ts and subject.render == "held":
-        held = True
-        if not subject.delay:  # the record then has b v between the samples, too
-            fe = np.repeat(fe[::steps], steps)
     bins = np.round(wave.omega / (2.0 * math.pi) * wave.period).astype(int)
-    reference = wave(record.t[part])[:, i]
-    Z = estimate_response(np.array([[reference, v, fh]]), n, bins)
+    Z = estimate_response(np.array([[reference, port.v, port.fh]]), n, bins)
     transparency = np.zeros_like(Z.response)
-    if np.any(fe):
-        transparency = estimate_response(np.array([[reference, fh, fe]]), n, bins).response
-    if held:
+    if np.any(port.fe):
+        rows = np.array([[reference, port.fh, port.fe]])
+        transparency = estimate_response(rows, n, bins).response
+    if port.held:
         turn = 1j * wave.omega * wave.period / n
         transparency = transparency * -np.expm1(-turn) / turn
     found = Impedance(wave.omega, Z.response, transparency, np.zeros_like(transparency))
     return found, Z.deviation / np.abs(Z.response)
 
 
-def _notes(subject: Subject, dt: float) -> tuple[str, ...]:
+def _notes(wall: Wall, dt: float) -> tuple[str, ...]:
     notes = []
-    if _rough(subject):
+    if wall.left_out:
         notes.append(
             "friction and encoder make the response depend on the amplitude: measured is the best "
             "linear one at this amplitude, computed leaves them out"
         )
-    late = subject.delay / dt
+    late = wall.delay / dt
     if abs(late - round(late)) > 1e-6:
         notes.append(
             "the delay is not a multiple of a step: measured fe/fh is late by up to a step"

@@ -9,8 +9,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, choice, integer, number, numbers_of
+from ..arguments import checked, named, part
+from ..errors import Bound, ParameterError, choice, integer, number
+from ..fields import Seed
 from ..model.operator import Operator
 from ..results import Result
 from ..scene.virtual_wall import VirtualWall
@@ -23,12 +24,13 @@ from .stability_map import Progress
 
 HAND = ("mass", "damper", "spring")
 HAND_UNITS = ("kg", "N.s/m", "N/m")
-PAIRS = tuple(itertools.combinations(HAND, 2))
+PAIRS = tuple(f"{a}, {b}" for a, b in itertools.combinations(HAND, 2))
 MOST_HANDS = 100_000
+Correlations = Annotated[tuple[float, float, float], Bound(-1.0, 1.0, names=PAIRS)]
+Variation = Annotated[float, Bound(1e-3, 10.0)]
 
 
-@named
-@dataclass(frozen=True)
+@part("hands.")
 class Hands:
     """A population of hands: the known distribution of mass, damper and spring of Th.
 
@@ -43,35 +45,28 @@ class Hands:
             to 1; that of the logarithms where both are log-normal. 0 where none was published.
     """
 
-    mass: float | Distribution
-    damper: float | Distribution
-    spring: float | Distribution
+    mass: Annotated[float | Distribution, Bound(0.0, unit="kg")]
+    damper: Annotated[float | Distribution, Bound(0.0, unit="N.s/m")]
+    spring: Annotated[float | Distribution, Bound(0.0, unit="N/m")]
     source: str = ""
     spread: str = ""
-    subjects: int = 0
-    correlation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    subjects: Annotated[int, Bound(0, 1_000_000)] = 0
+    correlation: Correlations = (0.0, 0.0, 0.0)
 
     def __post_init__(self):
-        for name, unit in zip(HAND, HAND_UNITS, strict=True):
+        for name in HAND:
             value = getattr(self, name)
-            if not isinstance(value, Distribution):
-                value = number(f"hands.{name}", value, 0.0, unit=unit)
-                object.__setattr__(self, name, value)
-            elif value.law == "normal" or value.first < 0.0:
+            if isinstance(value, Distribution) and (value.law == "normal" or value.first < 0.0):
                 laws = ", ".join(x for x in LAWS if x != "normal")
                 bound = f"must have no negative values: {laws}, from 0 on"
                 raise ParameterError(f"hands.{name}", value, bound)
-        integer("hands.subjects", self.subjects, 0, 1_000_000)
-        names = [f"{a}, {b}" for a, b in PAIRS]
-        found = numbers_of("hands.correlation", self.correlation, names, -1.0, 1.0)
-        object.__setattr__(self, "correlation", found)
         if np.linalg.eigvalsh(self._correlations).min() < -1e-12:
             bound = "must be correlations of three numbers: no three numbers have these"
             raise ParameterError("hands.correlation", self.correlation, bound)
 
     @classmethod
     @checked
-    def around(cls, operator: Operator, variation: float = 0.3, **about: Any) -> Hands:
+    def around(cls, operator: Operator, variation: Variation = 0.3, **about: Any) -> Hands:
         """Log-normal hands around a mean: an assumption for data without a published spread.
 
         Args:
@@ -79,7 +74,7 @@ class Hands:
             variation: standard deviation over mean of each number, 0.001 to 10.
             **about: other attributes.
         """
-        c = number("variation", variation, 1e-3, 10.0)
+        c = variation
         mass, damper, spring = (
             Distribution("log-normal", x, c * x) if x else 0.0
             for x in (operator.mass, operator.damper, operator.spring)
@@ -253,8 +248,7 @@ class Band(Result):
         return {"band": rows, "hands": hands}
 
 
-@named
-@dataclass(frozen=True)
+@part("draw.")
 class Draw:
     """Number of hands in a band, and their seed.
 
@@ -264,10 +258,7 @@ class Draw:
     """
 
     hands: Annotated[int, Bound(2, MOST_HANDS)] = 200
-    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
-
-    def __post_init__(self):
-        check_fields(self, "draw.")
+    seed: Seed = 0
 
 
 @checked

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, integer, number, numbers_of
+from ..arguments import checked, part
+from ..errors import Bound, ParameterError, integer
 from ..formulas import hardware
 from ..model.samples import Samples
 from ..model.spring import STIFFNESS_MAX
@@ -42,8 +42,7 @@ K_SHARE = 2e-4  # relative accuracy of limits
 FILTER_TIMES = 12.0  # time constants of the filter before energy is counted
 
 
-@named
-@dataclass(frozen=True)
+@part("path.")
 class Path:
     """A path that a hand imposes on the device: a periodic polygon through the samples.
 
@@ -57,7 +56,6 @@ class Path:
     middles: Annotated[tuple[float, ...], Bound(-0.1, 0.1, "m")] = ()
 
     def __post_init__(self):
-        check_fields(self, "path.")
         if len(self.places) < 2:
             raise ParameterError("path.places", self.places, "must be two places or more")
         if self.middles and len(self.middles) != len(self.places):
@@ -65,8 +63,12 @@ class Path:
             raise ParameterError("path.middles", self.middles, bound)
 
 
+Amplitude = Annotated[float, Bound(0.0, 0.1, "m", above=True)]
+Turn = Annotated[tuple[float, float], Bound(1.0, 1e6, names=("p", "q"))]
+
+
 @checked
-def zigzag(amplitude: float, about: float = 0.0) -> Path:
+def zigzag(amplitude: Amplitude, about: Annotated[float, Bound(-0.1, 0.1, "m")] = 0.0) -> Path:
     """The path at half the sampling frequency, synchronous with the samples: a triangle.
 
     Per sample a wall K with damper B delivers 2 A^2 (K + 2 B/Ts) along it, and a damper b
@@ -76,13 +78,11 @@ def zigzag(amplitude: float, about: float = 0.0) -> Path:
         amplitude: A [m], > 0, at most 0.1.
         about: its middle [m], -0.1 to 0.1.
     """
-    amplitude = number("amplitude", amplitude, 0.0, 0.1, above=True, unit="m")
-    about = number("about", about, -0.1, 0.1, unit="m")
     return Path((about + amplitude, about - amplitude))
 
 
 @checked
-def polygon(wall: VirtualWall, turn: tuple[int, int], amplitude: float = 1e-4) -> Path:
+def polygon(wall: VirtualWall, turn: Turn, amplitude: Amplitude = 1e-4) -> Path:
     """The path of least dissipation through a sine of the samples.
 
     If a delayed force changes between two samples, the path has a corner there too, where the
@@ -93,10 +93,9 @@ def polygon(wall: VirtualWall, turn: tuple[int, int], amplitude: float = 1e-4) -
         turn: omega Ts as (p, q) of pi p/q, 1 <= p <= q.
         amplitude: of the sine [m], > 0, at most 0.1.
     """
-    p, q = (int(n) for n in numbers_of("turn", turn, ("p", "q"), 1.0, 1e6))
+    p, q = map(int, turn)
     if p > q:
         raise ParameterError("turn", turn, "must be (p, q) with 1 <= p <= q")
-    amplitude = number("amplitude", amplitude, 0.0, 0.1, above=True, unit="m")
     angle = math.pi * p / q * np.arange(2 * q)
     places = amplitude * np.cos(angle)
     middle = wall_limits.worst_middle(wall, math.pi * p / q)

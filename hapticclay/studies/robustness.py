@@ -6,7 +6,6 @@ stored like those of a sweep, so an interrupted study resumes where it stopped.
 
 from __future__ import annotations
 
-import contextlib
 import math
 import shutil
 import time
@@ -21,13 +20,11 @@ from ..arguments import checked, named
 from ..display import brief
 from ..errors import ParameterError, choice, integer
 from ..results import Result
-from ..scene.virtual_wall import VirtualWall
-from ..theory import wall_limits
-from . import boundary, sweep, sweep_store
-from .boundary import PushedLoop
+from . import store, store_runs
 from .probability import LEVEL, Probability, clopper_pearson
 from .trials import Trials
 from .verdicts import NOT_RUN
+from .wall import as_wall
 
 PROBED = 200  # runs used to estimate the cost
 CURVE_POINTS = 61  # of a boundary
@@ -186,7 +183,8 @@ class Instability(Result):
         log = grid.min() > 0.0 and grid.max() > 30.0 * grid.min()
         x = (np.geomspace if log else np.linspace)(grid.min(), grid.max(), CURVE_POINTS)
         middle = {k: v for k, v in self.trials.middle().items() if k != "K"}
-        return x, np.array([_exact_limit(self.trials.loop({**middle, other[0]: v})) for v in x])
+        subjects = (self.trials.loop({**middle, other[0]: v}) for v in x)
+        return x, np.array([as_wall(subject).trial_limit() for subject in subjects])
 
     def tables(self) -> dict[str, dict[str, Sequence]]:
         """The numbers of the figure, by table name: columns by name."""
@@ -212,14 +210,6 @@ class Instability(Result):
             }  # fmt: skip
             out["cells"] = cells
         return out
-
-
-def _exact_limit(loop: PushedLoop | VirtualWall) -> float:
-    """Largest stable K of the linear loop."""
-    if isinstance(loop, VirtualWall):
-        return wall_limits.stiffness_band(loop)[1]
-    placed = loop.pose != (0.0, 0.0) and not loop.inertia_shaping
-    return boundary.pose_limit(loop) if placed else boundary.nominal_limit(loop)
 
 
 # ---- making the runs -----------------------------------------------------------------------------
@@ -255,7 +245,7 @@ def measure_cost(trials: Trials, left: int, out: Path | None = None, workers: in
         return Cost(left, each * left)
     blank = trials.blank_row()
     rows = [{**blank, **dict(zip(trials.names, v, strict=True))} for v in trials.points(0).tolist()]
-    size = sweep_store.row_size(trials, rows) * left
+    size = store.row_size(trials, rows) * left
     return Cost(left, each * left, size, shutil.disk_usage(out).free)
 
 
@@ -287,28 +277,30 @@ def monte_carlo(
         ChildProcessError: workers cannot be started, or one was killed.
         FileNotFoundError: the folder, or a file in it, was removed while the runs were made.
     """
-    workers, show = integer("workers", workers, 1, 1024), progress or (lambda n: None)
+    workers = integer("workers", workers, 1, 1024)
     if out is None:
         if announce:
             announce(measure_cost(trials, len(trials)))
         rows = []
         for n in range(trials.chunks):
             rows.append(_judged_chunk(trials, n))
-            show(len(rows[-1][1]))
+            if progress:
+                progress(len(rows[-1][1]))
         return Instability(trials, *(np.concatenate(x) for x in zip(*rows, strict=True)))
     folder = Path(out)
-    with sweep_store.claimed(trials, folder) as (_, todo):
-        if todo:
-            left = sum(map(len, todo))
-            cost = measure_cost(trials, left, folder, sweep.processes(trials, todo, workers))
-            if announce:
-                announce(cost)
-            if cost.size > cost.free:
-                bound = f"must have room for {cost.size:.3g} bytes; {cost.free:.3g} are free"
-                raise ParameterError("out", str(folder), bound)
-            with contextlib.closing(sweep.run_chunks(trials, folder, todo, workers)) as results:
-                for n in results:
-                    show(n)
+
+    def check_room(_: Trials, todo: list[range]) -> None:
+        left, crew = sum(map(len, todo)), store_runs.processes(trials, todo, workers)
+        if not left:
+            return
+        cost = measure_cost(trials, left, folder, crew)
+        if announce:
+            announce(cost)
+        if cost.size > cost.free:
+            bound = f"must have room for {cost.size:.3g} bytes; {cost.free:.3g} are free"
+            raise ParameterError("out", str(folder), bound)
+
+    store_runs.run_plan(trials, folder, workers, progress=progress, before=check_room)
     return stored_runs(trials, folder)
 
 
@@ -323,12 +315,12 @@ def stored_runs(trials: Trials, out: Path | str) -> Instability:
     Raises:
         ParameterError: it holds no runs, or other runs.
     """
-    digest = sweep_store.stored_digest(Path(out))
+    digest = store.stored_digest(Path(out))
     if digest is None:
         raise ParameterError("out", str(out), "holds no runs")
     if digest != trials.digest():
         raise ParameterError("out", str(out), "holds the runs of other trials")
-    table = sweep_store.read_sweep(out)
+    table = store.read_sweep(out)
     columns = {n: table[n].to_numpy() for n in (*trials.names, "unstable", "longer")}
     points = np.column_stack([columns[n] for n in trials.names])
     return Instability(trials, points, columns["unstable"], columns["longer"])

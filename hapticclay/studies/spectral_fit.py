@@ -8,10 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import checked
-from ..errors import ParameterError, choice, flag, numbers_of
-from ..model.constants import AXES
+from ..errors import ParameterError, numbers_of
+from ..fields import Axis
 from .identification import (
-    BLOCK_KINDS,
     COEFFICIENT_NAMES,
     COEFFICIENT_UNITS,
     COHERENT,
@@ -19,6 +18,8 @@ from .identification import (
     IDENTIFICATION_BAND,
     LINE_FLOOR,
     MULTISINE_LINES,
+    Band,
+    Block,
     Coefficient,
     Identified,
     printed_form,
@@ -43,10 +44,10 @@ WEIGHT_ROUNDS = 4  # of fit and noise; the weights settle in two
 @checked
 def identify_data(
     data: Measurement,
-    what: str = "G",
-    axis: str = "x",
+    what: Block = "G",
+    axis: Axis = "x",
     *,
-    band: tuple[float, float] | None = None,
+    band: Band = None,
     held: bool = False,
 ) -> Identified:
     """Identify one block from measured columns.
@@ -72,9 +73,7 @@ def identify_data(
         ParameterError: the record is too short for the band, the input has no power in it, the
             output does not follow, or no such block fits.
     """
-    choice("what", what, BLOCK_KINDS)
-    choice("axis", axis, AXES)
-    if flag("held", held) and what == "Th":
+    if held and what == "Th":
         raise ParameterError("held", held, 'must be False for "Th", whose input is a position')
     columns, warnings = _Columns.of(data), []
     place = cleaned(columns.output, quantum(columns.output))

@@ -14,8 +14,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ..arguments import checked, named
-from ..errors import Bound, ParameterError, check_fields, integer, number
+from ..arguments import checked, named, part
+from ..errors import Bound, ParameterError, integer, number
+from ..fields import Seed
 from ..results import Result
 
 NORMAL = NormalDist()
@@ -25,8 +26,7 @@ MOST_LEVEL = 1e6
 Stimulus = Callable[[float], float]
 
 
-@named
-@dataclass(frozen=True)
+@part("observer.")
 class Observer:
     """A simulated observer that answers at random with a known psychometric function.
 
@@ -41,9 +41,6 @@ class Observer:
     threshold: Annotated[float, Bound(0.0, MOST_LEVEL, above=True)] = 0.08
     spread: Annotated[float, Bound(0.0, MOST_LEVEL, above=True)] = 0.03
     lapse: Annotated[float, Bound(0.0, 0.5)] = 0.0
-
-    def __post_init__(self):
-        check_fields(self, "observer.")
 
     def notices(self, x: float) -> float:
         """Probability that a difference is noticed.
@@ -69,8 +66,7 @@ class Observer:
         return self.threshold + self.spread * NORMAL.inv_cdf((share - half) / (1.0 - self.lapse))
 
 
-@named
-@dataclass(frozen=True)
+@part("staircase.")
 class Staircase:
     """A staircase: the difference falls after several hits in a row, and rises after a miss.
 
@@ -91,7 +87,6 @@ class Staircase:
     skipped: Annotated[int, Bound(0, 9_999)] = 4
 
     def __post_init__(self):
-        check_fields(self, "staircase.")
         integer("staircase.skipped", self.skipped, 0, self.reversals - 1)
 
     @property
@@ -152,7 +147,7 @@ class StaircaseRun(Result):
 
 @checked
 def run_staircase(
-    staircase: Staircase, observer: Observer, seed: int = 0, stimulus: Stimulus | None = None
+    staircase: Staircase, observer: Observer, seed: Seed = 0, stimulus: Stimulus | None = None
 ) -> StaircaseRun:
     """Run a staircase on a simulated observer.
 
@@ -166,7 +161,7 @@ def run_staircase(
         ParameterError: it does not turn often enough within 100000 trials, or stimulus returns no
             difference.
     """
-    rng = np.random.default_rng(integer("seed", seed, 0, 2**32 - 1))
+    rng = np.random.default_rng(seed)
     s, level, row, direction = staircase, staircase.start, 0, 0
     levels: list[float] = []
     noticed: list[bool] = []
@@ -192,7 +187,10 @@ def run_staircase(
 
 @checked
 def staircase_mean(
-    staircase: Staircase, observer: Observer, runs: int = 100, seed: int = 0
+    staircase: Staircase,
+    observer: Observer,
+    runs: Annotated[int, Bound(2, 100_000)] = 100,
+    seed: Annotated[int, Bound(0, 2**31)] = 0,
 ) -> tuple[float, float]:
     """Mean estimate of many staircases, and its standard error.
 
@@ -202,6 +200,5 @@ def staircase_mean(
         runs: number of staircases, 2 to 100000.
         seed: seed of the first, 0 to 2^31.
     """
-    runs, seed = integer("runs", runs, 2, 100_000), integer("seed", seed, 0, 2**31)
     found = [run_staircase(staircase, observer, seed + i).estimate for i in range(runs)]
     return float(np.mean(found)), float(np.std(found, ddof=1) / math.sqrt(runs))

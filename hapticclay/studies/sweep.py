@@ -1,122 +1,184 @@
-"""Many runs over a space of parameters, as a data set that survives interruptions.
-
-The runs are stored in Parquet files, each written whole or not at all by the process that made its
-runs. Missing and damaged files define the remaining work, so an interrupted or killed sweep resumes
-where it stopped. A file holds a chunk of given size; without one, a process makes runs for a share
-of the time spent so far and then writes them, so that files stay few, whatever a run takes.
-"""
+"""Runs over a space of parameters, as a data set that survives interruptions."""
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-import logging
 import math
 import os
-import sys
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from ..arguments import checked
-from ..errors import ParameterError
-from ..files import atomic
-from ..simulation.batch import cores
-from .sampling import Sweep
-from .sweep_rows import CHUNK_TIME, PROBE_TIME, probed, run_point
-from .sweep_store import (
-    MOST_IN_CHUNK,
-    Plan,
-    check_begun,
-    check_complete,
-    chunk_size,
-    claimed,
-    parquet_schema,
-    part_number,
-    row_size,
-    sweep_part,
-    write_part,
-)
-from .workers import ended, started
+import numpy as np
 
-SCHEDULER_PATIENCE = 4.0  # until a scheduler answers [s]; dask tries for up to twice as long
-FINISHING = "hapticclay: finishing the chunks in progress"
-CLUSTER_CHUNK_TIME = 10.0  # as CHUNK_TIME, on a cluster: its scheduler serves many workers [s]
-CHUNK_SHARE = 0.05  # of the time spent so far, which a file may take instead
-AHEAD = 2  # tasks of a cluster per worker, so that none waits for the next
+from ..arguments import checked, part
+from ..errors import Bound, ParameterError, choice, integer
+from ..fields import join_names
+from ..files import MOST_SETTINGS, parse_toml, read_text
+from ..scene.earlier_names import with_present_names
+from ..scene.experiments import EXPERIMENTS, parameter_unit
+from ..scene.files import read_settings
+from ..scene.scenario import Scenario
+from ..simulation.simulate import simulate
+from . import store, store_runs
+from .sampling import MOST_RUNS, Range, unit_samples
+from .sweep_rows import result_row
+
+SWEEP_SCHEMA = "hapticclay-sweep-2"
+PROBES = 20  # runs used for an estimate ...
+PROBE_TIME = 5.0  # ... or fewer after this time [s]
 
 
-def run_part(
-    sweep: Plan,
-    runs: range,
-    out: str,
-    patience: float = math.inf,
-    ended: Callable[[], bool] = lambda: False,
-) -> tuple[int, float]:
-    """Makes runs and writes their file, in any process."""
-    begin, number = time.perf_counter(), part_number(sweep, runs)
-    check_begun(sweep, Path(out))  # before the work, too: a cluster repeats what has failed
-    if isinstance(sweep, Sweep):
-        rows: list[dict[str, Any]] = []
-        for index, point in zip(runs, sweep.points(runs.start, runs.stop), strict=True):
-            rows.append(run_point(sweep, index, point))
-            late = time.perf_counter() - begin > patience or ended()
-            if late and sweep.chunk is None:
-                break
-    else:
-        rows = sweep.chunk_rows(number)
-    check_begun(sweep, Path(out))
-    with atomic(sweep_part(Path(out), number)) as f:
-        write_part(rows, parquet_schema(sweep, number), f)
-    return len(rows), time.perf_counter() - begin
+@part()
+class Sweep(store.Plan):
+    """Runs of one experiment, or of a scenario file, over a space of its numbers.
 
+    A number is a parameter of the experiment, as on the command line, or any field of the scenario
+    by dotted name: "servo.x.G.damping", "gain.x", "compensator.den.1". A pair
+    without axis gets the value on both axes. "operator.mass" adds an arm at the handle.
 
-class Work:
-    """Runs still to be made, and how many of them go to one process at a time.
-
-    Args:
-        sweep: the sweep.
-        todo: the runs, in ranges as by `missing_parts`.
-        least: time of a file, if chunks have no size [s]; later CHUNK_SHARE of the time spent.
+    Attributes:
+        experiment: a name in EXPERIMENTS; not used with a scenario.
+        vary: ranges by name.
+        fixed: values by name, the same in all runs.
+        design: "grid" (all combinations, the last parameter fastest), "lhs" (Latin hypercube) or
+            "sobol".
+        runs: number of runs of "lhs" and "sobol"; None for "grid".
+        seed: seed of both.
+        chunk: runs per file, 1 to 100,000; None for as many as a process makes in 1.5 s, or in 5 %
+            of the time spent so far.
+        scenario: plain data of a scenario file, from `read_settings`; empty for the experiment.
     """
 
-    def __init__(self, sweep: Plan, todo: list[range], least: float):
-        self.sweep, self.free, self.least = sweep, sweep.chunk is None, least
-        self.left, self.count = todo[::-1], sum(map(len, todo))
-        self.begin, self.each = time.perf_counter(), 0.0  # each: time of a run, latest known [s]
+    experiment: str
+    vary: dict[str, Range]
+    fixed: dict[str, Any] = dataclasses.field(default_factory=dict)
+    design: Literal["grid", "lhs", "sobol"] = "grid"
+    runs: Annotated[int | None, Bound(1, MOST_RUNS)] = None
+    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
+    chunk: Annotated[int | None, Bound(1, 100_000)] = None
+    scenario: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self):
+        choice("experiment", self.experiment, tuple(EXPERIMENTS))
+        if not self.vary:
+            raise ParameterError("grid", "", "must vary a parameter, as in b=1:1000:50log")
+        for name in self.vary.keys() & self.fixed.keys():
+            bound = "is varied: leave it out of the fixed ones"
+            raise ParameterError(name, self.fixed[name], bound)
+        if (self.runs is None) != (self.design == "grid"):
+            bound = "must be given for 'lhs' and 'sobol', and for them alone"
+            raise ParameterError("runs", self.runs, bound)
+        for name, r in self.vary.items():
+            if not r.values and (r.n is None) == (self.design == "grid"):
+                bound = "must have no count: runs gives it"
+                if self.runs is None:
+                    bound = "must have a count, as in 1:1000:50log"
+                given = f"{r.low:g}:{r.high:g}{f':{r.n}' if r.n else ''}"
+                raise ParameterError(name, given, f"{bound} ({self.design})")
+        integer("runs", len(self), 1, MOST_RUNS)
+        self.run_scenario(self.points(0, 1)[0])  # raises the errors of the first run
+
+    def __len__(self) -> int:
+        if self.runs is not None:
+            return self.runs
+        return math.prod(r.n or 1 for r in self.vary.values())
+
+    def points(self, first: int, last: int) -> np.ndarray:
+        """Parameters of some runs, shape (last - first, parameters).
+
+        Args:
+            first: number of the first run.
+            last: number of the run after the last.
+        """
+        axes = list(self.vary.values())
+        if self.design == "grid":
+            index = np.unravel_index(np.arange(first, last), [r.n or 1 for r in axes])
+            return np.column_stack([r.grid()[i] for r, i in zip(axes, index, strict=True)])
+        unit = unit_samples(self.design, len(axes), len(self), self.seed)[first:last]
+        return np.column_stack([r.spread(u) for r, u in zip(axes, unit.T, strict=True)])
 
     @property
-    def patience(self) -> float:
-        """Time after which a process writes a file [s]."""
-        if not self.free:
-            return math.inf
-        return max(self.least, CHUNK_SHARE * (time.perf_counter() - self.begin))
+    def title(self) -> str:
+        """Name of the experiment or the scenario."""
+        return str(self.scenario.get("name", "scenario")) if self.scenario else self.experiment
 
-    def take(self, workers: int) -> range | None:
-        """The next runs for one process; None if none are left."""
-        if not self.left:
-            return None
-        runs = self.left.pop()
-        if self.free:
-            # a share of the rest, so that all end together, but no small files towards the end
-            fair = -(-self.count // (AHEAD * workers)) if workers > 1 else self.count
-            least = self.patience / (4.0 * self.each) if self.each else 0.0
-            n = min(MOST_IN_CHUNK, max(fair, int(min(least, MOST_IN_CHUNK))))
-            self._put_back(runs[n:])
-            runs = runs[:n]
-        self.count -= len(runs)
-        return runs
+    def run_scenario(self, point: np.ndarray) -> Scenario:
+        """The scenario of one run.
 
-    def give_back(self, runs: range, made: int, seconds: float) -> None:
-        """Notes what a process has made; the rest of its runs is to be made."""
-        self.each = seconds / made
-        self.count += len(runs) - made
-        self._put_back(runs[made:])
+        Args:
+            point: its parameters, a row of `points`.
 
-    def _put_back(self, runs: range) -> None:
-        if runs:
-            self.left.append(runs)
+        Raises:
+            ParameterError: there is no such parameter, or a value is out of its bounds.
+        """
+        settings = self.scenario or {"experiment": self.experiment}
+        varied = dict(zip(self.vary, point.tolist(), strict=True))
+        return Scenario.of(settings, self.fixed, varied)
+
+    def described(self) -> dict[str, Any]:
+        """The sweep as plain data."""
+        return {"schema": SWEEP_SCHEMA, **dataclasses.asdict(self)}
+
+    def blank_row(self) -> dict[str, Any]:
+        """A row of the data set, for the types of its columns."""
+        return result_row(0, list(self.vary), np.zeros(len(self.vary)), None)
+
+    def rows(self, runs: range, late: Callable[[], bool] = lambda: False) -> list[dict[str, Any]]:
+        """Makes some runs, one row per run.
+
+        Args:
+            runs: numbers of the runs.
+            late: whether to end, called after each run where the sweep has no chunk size.
+        """
+        rows: list[dict[str, Any]] = []
+        for index, point in zip(runs, self.points(runs.start, runs.stop), strict=True):
+            rows.append(run_point(self, index, point))
+            if self.chunk is None and late():
+                break
+        return rows
+
+
+def run_point(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:
+    """Makes one run of a sweep and returns its row."""
+    names = list(sweep.vary)
+    try:
+        return result_row(index, names, point, simulate(sweep.run_scenario(point)))
+    except ParameterError as error:
+        return result_row(index, names, point, None, str(error))
+
+
+def load_sweep(path: Path) -> dict[str, Any]:
+    """Reads the arguments of a Sweep from TOML; dotted names may be written as tables."""
+    try:
+        data = parse_toml(read_text(path, MOST_SETTINGS))
+    except (OSError, ValueError) as error:
+        fault = getattr(error, "strerror", None) or error
+        raise ParameterError("spec", str(path), f"must be a TOML file ({fault})") from None
+    fields = [f.name for f in dataclasses.fields(Sweep)]
+    for name in data:
+        choice("field of the spec", name, fields)
+    for name in ("vary", "fixed"):
+        if not isinstance(data.get(name, {}), dict):
+            raise ParameterError(name, data[name], "must be a table")
+        data[name] = _dotted(with_present_names(data.get(name, {})))
+    if "scenario" in data:
+        if "experiment" in data or not isinstance(data["scenario"], str):
+            bound = "must be the path of a scenario file; remove the experiment"
+            raise ParameterError("scenario", data["scenario"], bound)
+        data["scenario"] = read_settings(path.parent / data["scenario"])
+    data["vary"] = {k: Range.parse(k, v, parameter_unit(k)) for k, v in data["vary"].items()}
+    return {"experiment": "constant", **data}
+
+
+def _dotted(table: Mapping[str, Any], path: str = "") -> dict[str, Any]:
+    """Flattens a nested table to dotted names: a.b = 1 and "a.b" = 1 are equivalent."""
+    out: dict[str, Any] = {}
+    for name, value in table.items():
+        inner = join_names(path, name)
+        out |= _dotted(value, inner) if isinstance(value, dict) else {inner: value}
+    return out
 
 
 @checked
@@ -124,186 +186,46 @@ def run_sweep(
     sweep: Sweep,
     out: str | os.PathLike[str],
     *,
-    workers: int | None = None,
+    workers: Annotated[int | None, Bound(1, 1024)] = None,
     scheduler: str | None = None,
-    progress: Callable[[int], None] | None = None,
+    progress: Callable[[int], object] | None = None,
 ) -> int:
     """Makes the missing runs of a sweep; returns their number.
 
     Args:
         sweep: the sweep.
         out: folder of sweep.json and data/.
-        workers: as in `run_chunks`.
-        scheduler: as in `run_chunks`.
+        workers: processes on this machine; None for one per core.
+        scheduler: address of a dask scheduler to use instead.
         progress: called with the number of runs of each finished file.
 
     Raises:
-        ParameterError: as `claimed` and `run_chunks`.
-        ChildProcessError, ConnectionError, FileNotFoundError: as `run_chunks`.
+        ParameterError: the folder holds another sweep or cannot be written, or a package is
+            missing.
+        ChildProcessError: workers here cannot be started, or one was killed.
+        ConnectionError: the connection to the scheduler is lost.
+        FileNotFoundError: the folder, or a file in it, was removed while the runs were made.
     """
-    done, out = 0, Path(out)
-    with (
-        claimed(sweep, out) as (plan, todo),
-        contextlib.closing(run_chunks(plan, out, todo, workers, scheduler)) as results,
-    ):
-        for n in results:
-            done += n
-            if progress:
-                progress(n)
-    return done
-
-
-def run_chunks(
-    sweep: Plan,
-    out: Path,
-    todo: list[range],
-    workers: int | None = None,
-    scheduler: str | None = None,
-) -> Generator[int, None, None]:
-    """Makes the missing runs of a sweep whose folder is locked; yields the number in each file."""
-    work = Work(sweep, todo, CLUSTER_CHUNK_TIME if scheduler else CHUNK_TIME)
-    if scheduler:
-        yield from _run_on_cluster(work, str(out.resolve()), scheduler)
-    else:
-        yield from _run_here(work, str(out), processes(sweep, todo, workers))
-    check_complete(sweep, out)
-
-
-def processes(sweep: Plan, todo: list[range], workers: int | None) -> int:
-    """Number of processes that make runs on this machine."""
-    tasks = sum(map(len, todo)) if sweep.chunk is None else len(todo)
-    return max(1, min(workers or cores(), tasks))
-
-
-def _run_here(work: Work, out: str, crew: int) -> Generator[int, None, None]:
-    """As `run_chunks`, on this machine."""
-    if crew == 1:
-        while work.left:
-            yield _made_in_turn(work, out)
-    elif work.free and work.left:  # it may be all
-        yield _made_in_turn(work, out)
-    if work.left:
-        yield from _run_in_processes(work, out, crew)
-
-
-def _made_in_turn(work: Work, out: str) -> int:
-    """Makes the next file in this process."""
-    runs = work.take(1)
-    assert runs
-    with _finishing() as ended:
-        made, seconds = run_part(work.sweep, runs, out, work.patience, ended)
-    work.give_back(runs, made, seconds)
-    return made
-
-
-def _run_in_processes(work: Work, out: str, crew: int) -> Generator[int, None, None]:
-    from concurrent.futures import FIRST_COMPLETED, Future, wait
-
-    with started(crew) as submit:
-        jobs: dict[Future[tuple[int, float]], range] = {}
-        try:
-            while True:  # one task per worker: Ctrl-C would wait for queued ones
-                while len(jobs) < crew and (runs := work.take(crew)) is not None:
-                    jobs[submit(_part_of_worker, work.sweep, runs, out, work.patience)] = runs
-                if not jobs:
-                    return
-                for job in wait(jobs, return_when=FIRST_COMPLETED).done:
-                    made, seconds = job.result()
-                    work.give_back(jobs.pop(job), made, seconds)
-                    yield made
-        except (KeyboardInterrupt, GeneratorExit):  # Ctrl-C here or in the consumer of the results
-            print(FINISHING, file=sys.stderr, flush=True)
-            raise
-
-
-def _part_of_worker(sweep: Plan, runs: range, out: str, patience: float) -> tuple[int, float]:
-    return run_part(sweep, runs, out, patience, ended)
-
-
-@contextlib.contextmanager
-def _finishing() -> Iterator[Callable[[], bool]]:
-    """Makes Ctrl-C wait for the runs in progress, with a message; a second one does not wait.
-
-    Yields a function that tells whether there was one.
-    """
-    import signal
-    import threading
-
-    before = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(before):
-        yield lambda: False
-        return
-    caught: list[int] = []
-
-    def note(number: int, frame: Any) -> None:
-        caught.append(number)
-        signal.signal(signal.SIGINT, before)
-        print(FINISHING, file=sys.stderr, flush=True)
-
-    signal.signal(signal.SIGINT, note)
-    try:
-        yield lambda: bool(caught)
-    finally:
-        signal.signal(signal.SIGINT, before)
-    if caught:
-        raise KeyboardInterrupt
-
-
-def _run_on_cluster(work: Work, out: str, address: str) -> Generator[int, None, None]:
-    from concurrent.futures import CancelledError
-
-    try:
-        from distributed import Client, as_completed
-    except ImportError:
-        raise ParameterError(
-            "scheduler", address, "needs dask: pip install 'hapticclay[cluster]'"
-        ) from None
-    try:
-        client = Client(address, timeout=SCHEDULER_PATIENCE, set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise ParameterError(
-            "scheduler", address, f"must be the address of a dask scheduler ({error})"
-        ) from None
-    jobs: dict[Any, range] = {}
-    with _quiet("distributed"), client:
-        results = as_completed(loop=client.loop)
-        try:
-            while True:
-                crew = max(1, sum(client.nthreads().values()))  # workers come and go
-                while len(jobs) < AHEAD * crew and (runs := work.take(crew)) is not None:
-                    given = (work.sweep, runs, out, work.patience)
-                    job = client.submit(run_part, *given, pure=False, retries=10)
-                    jobs[job.key] = runs
-                    results.add(job)
-                if not jobs:
-                    return
-                job = next(results)
-                made, seconds = job.result()
-                work.give_back(jobs.pop(job.key), made, seconds)
-                yield made
-        except CancelledError:
-            raise ConnectionError(
-                f"the dask scheduler {address} has gone; the same command resumes the sweep"
-            ) from None
-
-
-@contextlib.contextmanager
-def _quiet(name: str) -> Iterator[None]:
-    """Silences the log of a package: the errors it logs are raised too and shown once."""
-    logger = logging.getLogger(name)
-    before = logger.level
-    logger.setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    finally:
-        logger.setLevel(before)
+    return store_runs.run_plan(sweep, Path(out), workers, scheduler, progress)
 
 
 def estimate_time(sweep: Sweep) -> tuple[float, float]:
-    """Process time [s] and disk space [bytes] of a run, estimated from a random sample."""
-    probed(sweep, 0.0)  # the first run imports
-    rows, spent = probed(sweep, PROBE_TIME)
+    """Process time [s] and disk space [bytes] of a run, estimated from random runs."""
+    _probe(sweep, 0.0)  # the first run imports
+    rows, spent = _probe(sweep, PROBE_TIME)
     each = spent / len(rows)
     if sweep.chunk is None:
-        sweep = dataclasses.replace(sweep, chunk=chunk_size(each))
-    return each, row_size(sweep, rows)
+        size = min(store_runs.MOST_IN_CHUNK, int(store_runs.CHUNK_TIME / max(each, 1e-6)))
+        sweep = dataclasses.replace(sweep, chunk=max(1, size))
+    return each, store.row_size(sweep, rows)
+
+
+def _probe(sweep: Sweep, patience: float) -> tuple[list[dict[str, Any]], float]:
+    """Rows of random runs, and their total time [s]."""
+    rows, spent, begin = [], 0.0, time.perf_counter()
+    for i in np.random.default_rng(0).integers(0, len(sweep), PROBES).tolist():
+        rows.append(run_point(sweep, i, sweep.points(i, i + 1)[0]))
+        spent = time.perf_counter() - begin
+        if spent > patience:
+            break
+    return rows, spent

@@ -4,25 +4,20 @@ from __future__ import annotations
 
 import math
 import re
-import time
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from ..errors import ParameterError
 from ..model.constants import AXES
 from ..scene.experiments import parameter_unit
 from ..simulation.record import Record
-from ..simulation.simulate import simulate
 from ..theory.pose_limits import PoseLimits
-from .sampling import Sweep
 
 CROSSINGS_KEPT = 3  # crossings that have columns of their own
-CHUNK_TIME = 1.5  # least time of a file in one process [s], if no chunk was given: a kill loses it
-PROBES = 20  # runs used for an estimate ...
-PROBE_TIME = 5.0  # ... or fewer after this time [s]
-NO_INDEX: dict[str, Any] = {"index_columns": [], "column_indexes": [], "columns": []}  # of pandas
-RESULT_COLUMNS = {  # unit, what it is; crossing1 and x stand for their likes
+MEASURED = ("b", "fe_over_v", "speed", "gain_margin")  # columns for each axis
+Notes = Mapping[str, tuple[str, str]]  # unit and description; crossing1 and x stand for their likes
+RESULT_COLUMNS: Notes = {
     "run": ("", "number of the run"),
     "status": ("", "how it ended; refused if a parameter was out of bounds"),
     "axis": ("", "the unstable axis, empty for none"),
@@ -38,46 +33,47 @@ RESULT_COLUMNS = {  # unit, what it is; crossing1 and x stand for their likes
 }
 
 
-def column_told(name: str) -> tuple[str, str]:
-    """Unit and description of a column of the data set, "" if it has none."""
+def column_note(name: str, notes: Notes = RESULT_COLUMNS) -> tuple[str, str]:
+    """Unit and description of a column of the data set, "" for no unit."""
     like = re.sub("_y$", "_x", re.sub(r"^crossing\d$", "crossing1", name))
-    return RESULT_COLUMNS.get(like) or (parameter_unit(name), "parameter of the run")
+    return notes.get(like) or (parameter_unit(name), "parameter of the run")
 
 
 def result_row(
     index: int, names: list[str], point: np.ndarray, r: Record | None, refused: str = ""
 ) -> dict[str, Any]:
     """One row of the data set: parameters, outcome and measurements; NaN for none."""
-    nan = math.nan
-    out: dict[str, Any] = {"run": index, **dict(zip(names, point.tolist(), strict=True))}
-    out |= {
-        "status": r.outcome.code if r else "refused",
-        "axis": r.outcome.axis if r else "",
-        "cause": r.outcome.cause if r else refused,
-        "end_time": r.outcome.time if r else nan,
-    }
-    times = [c.time for c in r.crossings] if r else []
-    out |= {f"crossing{k + 1}": times[k] if k < len(times) else nan for k in range(CROSSINGS_KEPT)}
-    for i, axis in enumerate(AXES):
-        deepest = max(r.regions(axis), key=lambda x: x[axis]["b"], default=None) if r else None
-        entry = deepest[axis] if deepest else {}
-        fe = entry.get("steady_fe_over_v") or {}
-        speed = entry.get("steady_speed")
-        out |= {
-            f"b_{axis}": entry.get("b", nan),
-            f"fe_over_v_{axis}": fe.get("mean", nan),
-            f"speed_{axis}": nan if speed is None else speed,
-        }
-        margin = nan
-        clay = r and r.scenario.clay
-        linear = not clay or clay.viscous
-        if r and linear and r.scenario.gain[i] > 0.0:
-            margin = _least_limit(r, axis, deepest) / r.scenario.gain[i]
-        out[f"gain_margin_{axis}"] = margin
-    through = r.energy.get("throughput", 0.0) if r else 0.0
-    out["energy_residual"] = abs(r.energy["residual"]) / through if r and through else nan
-    out["wall_time"] = r.wall_time if r else nan
-    return out
+    crossings = [f"crossing{k + 1}" for k in range(CROSSINGS_KEPT)]
+    measured = [f"{name}_{axis}" for axis in AXES for name in MEASURED]
+    numbers = ["end_time", *crossings, *measured, "energy_residual", "wall_time"]
+    row = {"run": index, **dict(zip(names, point.tolist(), strict=True))}
+    row |= {"status": "refused", "axis": "", "cause": refused, **dict.fromkeys(numbers, math.nan)}
+    if r is None:
+        return row
+    end = r.outcome
+    row |= {"status": end.code, "axis": end.axis, "cause": end.cause, "end_time": end.time}
+    row |= dict(zip(crossings, (c.time for c in r.crossings), strict=False))
+    for axis in AXES:
+        row |= {f"{name}_{axis}": x for name, x in _in_stiffest_clay(r, axis).items()}
+    if through := r.energy.get("throughput", 0.0):
+        row["energy_residual"] = abs(r.energy["residual"]) / through
+    return row | {"wall_time": r.wall_time}
+
+
+def _in_stiffest_clay(r: Record, axis: str) -> dict[str, float]:
+    """Measurements of one axis, in the stiffest clay that the handle met."""
+    gain, clay = r.scenario.gain[AXES.index(axis)], r.scenario.clay
+    stretch = max(r.regions(axis), key=lambda x: x[axis]["b"], default=None)
+    found = {}
+    if stretch:
+        found["b"] = stretch[axis]["b"]
+        if steady := stretch[axis].get("steady_fe_over_v"):
+            found["fe_over_v"] = steady["mean"]
+        if (speed := stretch[axis].get("steady_speed")) is not None:
+            found["speed"] = speed
+    if gain > 0.0 and (not clay or clay.viscous):
+        found["gain_margin"] = _least_limit(r, axis, stretch) / gain
+    return found
 
 
 def _least_limit(r: Record, axis: str, stretch: dict[str, Any] | None) -> float:
@@ -88,24 +84,3 @@ def _least_limit(r: Record, axis: str, stretch: dict[str, Any] | None) -> float:
     rows = (r.t >= stretch["from_s"]) & (r.t <= stretch["to_s"])
     low, high = r.p[rows].min(axis=0), r.p[rows].max(axis=0)
     return limits.least(i, (low[0], low[1]), (high[0], high[1])).K
-
-
-def run_point(sweep: Sweep, index: int, point: np.ndarray) -> dict[str, Any]:
-    """Makes one run of a sweep and returns its row."""
-    names = list(sweep.vary)
-    try:
-        scenario = sweep.run_scenario(point)
-        return result_row(index, names, point, simulate(scenario))
-    except ParameterError as error:
-        return result_row(index, names, point, None, str(error))
-
-
-def probed(sweep: Sweep, patience: float) -> tuple[list[dict[str, Any]], float]:
-    """Rows of random runs, and their total time [s]."""
-    rows, spent, begin = [], 0.0, time.perf_counter()
-    for i in np.random.default_rng(0).integers(0, len(sweep), PROBES).tolist():
-        rows.append(run_point(sweep, i, sweep.points(i, i + 1)[0]))
-        spent = time.perf_counter() - begin
-        if spent > patience:
-            break
-    return rows, spent

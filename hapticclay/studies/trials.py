@@ -4,37 +4,31 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import hashlib
-import json
 import math
-import multiprocessing
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import field
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from ..arguments import checked
-from ..errors import ParameterError, integer, number
-from ..files import versions
+from ..arguments import part
+from ..errors import Bound, ParameterError, integer
 from ..scene.changes import nested, with_fields
 from ..scene.scenario import Scenario
-from ..scene.virtual_wall import VirtualWall
-from . import wall_runs
-from .boundary import PushedLoop
 from .distribution import Distribution
 from .population import HAND, Hands, hands_of, open_uniform
 from .sampling import MOST_RUNS, Range
+from .store import Plan
+from .sweep_rows import RESULT_COLUMNS, Notes
 from .verdicts import Case, judge
+from .wall import Subject, as_wall
+from .workers import batch_threads
 
 SCHEMA = "hapticclay-trials-2"
-TRIAL_PUSH = 1e-6  # [m/s] so small that the arm stays linear to 1e-6
-SAMPLE_PUSH = 1e-7  # [m] per sample, for a wall: far above rounding and far below the arm's length
 
 
-@checked
-@dataclass(frozen=True)
-class Trials:
+@part()
+class Trials(Plan):
     """Random runs of a loop or of a virtual wall: fixed parts, varying parts and their laws.
 
     A wall must be linear: no surface, friction or encoder. `zwidth` judges other walls, by rest.
@@ -57,14 +51,20 @@ class Trials:
         chunk: runs per stored chunk, the most that a killed process loses.
     """
 
-    base: PushedLoop | VirtualWall
+    notes: ClassVar[Notes] = {
+        "run": RESULT_COLUMNS["run"],
+        "unstable": ("", "1 if the oscillation grows, 0 if not, -1 if the run cannot be made"),
+        "longer": ("", "whether a longer run was made to decide"),
+    }
+
+    base: Subject
     vary: dict[str, Distribution] = field(default_factory=dict)
     hands: str | Hands | None = None
     grid: dict[str, Range] = field(default_factory=dict)
-    runs: int = 1000
-    push: float | None = None
-    seed: int = 0
-    chunk: int = 1000
+    runs: Annotated[int, Bound(1, MOST_RUNS)] = 1000
+    push: Annotated[float | None, Bound(1e-9, 1.0, "m/s")] = None
+    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
+    chunk: Annotated[int, Bound(1, 100_000)] = 1000
 
     def __post_init__(self):
         for name, law in self.vary.items():
@@ -81,12 +81,6 @@ class Trials:
             raise ParameterError("names", self.names, "must each be given once")
         if not self.vary and self.hands is None:
             raise ParameterError("vary", self.vary, "must hold a distribution, or give hands")
-        if self.push is not None:
-            push = number("push", self.push, 1e-9, 1.0, unit="m/s")
-            object.__setattr__(self, "push", push)
-        integer("seed", self.seed, 0, 2**32 - 1)
-        integer("chunk", self.chunk, 1, 100_000)
-        integer("runs", self.runs, 1, MOST_RUNS)
         integer("runs", len(self), 1, MOST_RUNS)
         self.scenario(self.middle(), 0.1)  # refuses an unknown name
 
@@ -103,19 +97,6 @@ class Trials:
         """Names of the parameters of a run: of the grid, the hand, and what varies."""
         hand = tuple(f"operator.{n}" for n in HAND) if self.hands else ()
         return (*self.grid, *hand, *self.vary)
-
-    @property
-    def chunks(self) -> int:
-        """Number of chunks."""
-        return -(-len(self) // self.chunk)
-
-    def chunk_runs(self, number: int) -> range:
-        """The runs of one chunk.
-
-        Args:
-            number: of the chunk, from 0.
-        """
-        return range(number * self.chunk, min((number + 1) * self.chunk, len(self)))
 
     def points(self, number: int) -> np.ndarray:
         """Parameters of the runs of one chunk, shape (runs, names).
@@ -147,7 +128,7 @@ class Trials:
             | {name: law.median for name, law in self.vary.items()}
         )
 
-    def loop(self, values: Mapping[str, float]) -> PushedLoop | VirtualWall:
+    def loop(self, values: Mapping[str, float]) -> Subject:
         """The base with some of its parameters changed.
 
         Args:
@@ -169,32 +150,13 @@ class Trials:
         return self._case(values, t_max).scenario
 
     def _case(self, values: Mapping[str, float], t_max: float) -> Case:
-        """One run, with its loop or wall.
-
-        Args:
-            values: as in `scenario`.
-            t_max: as there.
-
-        Raises:
-            ParameterError: as there.
-        """
+        """One run, with its loop or wall."""
         own, others = self._split(values)
-        if isinstance(self.base, PushedLoop):
-            own["push"] = self.push or TRIAL_PUSH
-        base = with_fields(self.base, own)
-        if isinstance(base, PushedLoop):
-            scenario = base.scenario(t_max, stop_when_unstable=False)
-        else:
-            push = self.push or min(SAMPLE_PUSH / base.Ts, 1.0)
-            scenario = base.scenario(t_max, push=push, steps=wall_runs.growth_steps(base))
+        wall = as_wall(with_fields(self.base, own))
+        scenario = wall.trial(t_max, self.push)
         made = with_fields(scenario, others) if others else scenario
-        if isinstance(base, VirtualWall):
-            hardware = made.hardware
-            rough = hardware and (hardware.encoder or any(hardware.friction))
-            if base.unilateral or rough:
-                bound = "must be a wall without surface, friction and encoder; see hc.walls.zwidth"
-                raise ParameterError("base", base, bound)
-        return Case(base, made, self.axis)
+        wall.check_trial(made)
+        return Case(wall, made)
 
     def _split(self, values: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
         """Parameters of the base, and of the scenario."""
@@ -205,17 +167,12 @@ class Trials:
     @property
     def axis(self) -> str:
         """Axis of the motion."""
-        return self.base.axis if isinstance(self.base, PushedLoop) else "x"
+        return as_wall(self.base).axis
 
     def described(self) -> dict[str, Any]:
         """The trials as plain data."""
         kind = type(self.base).__name__
         return {"schema": SCHEMA, "kind": kind, **dataclasses.asdict(self)}
-
-    def digest(self) -> str:
-        """Fingerprint of the trials and of the release that runs them."""
-        text = json.dumps({**self.described(), "release": versions()["hapticclay"]}, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
 
     def judge(
         self, points: np.ndarray, threads: int | None = None
@@ -236,25 +193,19 @@ class Trials:
                 cases[i] = self._case(dict(zip(self.names, row, strict=True)), 1.0)
         return judge(cases, len(points), self.push is not None, threads)
 
-    # The interface that `sweep` requires of stored runs.
-
     def blank_row(self) -> dict[str, Any]:
         """A row of the data set, for the types of its columns."""
         return {"run": 0, **dict.fromkeys(self.names, 0.0), "unstable": 0, "longer": False}
 
-    def chunk_rows(self, number: int) -> list[dict[str, Any]]:
+    def rows(self, runs: range, late: Callable[[], bool] = lambda: False) -> list[dict[str, Any]]:
         """Makes the runs of a chunk, one row per run.
 
         Args:
-            number: of the chunk, from 0.
+            runs: numbers of the runs.
+            late: not called: a chunk is made whole.
         """
-        points = self.points(number)
-        # A worker is one of several processes, one per core.
-        threads = None if multiprocessing.parent_process() is None else 1
-        unstable, longer = self.judge(points, threads)
-        values = points.tolist()
-        return [
-            {"run": run, **dict(zip(self.names, values[i], strict=True)),
-             "unstable": int(unstable[i]), "longer": bool(longer[i])}
-            for i, run in enumerate(self.chunk_runs(number))
-        ]  # fmt: skip
+        points = self.points(self.part_number(runs))
+        unstable, longer = self.judge(points, batch_threads())
+        judged = zip(runs, points.tolist(), unstable.tolist(), longer.tolist(), strict=True)
+        names = tuple(self.blank_row())
+        return [dict(zip(names, (i, *x, u, more), strict=True)) for i, x, u, more in judged]

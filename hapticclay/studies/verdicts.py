@@ -9,16 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
-from ..scene.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch
 from ..simulation.period_map import PeriodMaps
-from . import boundary, growth, wall_runs
+from . import boundary, growth
+from .wall import Wall
 
 LEAST_OF_MAP = 1e-3  # [1/s] slower growth or decay of a map of a loop is left undecided
 WALL_MAP_TOLD = 1e-3  # so is a smaller relative change over a wall's run: a kick changes 3e-4 of it
@@ -35,14 +35,12 @@ class Case(NamedTuple):
     """A run to judge.
 
     Attributes:
-        base: the PushedLoop or the VirtualWall.
-        scenario: of the run.
-        axis: of the motion.
+        wall: the wall, or the arm in clay.
+        scenario: of the run, in which more than the wall may have been changed.
     """
 
-    base: Any
+    wall: Wall
     scenario: Scenario
-    axis: str
 
 
 Cases = dict[int, Case]  # by index
@@ -73,8 +71,7 @@ def judge(
     if map or run leaves the verdict open. A run that ends early, or saturates the motors after so
     small a push, is unstable.
     """
-    are_walls = any(isinstance(x.base, VirtualWall) for x in cases.values())
-    reading = WALLS if are_walls else ARMS
+    reading = WALLS if any(x.wall.read_by_samples for x in cases.values()) else ARMS
     rate = {} if pushed else mapped_rates(cases, reading)
     if left := {i: x for i, x in cases.items() if i not in rate}:
         rate |= reading.short(left, threads)
@@ -90,7 +87,7 @@ def mapped_rates(cases: Cases, reading: Reading) -> Rates:
     """Growth rates of those cases that have a map."""
     maps, rate = PeriodMaps(), {}
     for i, case in cases.items():
-        m = maps.of(case.scenario, AXES.index(case.axis))
+        m = maps.of(case.scenario, AXES.index(case.wall.axis))
         if m is not None:
             slowest, least = reading.scale(case)
             found = growth.growth_of_map(m, slowest)
@@ -130,7 +127,7 @@ def _short_arms(cases: list[Case], every: int, threads: int | None) -> list[floa
     records = simulate_batch(jobs, threads=threads, every=every)
     for k, (case, record) in enumerate(zip(cases, records, strict=True)):
         if len(record.v) > n:  # else it ended before its time
-            v[k] = record.v[1 : n + 1, AXES.index(case.axis)]
+            v[k] = record.v[1 : n + 1, AXES.index(case.wall.axis)]
     whole, dt = np.isfinite(v).all(axis=1), np.array([job.dt for job in jobs])
     for step in np.unique(dt[whole]).tolist():
         at = whole & (dt == step)
@@ -144,7 +141,7 @@ def long_arms(cases: Cases, threads: int | None) -> Rates:
     jobs = [lasting(s, max(boundary.GROWTH_SPAN / s.dt, SPAN_STEPS)) for s in made]
     records = simulate_batch(jobs, threads=threads)
     return {
-        i: math.inf if x.outcome.code in ENDED else growth.growth_rate(x, case.axis)
+        i: math.inf if x.outcome.code in ENDED else growth.growth_rate(x, case.wall.axis)
         for (i, case), x in zip(cases.items(), records, strict=True)
     }
 
@@ -154,31 +151,31 @@ def long_arms(cases: Cases, threads: int | None) -> Rates:
 
 def wall_scale(case: Case) -> tuple[float, float]:
     """Reading.scale of a wall."""
-    n, _, slowest = wall_runs.growth_reading(case.base)
-    return slowest, WALL_MAP_TOLD / (n * case.base.Ts)
+    n, _, slowest = case.wall.growth_reading()
+    return slowest, WALL_MAP_TOLD / (n * case.wall.Ts)
 
 
 def short_walls(cases: Cases, threads: int | None) -> Rates:
     """Growth rates of walls from a run each."""
     rate, span = long_walls(cases, threads, WALL_SPANS[0]), {}
     for i, x in cases.items():
-        n, *_ = wall_runs.growth_reading(x.base, WALL_SPANS[0])
-        span[i] = n * x.base.Ts
+        n, *_ = x.wall.growth_reading(WALL_SPANS[0])
+        span[i] = n * x.wall.Ts
     return {i: x if abs(x) * span[i] >= WALL_TOLD else math.nan for i, x in rate.items()}
 
 
 def long_walls(cases: Cases, threads: int | None, span: float = WALL_SPANS[1]) -> Rates:
     """Growth rates of walls from longer runs."""
     # Those with as many steps a sample run together: their records keep one step of so many.
-    steps = {i: round(x.base.Ts / x.scenario.dt) for i, x in cases.items()}
+    steps = {i: round(x.wall.Ts / x.scenario.dt) for i, x in cases.items()}
     rate = {}
     for every in sorted(set(steps.values())):
         members = [i for i in cases if steps[i] == every]
         for first in range(0, len(members), WALL_BATCH):
             some = [(i, cases[i]) for i in members[first : first + WALL_BATCH]]
-            read = [wall_runs.growth_reading(x.base, span) for _, x in some]
+            read = [x.wall.growth_reading(span) for _, x in some]
             jobs = [
-                replace(x.scenario, t_max=n * x.base.Ts)
+                replace(x.scenario, t_max=n * x.wall.Ts)
                 for (_, x), (n, *_) in zip(some, read, strict=True)
             ]
             records = simulate_batch(jobs, threads=threads, every=every)

@@ -6,7 +6,7 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,17 +15,16 @@ from ..display import brief
 from ..model.constants import TS
 from ..model.operator import Operator
 from ..scene.virtual_wall import VirtualWall
-from ..theory import gain_crossings, gain_limits, wall_limits
-from ..theory.hand_boxes import Box
+from ..theory import wall_limits
+from ..theory.hand_boxes import Box, lattice
 from ..theory.roots import bisect
-from . import boundary
+
+if TYPE_CHECKING:
+    from .wall import Wall
 
 LIMIT_POINTS = 61  # of a line of theory
 SOFTEST = 0.03  # first K of the search over that of the linear loop at B = 0, and
 SOFT_BOUNDS = (1e-4, 1e-3)  # its bounds over the largest K of the linear loop
-
-# on a bare device, or clay of k and b on this arm
-Wall = VirtualWall | boundary.PushedLoop
 
 
 @named
@@ -60,29 +59,12 @@ class Limit:
         return float(np.interp(B, self.B, self.K, math.nan, math.nan))
 
 
-def wall_at(wall: Wall, K: float, B: float) -> Wall:
-    """The wall with the given K and B."""
-    if isinstance(wall, VirtualWall):
-        return replace(wall, K=K, B=B)
-    return replace(wall, k=K, b=B)
-
-
-def is_linear(wall: Wall) -> bool:
-    """Whether the loop of a wall is linear: no friction, no encoder, no surface."""
-    if isinstance(wall, boundary.PushedLoop):
-        return True
-    return not (wall.unilateral or wall.device.friction or wall.device.quantum)
-
-
 def theoretical_damping(wall: Wall) -> float:
     """Largest B of the linear loop that is stable at K = 0 [N.s/m]; 0 for none."""
-    unit = moving_mass(wall) / sample_time(wall)
+    unit = wall.mass / (wall.Ts or TS)
 
     def stable(B: float) -> bool:
-        tried = wall_at(wall, 0.0, B)
-        if isinstance(tried, VirtualWall):
-            return wall_limits.stable_wall(tried)
-        return gain_crossings.is_stable(tried.linear)
+        return wall.at(0.0, B).stable()
 
     grid = np.geomspace(1e-5 * unit, 1e3 * unit, 120).tolist()
     low = next((i for i, B in enumerate(grid) if stable(B)), None)
@@ -94,79 +76,61 @@ def theoretical_damping(wall: Wall) -> float:
 
 def worst_hand(wall: Wall, box: Box) -> Operator:
     """The hand with the least stable K among those at ends and middles of a box."""
-    sides = [
-        sorted({low, 0.5 * (low + high), high}) for low, high in (box.mass, box.damper, box.spring)
-    ]
-    hands = [Operator(m, d, k) for m in sides[0] for d in sides[1] for k in sides[2]]
-    return min(hands, key=lambda hand: exact_limit(replace(wall, operator=hand)))
+    return min(lattice(box), key=lambda hand: exact_limit(wall.changed(operator=hand)))
 
 
 @functools.lru_cache(maxsize=2048)  # used as a line, as a guess, and for comparison with the runs
 def exact_limit(wall: Wall) -> float:
     """Largest stable K of the linear loop [N/m]."""
-    if isinstance(wall, VirtualWall):
-        return wall_limits.stiffness_band(wall)[1]
-    return gain_limits.stiffness_limit(wall.linear)
+    return wall.limit()
 
 
 def softest(wall: Wall, top: float) -> float:
     """Least K at which a wall is tested [N/m]."""
-    first, scale = (exact_limit(wall_at(wall, 0.0, share * top)) for share in (0.0, 0.5))
-    scale = max(first, scale) or wall.hand.spring + moving_mass(wall) / sample_time(wall) ** 2
+    first, scale = (exact_limit(wall.at(0.0, share * top)) for share in (0.0, 0.5))
+    scale = max(first, scale) or wall.hand.spring + wall.mass / (wall.Ts or TS) ** 2
     return min(max(SOFTEST * first, SOFT_BOUNDS[0] * scale), SOFT_BOUNDS[1] * scale)
-
-
-def moving_mass(wall: Wall) -> float:
-    """Mass of device and hand [kg]."""
-    if isinstance(wall, VirtualWall):
-        return wall.device.mass + wall.hand.mass
-    return 1.0 / wall.servo.S.gain + wall.hand.mass
-
-
-def sample_time(wall: Wall) -> float:
-    """Sampling period [s]; that of the paper if the wall has none."""
-    return wall.Ts or TS
 
 
 def theory_limits(wall: Wall, top: float, grid: Sequence[float]) -> list[Limit]:
     """Lines of theory, from the least B up to top."""
-    first = next((B for B in grid if B > 0.0), 1.0)
-    fine = [*np.linspace(min(grid[0], 0.0), first, 5)[:-1]]
-    if top > first:
-        fine += [*np.geomspace(first, top, LIMIT_POINTS), *np.linspace(0.5 * top, top, 17)]
-    if isinstance(wall, boundary.PushedLoop):  # their limit requires a scan
-        fine = []
-    B = np.unique([*fine, *grid]).tolist()
-    parts: list[Limit] = []
+    B = list(grid)
+    if not wall.costly:
+        first = next((x for x in grid if x > 0.0), 1.0)
+        B += np.linspace(min(grid[0], 0.0), first, 5)[:-1].tolist()
+        if top > first:
+            B += [*np.geomspace(first, top, LIMIT_POINTS), *np.linspace(0.5 * top, top, 17)]
+    B, note = np.unique(B).tolist(), wall.exact_note
+    if wall.left_out:
+        note = f"of the linear loop: {' and '.join(wall.left_out)} left out"
+    K = tuple(exact_limit(wall.at(0.0, x)) for x in B)
+    exact = Limit("exact, linear loop", "exact", tuple(B), K, note)
+    return [x for x in (exact, *wall.published(B)) if any(y > 0.0 for y in x.K)]
 
-    def line(
-        name: str, kind: str, law: Callable[[Any], float], note: str, places: Sequence[float] = B
+
+def published_limits(wall: VirtualWall, B: Sequence[float]) -> list[Limit]:
+    """Published lines of a bare device over B."""
+    quantum, out = bool(wall.device.quantum), []
+
+    def add(
+        name: str, kind: str, law: Callable[[VirtualWall], float], note: str, B: Sequence[float] = B
     ) -> None:
-        K = [law(wall_at(wall, 0.0, x)) for x in places]
-        if any(x > 0.0 for x in K):
-            parts.append(Limit(name, kind, tuple(places), tuple(K), note))
+        K = tuple(law(replace(wall, K=0.0, B=x)) for x in B)
+        out.append(Limit(name, kind, tuple(B), K, note))
 
-    if isinstance(wall, boundary.PushedLoop):
-        line("exact, linear loop", "exact", exact_limit, "sampled loop at the nominal pose")
-        return parts
-    left_out = [n for n in ("friction", "quantum") if getattr(wall.device, n)]
-    left_out += ["surface"] if wall.unilateral else []
-    note = f"of the linear loop: {' and '.join(left_out)} left out" if left_out else "eigenvalues"
-    line("exact, linear loop", "exact", exact_limit, note)
-    line(
+    add(
         "Colgate, Schenkel 1997",
-        "rule" if wall.device.quantum else "sufficient",
+        "rule" if quantum else "sufficient",
         wall_limits.colgate_schenkel_limit,
-        "passive: stable in every passive hand"
-        + (", but for the quantum" * bool(wall.device.quantum)),
+        "passive: stable in every passive hand" + ", but for the quantum" * quantum,
         np.unique([*B, *np.linspace(0.0, min(wall.device.damper, B[-1]), LIMIT_POINTS)]).tolist(),
     )
     if wall.velocity == "difference" and wall.velocity_window == 1 and wall.velocity_filter is None:
         note = "linear rule, for (b + B) Ts and K Ts^2 far below the mass"
-        line("Hulin et al. 2006", "rule", wall_limits.hulin_limit, note)
+        add("Hulin et al. 2006", "rule", wall_limits.hulin_limit, note)
     if wall.delay == 0.0 and wall.M == 0.0:
-        K = wall_limits.abbott_okamura_limit(wall)
-        if 0.0 < K < math.inf:
-            note = "passive, for B = 0: friction outweighs the encoder"
-            parts.append(Limit("Abbott, Okamura 2005", "sufficient", (0.0,), (K,), note))
-    return parts
+        K = wall_limits.abbott_okamura_limit(replace(wall, B=0.0))
+        note = "passive, for B = 0: friction outweighs the encoder"
+        if K < math.inf:
+            out.append(Limit("Abbott, Okamura 2005", "sufficient", (0.0,), (K,), note))
+    return out

@@ -127,6 +127,13 @@ def leave_if_imported() -> None:
         raise SystemExit(UNGUARDED)
 
 
+def batch_threads() -> int | None:
+    """Threads of a batch in this process: one in a worker, beside others; None for all cores."""
+    import multiprocessing
+
+    return None if multiprocessing.parent_process() is None else 1
+
+
 def ended() -> bool:
     """Whether this worker shall take no further run."""
     return _end is not None and _end.is_set()

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..arguments import checked, named
 from ..display import brief
-from ..errors import integer, number
+from ..errors import Bound
+from ..fields import Seed
 from ..model.constants import AXES, L1, L2
 from .identification import (
     COEFFICIENT_NAMES,
@@ -115,9 +116,12 @@ def poses(spacing: float) -> tuple[np.ndarray, np.ndarray]:
     return x[inside], y[inside]
 
 
+Spacing = Annotated[float, Bound(0.01, 0.3, "m")]
+
+
 @checked
 def drift_map(
-    spacing: float = 0.08, *, seed: int = 0, progress: Callable[[int, int], None] | None = None
+    spacing: Spacing = 0.08, *, seed: Seed = 0, progress: Callable[[int, int], None] | None = None
 ) -> Drift:
     """Identify G and Sh on both axes over the workspace, without and with inertia shaping.
 
@@ -131,8 +135,6 @@ def drift_map(
     Raises:
         ParameterError: a value is out of its bounds.
     """
-    spacing = number("spacing", spacing, 0.01, 0.3, unit="m")
-    seed = integer("seed", seed, 0, 2**32 - 1)
     x, y = poses(spacing)
     out = np.empty((len(x), 2, 2, 2, 3))
     for m, at in enumerate(zip(x.tolist(), y.tolist(), strict=True)):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
 
@@ -16,41 +16,22 @@ import numpy as np
 from ..arguments import checked, named
 from ..display import brief
 from ..errors import ParameterError, choice, number
-from ..model.constants import AXES
 from ..results import Result
 from ..scene.changes import with_fields
 from ..scene.scenario import Scenario
-from ..scene.virtual_wall import VirtualWall
 from ..theory.hand_boxes import Box
 from . import boundary
+from .wall import Subject, Wall, as_wall
 from .wall_lines import (
     Limit,
-    Wall,
     exact_limit,
-    is_linear,
     softest,
     theoretical_damping,
     theory_limits,
-    wall_at,
     worst_hand,
 )
 from .wall_runs import PRESS, Press, Share, most_damping, stiffest, unshown
 
-VARIED_DEVICE = {  # parameters of a family: field, unit, factor of the unit in labels
-    "Ts": ("Ts", "ms", 1e3),
-    "delay": ("delay", "ms", 1e3),
-    "quantum": ("device.quantum", "um", 1e6),
-    "damper": ("device.damper", "N.s/m", 1.0),
-    "friction": ("device.friction", "N", 1.0),
-    "mass": ("device.mass", "kg", 1.0),
-    "filter": ("velocity_filter", "Hz", 1.0),
-    "velocity_window": ("velocity_window", "samples", 1.0),
-}
-VARIED_ARM = {
-    "Ts": VARIED_DEVICE["Ts"],
-    "delay": VARIED_DEVICE["delay"],
-    "gain": ("K", "1/kg", 1.0),
-}
 LETTERS = {
     "gain": "Kc",
     "damper": "b",
@@ -92,7 +73,7 @@ class ZRegion:
         return brief(self)
 
     name: str
-    wall: Wall
+    wall: Subject
     verdict: str
     B: tuple[float, ...]
     K: tuple[float, ...]
@@ -237,7 +218,7 @@ class ZWidth(Result):
 
 @checked
 def zwidth(
-    wall: Wall | Scenario,
+    wall: Subject | Scenario,
     vary: str = "",
     values: Iterable[Any] = (),
     *,
@@ -273,13 +254,13 @@ def zwidth(
         ParameterError: wall is not a wall, an unknown name, a value out of its bounds, no values,
             or an arm in continuous time.
     """
-    wall = boundary.of_scenario(wall, AXES[0])
-    if isinstance(wall, boundary.PushedLoop) and not wall.Ts:
+    device = as_wall(wall)
+    if not device.Ts:
         raise ParameterError("Ts", None, "is needed: the walls are rendered at samples")
     if box is not None and not isinstance(box, Box):
         raise ParameterError("box", box, "must be a Box")
     some = None if B is None else _dampings(B)
-    family = _family_walls(wall, vary, tuple(values))
+    family = _family_walls(device, vary, tuple(values))
     regions = []
     for i, (name, each) in enumerate(family):
 
@@ -303,12 +284,11 @@ def _family_walls(wall: Wall, vary: str, values: tuple[Any, ...]) -> list[tuple[
         if values:
             raise ParameterError("values", values, "must be given with the name that they vary")
         return [("", wall)]
-    varied = VARIED_DEVICE if isinstance(wall, VirtualWall) else VARIED_ARM
-    field, unit, factor = varied[choice("vary", vary, tuple(varied))]
+    field, unit, factor = wall.varied[choice("vary", vary, tuple(wall.varied))]
     if not values:
         raise ParameterError("values", values, f"must contain at least one value of {vary}")
-    walls = [with_fields(wall, {field: x}) for x in values]
-    return [(_value_name(vary, attrgetter(field)(w), unit, factor), w) for w in walls]
+    subjects = [with_fields(wall.subject, {field: x}) for x in values]
+    return [(_value_name(vary, attrgetter(field)(x), unit, factor), as_wall(x)) for x in subjects]
 
 
 def _value_name(vary: str, value: float | None, unit: str, factor: float) -> str:
@@ -326,8 +306,8 @@ def _region(
     quick: bool,
     show: Share,
 ) -> ZRegion:
-    wall = wall_at(wall, 0.0, 0.0)
-    linear = is_linear(wall)
+    wall = wall.at(0.0, 0.0)
+    linear = wall.linear
     top = theoretical_damping(wall)
     soft = softest(wall, top)
     most_B = math.nan
@@ -335,7 +315,7 @@ def _region(
         most_B = most_damping(wall, top, 0.0 if linear else soft, press)
         top = top if linear or math.isinf(most_B) else min(top, most_B)
     grid = _grid(wall, top, QUICK_POINTS if quick else POINTS) if B is None else B
-    walls = [wall_at(wall, 0.0, x) for x in grid]
+    walls = [wall.at(0.0, x) for x in grid]
     exact = [exact_limit(w) for w in walls]
     limits = theory_limits(wall, max(grid[-1], top if B is None else 0.0), grid)
     half = 1.0 if box is None else 0.5
@@ -347,7 +327,7 @@ def _region(
     box_K: list[float] = []
     box_exact: list[float] = []
     if box:
-        held = [replace(w, operator=worst_hand(w, box)) for w in walls]
+        held = [w.changed(operator=worst_hand(w, box)) for w in walls]
         box_exact = [exact_limit(w) for w in held]
         box_K = find(held, box_exact, half)
         note = "worst hand of the box, linear loop"
@@ -355,14 +335,13 @@ def _region(
     show(1.0)
     verdict, given = BY_GROWTH if linear else BY_REST, (tuple(grid), tuple(K), tuple(exact))
     boxed = (box, tuple(box_K), tuple(box_exact))
-    return ZRegion(name, wall, verdict, *given, most_B, tuple(limits), *boxed)
+    return ZRegion(name, wall.subject, verdict, *given, most_B, tuple(limits), *boxed)
 
 
 def _grid(wall: Wall, top: float, points: int) -> tuple[float, ...]:
     """0, then evenly spaced in log B up to half of the largest B, then where the boundary falls."""
     if top == 0.0:
         return (0.0,)
-    b = wall.hand.damper + (wall.device.damper if isinstance(wall, VirtualWall) else 0.0)
-    first = min(max(0.5 * b, 1e-3 * top), 0.1 * top)
+    first = min(max(0.5 * wall.damper, 1e-3 * top), 0.1 * top)
     rising = np.geomspace(first, 0.5 * top, points - 1 - len(TOP_SHARES)).tolist()
     return (0.0, *rising, *(share * top for share in TOP_SHARES))

@@ -1,5 +1,8 @@
 # What is known of a loop without a run: public names, and the modules they come from.
 
+from .controller_loop import ControllerStability as ControllerStability
+from .controller_loop import LinearLaw as LinearLaw
+from .controller_loop import controller_stability as controller_stability
 from .describing import LimitCycle as LimitCycle
 from .describing import describing_function as describing_function
 from .describing import limit_cycles as limit_cycles

@@ -12,14 +12,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..arguments import named
-from ..errors import (
-    ParameterError,
-    field_types,
-    flag,
-    integer,
-    number,
-    numbers_of,
-)
+from ..errors import ParameterError, flag, integer, number, numbers_of
+from ..fields import nodes_of
 from ..model.operator import Operator
 from . import exact_roots, gain_crossings, linear_loop, roots
 from .exact_roots import axis_parts, rational, value
@@ -48,8 +42,8 @@ class Box:
     rigid: bool = False
 
     def __post_init__(self):
-        for field, (_, bound) in field_types(Operator).items():
-            unit = bound.unit if bound else ""
+        for field, node in nodes_of(Operator).items():
+            unit = node.bound.unit
             given = getattr(self, field)
             low, high = numbers_of(f"box.{field}", given, ("low", "high"), 0.0, unit=unit)
             if high < low:
@@ -73,6 +67,13 @@ class Box:
         x = np.random.default_rng(seed).uniform(size=(n, 3))
         low, high = np.array([self.mass, self.damper, self.spring]).T
         return [Operator(*row) for row in (low + x * (high - low)).tolist()]
+
+
+def lattice(box: Box) -> list[Operator]:
+    """The hands at ends and middles of a box, up to 27."""
+    sides = box.mass, box.damper, box.spring
+    places = (sorted({low, 0.5 * (low + high), high}) for low, high in sides)
+    return [Operator(*hand) for hand in itertools.product(*places)]
 
 
 @named

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..arguments import named
-from ..errors import Bound, ParameterError, check_fields, choice, number
+from ..errors import Bound, ParameterError, choice, number
+from ..fields import check_fields
 from ..formulas.constants import B_MAX
 from ..model import controller
 from ..model.compensator import PRINTED, Compensator

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..arguments import checked, known_names, named
 from ..errors import ParameterError, choice
+from ..model.clay import Clay
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
 from . import roots
@@ -63,7 +64,7 @@ class Loop(LinearLoop):
         if not isinstance(scenario, Scenario):
             raise ParameterError("scenario", scenario, "must be a Scenario")
         if scenario.controller is not None:
-            bound = "must be None: the analysis is of compensator and servo, not of a law"
+            bound = "must be None: see hc.theory.controller_stability for a controller of your own"
             raise ParameterError("controller", scenario.controller, bound)
         i, clay = AXES.index(choice("axis", axis, AXES)), scenario.clay
         servo, bare = scenario.servo[i], scenario.arm.nominal_mobility[i]
@@ -88,11 +89,17 @@ class Loop(LinearLoop):
         def limit(x: Loop) -> float:
             return critical_gain(x)[0]
 
-        laws = () if clay is None else clay.laws_on(i)
-        dampings = np.unique(np.concatenate([law.damping.ravel() for law in laws] or [[]]))
-        if len(dampings) > MOST_DAMPINGS:
-            dampings = dampings[np.linspace(0, len(dampings) - 1, MOST_DAMPINGS).astype(int)]
-        return min((replace(loop, b=x) for x in dampings.tolist()), key=limit, default=loop)
+        dampings = dampings_of(clay, (i,))
+        return min((replace(loop, b=x) for x in dampings), key=limit, default=loop)
+
+
+def dampings_of(clay: Clay | None, axes: Sequence[int]) -> list[float]:
+    """The dampings of clay on some axes [N.s/m], at most MOST_DAMPINGS."""
+    laws = [] if clay is None else [law for i in axes for law in clay.laws_on(i)]
+    found = np.unique(np.concatenate([law.damping.ravel() for law in laws] or [[]]))
+    if len(found) > MOST_DAMPINGS:
+        found = found[np.linspace(0, len(found) - 1, MOST_DAMPINGS).astype(int)]
+    return found.tolist()
 
 
 PARTS = tuple(f.name for f in fields(Loop))

@@ -20,7 +20,7 @@ from ..errors import ParameterError, array_of, integer, number
 from ..model.operator import Operator
 from ..scene.virtual_wall import Device, VirtualWall
 from . import gain_crossings, linear_loop, roots
-from .hand_boxes import Box
+from .hand_boxes import Box, lattice
 
 MOST_STATES = 600  # largest order of a map whose eigenvalues are computed
 SLOWEST_TURN = 1e-7  # [rad] least omega Ts at which the passivity condition is evaluated
@@ -230,35 +230,29 @@ def hand_box_limit(wall: VirtualWall, box: Box) -> float:
     """
     from scipy.optimize import minimize_scalar
 
-    sides = [box.mass, box.damper, box.spring]
-    known: dict[tuple[float, ...], tuple[float, float]] = {}
+    known: dict[Operator, tuple[float, float]] = {}
 
-    def band(hand: tuple[float, ...]) -> tuple[float, float]:
+    def high(hand: Operator) -> float:
         if hand not in known:
-            known[hand] = stiffness_band(replace(wall, operator=Operator(*hand)))
-        return known[hand]
+            known[hand] = stiffness_band(replace(wall, operator=hand))
+        return known[hand][1]
 
-    ends = [sorted({low, 0.5 * (low + high), high}) for low, high in sides]
-    worst = min(
-        ((m, d, k) for m in ends[0] for d in ends[1] for k in ends[2]), key=lambda x: band(x)[1]
-    )
+    worst = min(lattice(box), key=high)
     for _ in range(REFINED):
         before = worst
-        for i, (low, high) in enumerate(sides):
-            if low == high:
+        for side in ("mass", "damper", "spring"):
+            bounds = getattr(box, side)
+            if bounds[0] == bounds[1]:
                 continue
 
-            def along(x: float, i=i, hand=worst) -> float:
-                return band((*hand[:i], float(x), *hand[i + 1 :]))[1]
+            def along(x: float, side=side, hand=worst) -> float:
+                return high(replace(hand, **{side: float(x)}))
 
-            found: Any = minimize_scalar(along, bounds=(low, high), method="bounded")
-            worst = min(
-                worst, (*worst[:i], float(found.x), *worst[i + 1 :]), key=lambda x: band(x)[1]
-            )
+            found: Any = minimize_scalar(along, bounds=bounds, method="bounded")
+            worst = min(worst, replace(worst, **{side: float(found.x)}), key=high)
         if worst == before:
             break
-    high = band(worst)[1]
-    return high if all(low < high for low, _ in known.values()) else 0.0
+    return high(worst) if all(low < top for low, top in known.values()) else 0.0
 
 
 # ---- passivity -----------------------------------------------------------------------------------

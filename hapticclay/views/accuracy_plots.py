@@ -8,20 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..studies.accuracy_ladder import CLEAR, SAMPLED, Ladder
-from .style import (
-    BLACK,
-    BLUE,
-    GREY,
-    PALE_GREY,
-    VERMILION,
-    add_legend,
-    figure_size,
-    figure_style,
-    panel_grid,
-    points,
-    set_title,
-    stroke,
-)
+from .palette import BLACK, BLUE, GREY, PALE_GREY, VERMILION
+from .panels import add_legend, mark, ring, set_title, side_by_side
+from .style import figure_style, points, stroke
 
 SERIES_LOOKS: dict[str, Any] = {  # curve, and where its steps are written
     "fast": (dict(color=BLUE, marker="o", ls="-"), dict(xytext=(7, 5), ha="left")),
@@ -31,6 +20,7 @@ SERIES_LOOKS: dict[str, Any] = {  # curve, and where its steps are written
 ERROR_AXES = {"s": "error of the border times [s]", "m": "error of the position [m]"}
 
 
+@figure_style()
 def accuracy_plot(ladder: Ladder) -> Figure:
     """Plots error against run time: one panel per unit, one curve per method, one mark per step.
 
@@ -38,17 +28,15 @@ def accuracy_plot(ladder: Ladder) -> Figure:
     that of a setting.
     """
     units = ladder.units()
-    with figure_style():
-        count = max(len(units), 1)
-        rows, columns = panel_grid(count)
-        figure = Figure(figsize=figure_size(count, 4.6 * rows, 4.4 * count + 0.6))
-        axes = figure.subplots(rows, columns, squeeze=False).ravel()
-        for ax, unit in zip(axes, units, strict=False):
-            _accuracy_panel(ax, ladder, unit)
-        if units:
-            add_legend(figure, axes[-1], 5 if len(units) > 1 else 2)
-        parts = [ladder.scenario.name, f"{ladder.simulated:.4g} s simulated"]
-        set_title(axes[0], *parts, f"engine {ladder.engine}", "steps written beside the marks")
+    count = max(len(units), 1)
+    figure, axes = side_by_side(count, 4.6, 4.4 * count + 0.6)
+    for ax, unit in zip(axes, units, strict=False):
+        _accuracy_panel(ax, ladder, unit)
+    if units:
+        add_legend(figure, 5 if len(units) > 1 else 2)
+    simulated = f"{ladder.simulated:.4g} s simulated"
+    engine, steps = f"engine {ladder.engine}", "steps written beside the marks"
+    set_title(axes[0], ladder.scenario.name, simulated, engine, steps)
     return figure
 
 
@@ -56,23 +44,17 @@ def _accuracy_panel(ax: Axes, ladder: Ladder, unit: str) -> None:
     ax.set(xscale="log", yscale="log", xlabel="run time [s]", ylabel=ERROR_AXES[unit])
     marks = [(x, e) for x in ladder.settings if (e := ladder.shown(x, unit)) and x.wall]
     for name, (look, side) in SERIES_LOOKS.items():
-        mine = [(x.wall, e, x.dt) for x, e in marks if x.series == name]
-        if not mine:
+        series = [(x.wall, e, x.dt) for x, e in marks if x.series == name]
+        if not series:
             continue
-        walls, errors, steps = zip(*mine, strict=True)
+        walls, errors, steps = zip(*series, strict=True)
         ax.plot(walls, errors, ms=stroke(5), lw=stroke(1.4), label=name, zorder=3, **look)
-        for i in sorted({0, len(mine) - 1}):
-            at: Any = (walls[i], errors[i])
-            told: Any = dict(
-                side, textcoords="offset points", fontsize=points(8), color=look["color"]
-            )
-            ax.annotate(_step(steps[i]), at, **told)
-    best = [(x.wall, e) for x, e in marks if x in ladder.cheapest(unit).values()]
-    if best:
-        ring: Any = dict(
-            ls="none", marker="o", mfc="none", color=BLACK, ms=stroke(11), mew=stroke(1.2), zorder=4
-        )
-        ax.plot(*zip(*best, strict=True), label="cheapest for an error", **ring)
+        for i in {0, len(series) - 1}:
+            text: Any = dict(fontsize=points(8), color=look["color"], textcoords="offset points")
+            ax.annotate(_step(steps[i]), (walls[i], errors[i]), **text, **side)
+    cheapest = ladder.cheapest(unit).values()
+    best = [(x.wall, e) for x, e in marks if x in cheapest]
+    mark(ax, best, label="cheapest for an error", **ring(BLACK, 11.0))
     ax.margins(x=0.15, y=0.1)
     (first, last), (low, high) = ax.get_xlim(), ax.get_ylim()
     ax.set_xlim(first, 2.5 * last)  # space for the label of the last step

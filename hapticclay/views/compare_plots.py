@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -12,190 +12,161 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..model.constants import AXES
-from ..scene.virtual_wall import VirtualWall
 from ..studies.comparison import Compared, Comparison
 from ..theory import stability_margins, wall_limits
 from ..theory.gain_limits import gain_limit
 from ..theory.loops import TIMING
 from . import figure as shown
-from .style import (
-    BLACK,
-    CURVE_STYLES,
-    WHITE,
-    add_legend,
-    figure_size,
-    figure_style,
-    plain_ticks,
-    stroke,
-    unit_text,
-)
+from .impedance_plots import parts_panels
+from .panels import add_legend, curve_look, hollow, label_axes, level, plain_ticks, positive, single
+from .style import figure_style
 from .wall_plots import regions_plot
 
 CLAY_DAMPINGS = np.geomspace(1.0, 3000.0, 61)  # of the line of gain limits [N.s/m]
+FREQUENCY = "frequency [Hz]"
 BAND = 2.0 * math.pi * np.geomspace(0.1, 100.0, 400)  # [rad/s]
 
 
 def compare_figures(found: Comparison) -> dict[str, tuple[str, shown.Figure]]:
     """Returns the figures of a comparison by name, each with a title."""
-    if isinstance(found[0].subject, VirtualWall):
-        plots: dict[str, tuple[str, Callable[[Comparison], Figure]]] = {
-            "zwidth": ("Walls that are stable, by runs and exact", wall_region_plot),
-            "passivity": ("Damping to spare over frequency", spare_plot),
-            "impedance": ("Impedance that the hand feels", impedance_overlay),
-            "parts": ("Effective stiffness, damping and mass", parts_overlay),
-            "push": (f"After a push of {1e3 * 0.01:g} mm/s", push_plot),
-        }
+    plots: dict[str, tuple[str, Callable[[Comparison], Figure]]] = {
+        "passivity": ("Damping to spare over frequency", spare_plot),
+        "impedance": ("Impedance that the hand feels", impedance_overlay),
+        "parts": ("Effective stiffness, damping and mass", parts_overlay),
+    }
+    if found[0].loop is None:
+        first = {"zwidth": ("Walls that are stable, by runs and exact", wall_region_plot)}
+        last = {"push": (f"After a push of {1e3 * 0.01:g} mm/s", push_plot)}
     else:
-        plots = {
+        first = {
             "velocity": ("Velocity over position", velocity_overlay),
             "stability": ("Gain limit over the damping of the clay", gain_overlay),
-            "passivity": ("Damping to spare over frequency", spare_plot),
-            "impedance": ("Impedance that the hand feels", impedance_overlay),
-            "parts": ("Effective stiffness, damping and mass", parts_overlay),
-            "transparency": ("Share of the clay in the hand's force", transparency_overlay),
         }
+        last = {"transparency": ("Share of the clay in the hand's force", transparency_overlay)}
     return {
-        name: (title, shown.Figure(partial(plot, found))) for name, (title, plot) in plots.items()
+        name: (title, shown.Figure(partial(plot, found)))
+        for name, (title, plot) in (first | plots | last).items()
     }
 
 
 def main_overlay(found: Comparison) -> Figure:
     """Plots the main difference between the files: stable walls, or velocity over position."""
-    walls = isinstance(found[0].subject, VirtualWall)
-    return wall_region_plot(found) if walls else velocity_overlay(found)
+    return velocity_overlay(found) if found[0].loop else wall_region_plot(found)
 
 
+@figure_style()
 def _overlay(
-    found: Comparison, curve: Callable[[Compared], tuple[Any, Any]], **axes: Any
+    found: Comparison, curve: Callable[[Compared], tuple[Any, Any]], x: str, y: str, log: str = ""
 ) -> Figure:
     """One curve per file, each in its own style."""
-    with figure_style():
-        figure = Figure(figsize=figure_size(1, 3.6))
-        ax = figure.add_subplot()
-        for x, look in _looks(found):
-            ax.plot(*curve(x), label=x.name, **look)
-        ax.set(**axes)
-        for axis in (ax.xaxis, ax.yaxis):
-            if axis.get_scale() == "log":
-                plain_ticks(axis)
-        add_legend(figure, ax, 3)
-    return figure
-
-
-def _looks(found: Comparison) -> Iterator[tuple[Compared, dict[str, Any]]]:
-    for x, (color, dash) in zip(found, CURVE_STYLES, strict=False):
-        yield x, dict(color=color, ls=dash)
-
-
-def _zero(figure: Figure) -> Figure:
-    figure.axes[0].axhline(0.0, color=BLACK, lw=stroke(0.8), zorder=1)
+    figure, ax = single(3.6)
+    for i, file in enumerate(found):
+        ax.plot(*curve(file), label=file.name, **curve_look(i))
+    label_axes(ax, x, y)
+    ax.set(**{f"{name}scale": "log" for name in log})
+    plain_ticks(ax)
+    add_legend(figure, 3)
     return figure
 
 
 def velocity_overlay(found: Comparison) -> Figure:
     """Plots velocity over position of each run."""
-    i = AXES.index(found[0].loop.axis if found[0].loop else "x")
-    labels = dict(xlabel=f"position {AXES[i]} [cm]", ylabel=f"velocity v$_{AXES[i]}$ [m/s]")
-    return _overlay(found, lambda x: (100.0 * x.record.p[:, i], x.record.v[:, i]), **labels)
+    axis = found[0].loop.axis if found[0].loop else "x"
+    i = AXES.index(axis)
+
+    def velocity(file: Compared) -> tuple[np.ndarray, np.ndarray]:
+        return 100.0 * file.record.p[:, i], file.record.v[:, i]
+
+    return _overlay(found, velocity, f"position {axis} [cm]", f"velocity v$_{axis}$ [m/s]")
 
 
+@figure_style()
 def gain_overlay(found: Comparison) -> Figure:
     """Plots the gain limit over b, with the sampling of each file, and marks its b and K."""
 
-    def limits(x: Compared) -> tuple[np.ndarray, np.ndarray]:
-        assert x.loop is not None
-        K = np.array([gain_limit(replace(x.loop, b=float(b))) for b in CLAY_DAMPINGS])
-        return CLAY_DAMPINGS, np.where((K > 0.0) & np.isfinite(K), K, np.nan)
+    def limits(file: Compared) -> tuple[np.ndarray, np.ndarray]:
+        assert file.loop is not None
+        K = [gain_limit(replace(file.loop, b=float(b))) for b in CLAY_DAMPINGS]
+        return CLAY_DAMPINGS, positive(K)
 
-    labels = dict(xlabel=unit_text("damping of the clay b [N.s/m]"), ylabel="gain K [1/kg]")
-    figure = _overlay(found, limits, xscale="log", yscale="log", **labels)
-    with figure_style():
-        for x, look in _looks(found):
-            if x.loop and x.loop.b and x.loop.gain:
-                mark: Any = dict(ms=stroke(7.0), mfc=WHITE, mec=look["color"], mew=stroke(1.4))
-                figure.axes[0].plot(x.loop.b, x.loop.gain, "o", **mark)
+    figure = _overlay(found, limits, "damping of the clay b [N.s/m]", "gain K [1/kg]", "xy")
+    for i, file in enumerate(found):
+        if file.loop and file.loop.b and file.loop.gain:
+            look = hollow(curve_look(i)["color"], size=7.0)
+            figure.axes[0].plot(file.loop.b, file.loop.gain, **look)
     return figure
 
 
-def _shown_band(x: Compared) -> np.ndarray:
+def _shown_band(file: Compared) -> np.ndarray:
     """Frequencies [rad/s]; for a wall below half of its sampling frequency."""
-    if isinstance(x.subject, VirtualWall):
-        return BAND[BAND < 0.95 * math.pi / x.subject.Ts]
-    return BAND
+    return BAND[BAND < 0.95 * 2.0 * math.pi * file.top]
 
 
+@figure_style()
 def spare_plot(found: Comparison) -> Figure:
     """Plots the excess damping: passivity index of a sampled wall, Re Z of an arm."""
 
-    def spare(x: Compared) -> tuple[np.ndarray, np.ndarray]:
-        if isinstance(x.subject, VirtualWall):
-            edge = math.pi / x.subject.Ts
+    def spare(file: Compared) -> tuple[np.ndarray, np.ndarray]:
+        if file.loop is None:
+            edge = math.pi / file.wall.Ts
             omega = np.geomspace(1e-3 * edge, edge * (1.0 - 1e-9), 400)
-            return omega / (2.0 * math.pi), wall_limits.passivity_index(x.subject, omega)
-        omega = _shown_band(x)
-        return omega / (2.0 * math.pi), x.impedance(omega).damping
+            return omega / (2.0 * math.pi), wall_limits.passivity_index(file.wall, omega)
+        omega = _shown_band(file)
+        return omega / (2.0 * math.pi), file.impedance(omega).damping
 
-    labels = dict(xlabel="frequency [Hz]", ylabel=unit_text("damping to spare [N.s/m]"))
-    return _zero(_overlay(found, spare, xscale="log", **labels))
+    figure = _overlay(found, spare, FREQUENCY, "damping to spare [N.s/m]", "x")
+    level(figure.axes[0])
+    return figure
 
 
 def impedance_overlay(found: Comparison) -> Figure:
     """Plots the magnitude of the impedance fh/v over frequency."""
 
-    def size(x: Compared) -> tuple[np.ndarray, np.ndarray]:
-        omega = _shown_band(x)
-        return omega / (2.0 * math.pi), np.abs(x.impedance(omega).Z)
+    def size(file: Compared) -> tuple[np.ndarray, np.ndarray]:
+        omega = _shown_band(file)
+        return omega / (2.0 * math.pi), np.abs(file.impedance(omega).Z)
 
-    labels = dict(xlabel="frequency [Hz]", ylabel=unit_text("|f$_h$/v| [N.s/m]"))
-    return _overlay(found, size, xscale="log", yscale="log", **labels)
+    return _overlay(found, size, FREQUENCY, "|f$_h$/v| [N.s/m]", "xy")
 
 
+@figure_style()
 def parts_overlay(found: Comparison) -> Figure:
     """Plots effective stiffness, damping and mass over frequency; empty panels are omitted."""
-    panels = {"stiffness": "[N/m]", "damping": "[N.s/m]", "mass": "[kg]"}
-    curves = [(look, _shown_band(x), x) for x, look in _looks(found)]
-    known = [(look, omega, x.impedance(omega), x.name) for look, omega, x in curves]
-    panels = {
-        p: u
-        for p, u in panels.items()
-        if any(np.isfinite(getattr(z, p)).any() for *_, z, _ in known)
-    }
-    with figure_style():
-        figure = Figure(figsize=figure_size(1, 1.0 + 1.7 * len(panels)))
-        axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-        for ax, (part, unit) in zip(axes, panels.items(), strict=True):
-            for look, omega, Z, name in known:
-                ax.plot(omega / (2.0 * math.pi), getattr(Z, part), label=name, **look)
-            ax.axhline(0.0, color=BLACK, lw=stroke(0.8), zorder=1)
-            ax.set(xscale="log", ylabel=unit_text(f"{part} {unit}"))
-        axes[-1].set_xlabel("frequency [Hz]")
-        plain_ticks(axes[-1].xaxis)
-        figure.align_ylabels(list(axes))
-        add_legend(figure, axes[0], 3)
+    computed = [file.impedance(_shown_band(file)) for file in found]
+    figure, panels = parts_panels(computed)
+    for part, ax in panels.items():
+        for i, (file, Z) in enumerate(zip(found, computed, strict=True)):
+            ax.plot(Z.frequency, getattr(Z, part), label=file.name, **curve_look(i))
+        level(ax)
+    add_legend(figure, 3)
     return figure
 
 
+@figure_style()
 def transparency_overlay(found: Comparison) -> Figure:
     """Plots |fe/fh| over frequency, in continuous time."""
 
-    def share(x: Compared) -> tuple[np.ndarray, np.ndarray]:
-        assert x.loop is not None
-        loop = replace(x.loop, **TIMING)
+    def share(file: Compared) -> tuple[np.ndarray, np.ndarray]:
+        assert file.loop is not None
+        loop = replace(file.loop, **TIMING)
         return BAND / (2.0 * math.pi), np.abs(stability_margins.transparency(loop, BAND))
 
-    labels = dict(xlabel="frequency [Hz]", ylabel="|f$_e$/f$_h$|")
-    figure = _overlay(found, share, xscale="log", **labels)
-    figure.axes[0].axhline(1.0, color=BLACK, lw=stroke(0.8), zorder=1)
+    figure = _overlay(found, share, FREQUENCY, "|f$_e$/f$_h$|", "x")
+    level(figure.axes[0], 1.0)
     return figure
 
 
 def wall_region_plot(found: Comparison) -> Figure:
     """Plots the walls that each device renders stably, by runs and by theory, and its own wall."""
-    walls = [x.subject for x in found if isinstance(x.subject, VirtualWall)]
-    return regions_plot([replace(x.region, name=x.name) for x in found if x.region], walls)
+    regions = [replace(x.region, name=x.name) for x in found if x.region]
+    return regions_plot(regions, [x.wall for x in found])
 
 
+@figure_style()
 def push_plot(found: Comparison) -> Figure:
     """Plots position over time after a push."""
-    labels = dict(xlabel="time [s]", ylabel="position x [mm]")
-    return _zero(_overlay(found, lambda x: (x.record.t, 1e3 * x.record.p[:, 0]), **labels))
+    figure = _overlay(
+        found, lambda x: (x.record.t, 1e3 * x.record.p[:, 0]), "time [s]", "position x [mm]"
+    )
+    level(figure.axes[0])
+    return figure

@@ -9,18 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..studies.fitting import Fitted
-from .style import (
-    BLACK,
-    BLUE,
-    MID_GREY,
-    VERMILION,
-    figure_size,
-    figure_style,
-    narrow,
-    points,
-    set_title,
-    stroke,
-)
+from .captions import clay_text
+from .palette import BLACK, BLUE, MID_GREY, VERMILION
+from .panels import level, set_title
+from .style import figure_size, figure_style, narrow, points, stroke
 
 DOTS_SHOWN = 6000  # of a panel
 BINS = 24  # of speeds, in which residuals are averaged
@@ -30,45 +22,38 @@ LAGS = 60  # of the autocorrelation
 DOTS: Any = dict(mew=0.0, color=BLUE, alpha=0.45, zorder=2.2, rasterized=True)
 
 
+@figure_style()
 def fit_plot(fitted: Fitted) -> Figure:
     """Plots force against velocity with the law, and residuals over velocity, time and lag."""
     shown = np.unique(np.linspace(0, len(fitted.v) - 1, DOTS_SHOWN).astype(int))
-    t, v, f, left = (x[shown] for x in (fitted.t, fitted.v, fitted.f, fitted.residuals))
-    with figure_style():
-        if narrow():
-            figure = Figure(figsize=figure_size(2, 10.2))
-            axes = figure.subplot_mosaic("A;B;C;D", height_ratios=(2.2, 1.0, 1.0, 1.0))
-        else:
-            figure = Figure(figsize=figure_size(2, 5.6))
-            axes = figure.subplot_mosaic("AB;AC;AD", width_ratios=(1.25, 1.0))
-        law, speed, time, lag = (axes[k] for k in "ABCD")
-        law.plot(v, f, "o", label="data", ms=stroke(1.6), **DOTS)
-        _fitted_curve(law, fitted)
-        law.set(xlabel="velocity [m/s]", ylabel="resisting force [N]")
-        law.locator_params(axis="x", nbins=6)
-        law.legend(loc="lower right", markerscale=3.0)
-        words = [
-            f"{p.name} = {_interval(p.value, p.low, p.high)} {p.unit}" for p in fitted.parameters
-        ]
-        law.text(
-            0.03,
-            0.97,
-            "\n".join(_typeset(x) for x in words),
-            transform=law.transAxes,
-            va="top",
-            fontsize=points(9),
-            color=BLACK,
-        )
-        chosen = next(c for c in fitted.candidates if c.law == fitted.law)
-        told = f"{fitted.law} law" if not fitted.law.endswith("law") else fitted.law
-        set_title(law, told, f"Akaike weight {chosen.weight:.2f}")
-        least = LEAST_RESIDUAL * float(np.max(np.abs(f), initial=1e-6))
-        _residual_panel(speed, v, left, "velocity [m/s]", least)
-        _binned(speed, fitted)
-        speed.legend(loc="upper right", fontsize=points(8))
-        _residual_panel(time, t, left, "time [s]", least)
-        _autocorrelation(lag, fitted)
-        figure.align_ylabels([speed, time, lag])
+    t, v, f, residuals = (x[shown] for x in (fitted.t, fitted.v, fitted.f, fitted.residuals))
+    figure = Figure(figsize=figure_size(2, 10.2 if narrow() else 5.6))
+    if narrow():
+        axes = figure.subplot_mosaic("A;B;C;D", height_ratios=(2.2, 1.0, 1.0, 1.0))
+    else:
+        axes = figure.subplot_mosaic("AB;AC;AD", width_ratios=(1.25, 1.0))
+    law, *small = (axes[k] for k in "ABCD")
+    law.plot(v, f, "o", label="data", ms=stroke(1.6), **DOTS)
+    _fitted_curve(law, fitted)
+    law.set(xlabel="velocity [m/s]", ylabel="resisting force [N]")
+    law.locator_params(axis="x", nbins=6)
+    law.legend(loc="lower right", markerscale=3.0)
+    values = [f"{p.name} = {_interval(p.value, p.low, p.high)} {p.unit}" for p in fitted.parameters]
+    corner: Any = dict(transform=law.transAxes, va="top", fontsize=points(9), color=BLACK)
+    law.text(0.03, 0.97, clay_text("\n".join(values)), **corner)
+    chosen = next(c for c in fitted.candidates if c.law == fitted.law)
+    name = f"{fitted.law.removesuffix(' law')} law"
+    set_title(law, name, f"Akaike weight {chosen.weight:.2f}")
+    least = LEAST_RESIDUAL * float(np.max(np.abs(f), initial=1e-6))
+    top = 1.05 * float(np.max(np.abs(residuals), initial=least))
+    for ax, x, label in zip(small, (v, t), ("velocity [m/s]", "time [s]"), strict=False):
+        ax.plot(x, residuals, "o", ms=stroke(1.6), **DOTS)
+        level(ax)
+        ax.set(xlabel=label, ylabel="residual [N]", ylim=(-top, 1.5 * top))  # room for the legend
+    _binned(small[0], fitted)
+    small[0].legend(loc="upper right", fontsize=points(8))
+    _autocorrelation(small[2], fitted)
+    figure.align_ylabels(small)
     return figure
 
 
@@ -78,15 +63,13 @@ def _fitted_curve(ax: Axes, fitted: Fitted) -> None:
         speeds = np.abs(fitted.v[fitted.v * way > 0.0])
         if not len(speeds):
             continue
-        fine = way * np.geomspace(speeds.min(), speeds.max(), 300)
-        force, half = fitted.flow.force(fine), fitted.band(fine)
+        v = way * np.geomspace(speeds.min(), speeds.max(), 300)
+        force, half = fitted.flow.force(v), fitted.band(v)
         first = way == np.sign(fitted.v[0])
-        look: Any = dict(label="law" if first else "_")
-        ax.plot(fine, force, color=VERMILION, zorder=4, **look)
-        look["label"] = f"{100 * fitted.level:g} % band" if first else "_"
-        ax.fill_between(
-            fine, force - half, force + half, color=BLACK, alpha=0.3, lw=0, zorder=3, **look
-        )
+        ax.plot(v, force, color=VERMILION, zorder=4, label="law" if first else "_")
+        look: Any = dict(color=BLACK, alpha=0.3, lw=0, zorder=3)
+        band = f"{100 * fitted.level:g} % band" if first else "_"
+        ax.fill_between(v, force - half, force + half, label=band, **look)
 
 
 def _interval(value: float, low: float, high: float) -> str:
@@ -94,26 +77,6 @@ def _interval(value: float, low: float, high: float) -> str:
     width = max(high - low, 1e-6 * abs(value), 1e-300)
     digits = int(np.clip(1 - np.floor(np.log10(width)), 0, 9))
     return f"{value:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
-
-
-def _typeset(text: str) -> str:
-    for plain, nice in (
-        ("Fy =", "$F_y$ ="),
-        ("K =", "$K$ ="),
-        ("n =", "$n$ ="),
-        ("b =", "$b$ ="),
-        ("N/(m/s)^n", "N/(m/s)$^n$"),
-        ("N.s/m", "N$\\cdot$s/m"),
-    ):
-        text = text.replace(plain, nice)
-    return text
-
-
-def _residual_panel(ax: Axes, x: np.ndarray, left: np.ndarray, label: str, least: float) -> None:
-    ax.plot(x, left, "o", ms=stroke(1.6), **DOTS)
-    ax.axhline(0.0, color=BLACK, lw=stroke(0.8))
-    top = 1.05 * float(np.max(np.abs(left), initial=least))
-    ax.set(xlabel=label, ylabel="residual [N]", ylim=(-top, 1.5 * top))  # room for the legend
 
 
 def _binned(ax: Axes, fitted: Fitted) -> None:
@@ -125,17 +88,8 @@ def _binned(ax: Axes, fitted: Fitted) -> None:
     good = count >= LEAST_IN_BIN
     mean_v, mean = (np.bincount(place, x, BINS)[good] / count[good] for x in (v, left))
     bar = 1.96 * fitted.force_noise * np.sqrt(fitted.correlation / count[good])
-    ax.errorbar(
-        mean_v,
-        mean,
-        bar,
-        fmt="s",
-        ms=stroke(3.0),
-        color=VERMILION,
-        elinewidth=stroke(1.0),
-        zorder=3,
-        label="means, 95 %",
-    )
+    look: Any = dict(fmt="s", ms=stroke(3.0), color=VERMILION, elinewidth=stroke(1.0), zorder=3)
+    ax.errorbar(mean_v, mean, bar, label="means, 95 %", **look)
 
 
 def _autocorrelation(ax: Axes, fitted: Fitted) -> None:
@@ -144,12 +98,7 @@ def _autocorrelation(ax: Axes, fitted: Fitted) -> None:
     power = float(x @ x) or 1.0
     rho = [float(x[k:] @ x[: len(x) - k]) / power for k in range(1, count + 1)]
     ax.axhspan(-1.96 / np.sqrt(len(x)), 1.96 / np.sqrt(len(x)), color=MID_GREY, alpha=0.3, lw=0)
-    ax.axhline(0.0, color=BLACK, lw=stroke(0.8))
+    level(ax)
     ax.vlines(np.arange(1, count + 1), 0.0, rho, color=BLUE, lw=stroke(1.4))
-    low, high = min(-0.1, *rho), max(0.1, *rho)
-    ax.set(
-        xlabel="lag [samples]; grey: white noise",
-        ylabel="autocorrelation",
-        xlim=(0, count + 1),
-        ylim=(1.15 * low, 1.15 * high),
-    )
+    ax.set(xlabel="lag [samples]; grey: white noise", ylabel="autocorrelation")
+    ax.set(xlim=(0, count + 1), ylim=(1.15 * min(-0.1, *rho), 1.15 * max(0.1, *rho)))

@@ -13,28 +13,18 @@ from matplotlib.figure import Figure
 from ..model.constants import AXES
 from ..model.flow import Flow
 from ..simulation.record import Record
-from .captions import in_math, scenario_parts
-from .run_axes import MOST_DOTS, main_axis, spread
-from .style import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    PURPLE,
-    SKY_BLUE,
-    VERMILION,
-    add_legend,
-    along_motion,
-    figure_size,
-    figure_style,
-    panel_grid,
-    set_title,
-    stroke,
-)
+from .captions import clay_text, scenario_parts
+from .motion import along_motion
+from .palette import BLUE, GREEN, ORANGE, PURPLE, SKY_BLUE, VERMILION
+from .panels import add_legend, set_title, side_by_side
+from .run_axes import main_axis, spread
+from .style import figure_style, stroke
 
 HELD_LOOK: Any = dict(color=ORANGE, ls="", marker="_", ms=9, mew=0.8)
 FLOW_COLORS = (BLUE, GREEN, PURPLE, SKY_BLUE)  # of the regions of clay that yields
 
 
+@figure_style()
 def force_velocity_plot(record: Record) -> Figure:
     """Plots the force of clay that yields over the velocity, with the law of each region.
 
@@ -63,25 +53,21 @@ def force_velocity_plot(record: Record) -> Figure:
         some = {n: x for n, x in panels.items() if clay.resists_otherwise(x[0]) and x[1].any()}
         panels = some or dict([next(iter(panels.items()))])
     met = {name: flows_met(record, x[0], whole) for name, x in panels.items()}
-    shown = list(dict.fromkeys(flow for flows in met.values() for flow in flows))
-    colors = dict(zip(shown, FLOW_COLORS, strict=False))
-    with figure_style():
-        rows, columns = panel_grid(len(panels))
-        figure = Figure(figsize=figure_size(columns, 4.4 * rows))
-        several = figure.subplots(rows, columns, squeeze=False).ravel()
-        for flow, color in colors.items():
-            told = ", ".join(in_math(x.text()) for x in flow.words)
-            label = f"measured, {told}"
-            several[0].plot([], [], ".", color=color, ms=stroke(9), label=label)
-        if any(held[:, x[0]].any() for x in panels.values()):
-            several[0].plot([], [], **HELD_LOOK, label="held still")
-        for ax, (name, (_, *measured)) in zip(several, panels.items(), strict=True):
-            flows = {flow: where for flow, where in met[name].items() if flow in colors}
-            _forces_over_velocity(ax, flows, colors, *measured)
-            ax.set_xlabel(name)
-            ax.set_ylabel("force of the clay [N]" if whole else "force of the clay less b v [N]")
-        add_legend(figure, several[0], ncols=2)
-        set_title(several[0], *scenario_parts(record.scenario))
+    flows = dict.fromkeys(flow for found in met.values() for flow in found)
+    colors = dict(zip(flows, FLOW_COLORS, strict=False))
+    figure, axes = side_by_side(len(panels), 4.4)
+    for flow, color in colors.items():
+        label = f"measured, {', '.join(clay_text(x.text()) for x in flow.words)}"
+        axes[0].plot([], [], ".", color=color, ms=stroke(9), label=label)
+    if any(held[:, x[0]].any() for x in panels.values()):
+        axes[0].plot([], [], **HELD_LOOK, label="held still")
+    for ax, (name, (_, *measured)) in zip(axes, panels.items(), strict=True):
+        drawn = {flow: where for flow, where in met[name].items() if flow in colors}
+        _forces_over_velocity(ax, drawn, colors, *measured)
+        ax.set_xlabel(name)
+        ax.set_ylabel("force of the clay [N]" if whole else "force of the clay less b v [N]")
+    add_legend(figure, 2)
+    set_title(axes[0], *scenario_parts(record.scenario))
     return figure
 
 
@@ -107,16 +93,21 @@ def _forces_over_velocity(
 ) -> None:
     """Draws measured forces, forces on a held handle, and the laws."""
     for flow, where in met.items():
-        some = spread(where[~held[where]], MOST_DOTS)
+        some = spread(where[~held[where]])
         ax.plot(v[some], force[some], ".", color=colors[flow], ms=stroke(6), mew=0)
-    some = spread(np.flatnonzero(held), MOST_DOTS)
+    some = spread(np.flatnonzero(held))
     ax.plot(v[some], force[some], **HELD_LOOK)
-    label = "law of the clay"
+    draw_laws(ax, met, v, force, 1.3)
+
+
+def draw_laws(
+    ax: Axes, met: dict[Flow, np.ndarray], v: np.ndarray, force: np.ndarray, width: float
+) -> None:
+    """Draws the law of each flow over the velocities at which a run met it."""
     for flow, where in met.items():
         back = force[where].min() < -0.01 * flow.Fy
         x, y = law_curve(flow, min(float(v[where].min()), 0.0), float(v[where].max()), back)
-        ax.plot(x, y, color=VERMILION, ls="--", lw=stroke(1.3), label=label)
-        label = "_"
+        ax.plot(x, y, color=VERMILION, ls="--", lw=stroke(width), label="law of the clay")
 
 
 def law_curve(flow: Flow, low: float, high: float, back: bool) -> tuple[np.ndarray, np.ndarray]:

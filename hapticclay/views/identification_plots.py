@@ -8,47 +8,24 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MultipleLocator, NullFormatter
+from matplotlib.ticker import MultipleLocator
 
 from ..model.constants import AXES
-from ..studies.identification import (
-    COHERENT,
-    Identified,
-    format_coefficient,
-    printed_form,
-    response,
-)
-from .style import (
-    BLACK,
-    BLUE,
-    GREY,
-    VERMILION,
-    WHITE,
-    add_legend,
-    figure_size,
-    figure_style,
-    panel_grid,
-    points,
-    set_title,
-    stroke,
-    unit_text,
-)
+from ..studies import identification
+from ..studies.identification import Identified
+from .captions import unit_text
+from .palette import BLACK, BLUE, GREY, VERMILION
+from .panels import add_legend, hollow, plain_ticks, set_title
+from .style import figure_size, figure_style, panel_grid, points, stroke
 
 
 class PlottedBlock(NamedTuple):
-    """Labels of an identified block.
+    """Labels of an identified block."""
 
-    Attributes:
-        figure: file name for the simulated arm, after the figure of the paper.
-        symbol: in titles.
-        unit: of its magnitude.
-        equations: of the paper, on x and y.
-    """
-
-    figure: str
-    symbol: str
-    unit: str
-    equations: tuple[str, str]
+    figure: str  # file name for the simulated arm, after the figure of the paper
+    symbol: str  # in titles
+    unit: str  # of its magnitude
+    equations: tuple[str, str]  # of the paper, on x and y
 
 
 BLOCKS = {
@@ -56,37 +33,35 @@ BLOCKS = {
     "S": PlottedBlock("fig5", "S", "dB re 1 m/N", ("Eq. 17", "Eq. 18")),
     "Th": PlottedBlock("fig6", "T$_h$", "dB re 1 N/m", ("Eq. 19", "Eq. 19")),
 }
-
-
 HEIGHTS = (2.2, 2.0, 0.8)  # of magnitude, phase and coherence
 
 
+@figure_style()
 def identification_plot(results: Sequence[Identified], paper: bool | None = None) -> Figure:
     """Plots magnitude, phase and coherence of one block.
 
     The response is left out where its coherence is below 0.5.
     """
     rows, columns = panel_grid(len(results))
-    with figure_style():
-        figure = Figure(figsize=figure_size(2, 5.4 * rows, max(1.2 + 3.6 * len(results), 6.0)))
-        look: Any = dict(sharex=True, squeeze=False)
-        axes: Any = figure.subplots(3 * rows, columns, height_ratios=HEIGHTS * rows, **look)
-        axes = axes.reshape(rows, 3, columns).transpose(1, 0, 2).reshape(3, -1)
-        for row in axes:
-            for ax in row[1:]:
-                ax.sharey(row[0])
-                ax.tick_params(labelleft=rows > 1)
-        for column, result in zip(axes.T, results, strict=True):
-            _response_column(column, result, paper)
-        labels = f"magnitude [{BLOCKS[results[0].what].unit}]", "phase [deg]", "coherence"
-        named = axes if rows > 1 else axes[:, :1]
-        for row, label in zip(named, labels, strict=True):
-            for ax in row:
-                ax.set_ylabel(label)
-        low = min(0.9, *(float(r.coherence.min()) for r in results))
-        axes[2, 0].set_ylim(low - 0.1 * (1.0 - low), 1.0 + 0.2 * (1.0 - low))
-        figure.align_ylabels(named.ravel())
-        add_legend(figure, axes[0, 0], 3)
+    figure = Figure(figsize=figure_size(2, 5.4 * rows, max(1.2 + 3.6 * len(results), 6.0)))
+    look: Any = dict(sharex=True, squeeze=False)
+    axes: Any = figure.subplots(3 * rows, columns, height_ratios=HEIGHTS * rows, **look)
+    axes = axes.reshape(rows, 3, columns).transpose(1, 0, 2).reshape(3, -1)
+    for row in axes:
+        for ax in row[1:]:
+            ax.sharey(row[0])
+            ax.tick_params(labelleft=rows > 1)
+    for column, result in zip(axes.T, results, strict=True):
+        _response_column(column, result, paper)
+    labels = f"magnitude [{BLOCKS[results[0].what].unit}]", "phase [deg]", "coherence"
+    labelled = axes if rows > 1 else axes[:, :1]
+    for row, label in zip(labelled, labels, strict=True):
+        for ax in row:
+            ax.set_ylabel(label)
+    low = min(0.9, *(float(r.coherence.min()) for r in results))
+    axes[2, 0].set_ylim(low - 0.1 * (1.0 - low), 1.0 + 0.2 * (1.0 - low))
+    figure.align_ylabels(labelled.ravel())
+    add_legend(figure, 3)
     return figure
 
 
@@ -98,46 +73,33 @@ def identified_plot(result: Identified) -> Figure:
 def _response_column(axes: Sequence[Axes], result: Identified, paper: bool | None) -> None:
     magnitude, phase, coherence = axes
     what, f = result.what, result.frequency
-    fine = np.geomspace(f[0] / 1.15, f[-1] * 1.15, 400)
-    known, fitted = (
-        response(what, x, fine) for x in (printed_form(what, result.axis), result.values)
-    )
-    seen = result.coherence >= COHERENT
-    measured = result.response[seen]
-    share = result.deviation[seen] / np.abs(measured)
+    line = np.geomspace(f[0] / 1.15, f[-1] * 1.15, 400)
+    printed = identification.printed_form(what, result.axis)
+    known, fitted = (identification.response(what, x, line) for x in (printed, result.values))
+    clear = result.coherence >= identification.COHERENT
+    measured = result.response[clear]
+    share = result.deviation[clear] / np.abs(measured)
     beside = result.scenario is not None if paper is None else paper
     error = 1.96 * np.array((20.0 / np.log(10.0) * share, np.degrees(share)))
-    marks: Any = dict(
-        fmt="o",
-        ms=stroke(4.0),
-        mfc=WHITE,
-        mew=stroke(1.2),
-        color=BLUE,
-        elinewidth=stroke(1.0),
-        zorder=3,
-    )
+    marks = hollow(BLUE, "o", 4.0, color=BLUE, elinewidth=stroke(1.0), zorder=3)
     label = f"{'simulated arm' if result.scenario else 'measured'}, with 95 % bars"
     for ax, part, e in ((magnitude, _decibel, error[0]), (phase, _degrees, error[1])):
         if beside:
-            ax.plot(fine, part(known), color=VERMILION, lw=stroke(2.2), label="printed")
-        ax.plot(
-            fine, part(fitted), color=BLACK, ls=":", lw=stroke(1.2), label="fitted to the points"
-        )
-        ax.errorbar(f[seen], part(measured), e, label=label, **marks)
+            ax.plot(line, part(known), color=VERMILION, lw=stroke(2.2), label="printed")
+        look: Any = dict(color=BLACK, ls=":", lw=stroke(1.2), label="fitted to the points")
+        ax.plot(line, part(fitted), **look)
+        ax.errorbar(f[clear], part(measured), e, label=label, **marks)
     coherence.plot(f, result.coherence, "o", ms=stroke(3.0), color=BLUE)
-    coherence.set_xscale("log")
-    coherence.set_xlabel("frequency [Hz]")
-    coherence.xaxis.set_major_formatter("{x:g}")
-    coherence.xaxis.set_minor_formatter(NullFormatter())
+    coherence.set(xscale="log", xlabel="frequency [Hz]")
+    plain_ticks(coherence)
     phase.yaxis.set_major_locator(MultipleLocator(45.0))
     set_title(magnitude, *_title(result, beside), panel=True)
-    text = "\n".join(
-        unit_text(f"{c.name} {format_coefficient(c)} {c.unit}") for c in result.coefficients
-    )
-    where: Any = dict(y=0.95, va="top") if what == "Th" else dict(y=0.06, va="bottom")
-    magnitude.text(
-        0.04, s=text, transform=magnitude.transAxes, fontsize=points(8), color=GREY, **where
-    )
+    values = [
+        f"{c.name} {identification.format_coefficient(c)} {c.unit}" for c in result.coefficients
+    ]
+    corner: Any = dict(y=0.95, va="top") if what == "Th" else dict(y=0.06, va="bottom")
+    corner |= dict(transform=magnitude.transAxes, fontsize=points(8), color=GREY)
+    magnitude.text(0.04, s=unit_text("\n".join(values)), **corner)
 
 
 def _title(result: Identified, beside: bool) -> list[str]:

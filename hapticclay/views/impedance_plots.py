@@ -3,250 +3,209 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..scene.virtual_wall import VirtualWall
-from ..studies.impedance import MeasuredImpedance, Subject
-from ..studies.mbk import ArmMBK, Border, DeviceMBK
+from ..studies.impedance import MeasuredImpedance
+from ..studies.mbk import ArmMBK, DeviceMBK
+from ..studies.wall import Subject, as_wall
+from ..theory.impedance import Impedance
 from ..theory.mbk import PLANES
-from .style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    LOG_SPAN,
-    MID_GREY,
-    PALE_GREY,
-    VERMILION,
+from .captions import hand_name, loop_parts
+from .palette import BLACK, BLUE, GREEN, PALE_GREY, VERMILION
+from .panels import (
     add_legend,
-    figure_size,
-    figure_style,
-    hand_name,
-    narrow,
+    hollow,
+    label_axes,
+    level,
+    mark,
     plain_ticks,
-    points,
     set_title,
-    stroke,
-    unit_text,
+    side_by_side,
+    single,
+    spans_decades,
+    stacked,
 )
+from .style import figure_style, narrow, points, stroke
 
-FINE = 400  # points of a computed line
-FREQUENCY = "frequency [Hz]"
-PART_LABELS = {"M": "virtual mass M [kg]", "B": "virtual damper B [N.s/m]", "K": "spring K [N/m]"}
+PART_UNITS = {"stiffness": "N/m", "damping": "N.s/m", "mass": "kg"}
+LETTERS = {"K": "stiffness", "B": "damping", "M": "mass"}
+NAMES = {"M": "virtual mass M", "B": "virtual damper B", "K": "spring K"}
 
 
+@figure_style()
 def impedance_plot(found: MeasuredImpedance) -> Figure:
     """Plots effective stiffness, damping and mass over frequency, measured and computed.
 
-    Thin lines are the rendered values. Empty panels are omitted.
+    Dashed lines are the rendered values. Empty panels are omitted.
     """
     m = found.measured
-    fine = np.geomspace(m.frequency[0], m.frequency[-1], FINE)
-    line = found.over(fine)
-    panels = [
-        ("stiffness", "stiffness [N/m]", m.stiffness, line.stiffness),
-        ("damping", "damping [N.s/m]", m.damping, line.damping),
-        ("mass", "mass [kg]", m.mass, line.mass),
-    ]
-    shown = [x for x in panels if np.any(np.isfinite(x[3]))]
-    with figure_style():
-        figure = Figure(figsize=figure_size(1, 1.0 + 1.7 * len(shown)))
-        axes = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
-        for ax, (name, label, dots, curve) in zip(axes, shown, strict=True):
-            value = rendered_part(found.subject, name)
-            if value is not None:
-                look: Any = dict(color=BLACK, lw=stroke(0.8), ls=(0, (5, 3)), label="rendered")
-                ax.axhline(value, **look)
-            ax.plot(fine, curve, color=BLUE, label="computed")
-            ax.plot(m.frequency, dots, label="measured", **_dots())
-            _scale(ax, np.concatenate((curve, dots)), value, log=False)
-            ax.set(xscale="log", ylabel=unit_text(label))
-        _frequency_axis(axes[-1], fine)
-        figure.align_ylabels(list(axes))
-        labelled = max(axes, key=lambda ax: len(ax.get_legend_handles_labels()[1]))
-        add_legend(figure, labelled, 3)
-        set_title(axes[0], *_subject_name(found.subject))
+    f = np.geomspace(m.frequency[0], m.frequency[-1], 400)
+    computed = found.over(f)
+    figure, panels = parts_panels([computed])
+    for part, ax in panels.items():
+        line, dots = getattr(computed, part), getattr(m, part)
+        values = np.concatenate((line, dots))
+        if rendered := as_wall(found.subject).rendered(part):
+            look: Any = dict(color=BLACK, lw=stroke(0.8), ls=(0, (5, 3)), label="rendered")
+            ax.axhline(rendered, **look)
+            values = np.append(values, rendered)
+        ax.plot(f, line, color=BLUE, label="computed")
+        ax.plot(m.frequency, dots, label="measured", **hollow(size=5.0))
+        _from_zero(ax, values)
+    add_legend(figure, 3)
+    set_title(figure.axes[0], *_subject_parts(found.subject))
     return figure
 
 
+def parts_panels(shown: Sequence[Impedance]) -> tuple[Figure, dict[str, Axes]]:
+    """Panels of effective stiffness, damping and mass over frequency, where they are not empty."""
+    units = {
+        part: unit
+        for part, unit in PART_UNITS.items()
+        if any(np.isfinite(getattr(x, part)).any() for x in shown)
+    }
+    figure, axes = stacked(len(units), 1.0 + 1.7 * len(units))
+    for ax, (part, unit) in zip(axes, units.items(), strict=True):
+        label_axes(ax, y=f"{part} [{unit}]")
+    _frequency_axis(
+        axes[-1], min(x.frequency[0] for x in shown), max(x.frequency[-1] for x in shown)
+    )
+    return figure, dict(zip(units, axes, strict=True))
+
+
+@figure_style()
 def transparency_bode_plot(found: MeasuredImpedance) -> Figure:
     """Plots fe/fh and the impedance ratio Z/Ze over frequency, measured and computed."""
     m = found.measured
-    fine = np.geomspace(m.frequency[0], m.frequency[-1], FINE)
-    line = found.over(fine)
-    curves = [("f$_e$/f$_h$", m.transparency, line.transparency, BLUE, "-", "o")]
-    if np.any(line.rendered):
-        curves.append(("Z/Z$_e$", m.ratio, line.ratio, VERMILION, "--", "s"))
-    with figure_style():
-        figure = Figure(figsize=figure_size(1, 4.6))
-        size, phase = figure.subplots(2, 1, sharex=True)
-        size.axhline(1.0, color=BLACK, lw=stroke(0.8))
-        phase.axhline(0.0, color=BLACK, lw=stroke(0.8))
-        for name, dots, curve, color, style, mark in curves:
-            size.plot(fine, np.abs(curve), color=color, ls=style, label=f"{name}, computed")
-            look = _dots(color, mark)
-            size.plot(m.frequency, np.abs(dots), label=f"{name}, measured", **look)
-            angle = np.degrees(np.unwrap(np.angle(curve)))
-            turned = np.interp(np.log(m.frequency), np.log(fine), angle)
-            own = np.degrees(np.angle(dots))
-            own += 360.0 * np.round((turned - own) / 360.0)
-            phase.plot(fine, angle, color=color, ls=style)
-            phase.plot(m.frequency, own, **look)
-        _scale(size, np.concatenate([np.abs(x) for _, a, b, *_ in curves for x in (a, b)]), 1.0)
-        size.set(xscale="log", ylabel="magnitude")
-        phase.set(ylabel="phase [degrees]")
-        _frequency_axis(phase, fine)
-        figure.align_ylabels([size, phase])
-        add_legend(figure, size, 4 if not narrow() else 2)
-        set_title(size, *_subject_name(found.subject))
+    f = np.geomspace(m.frequency[0], m.frequency[-1], 400)
+    computed = found.over(f)
+    curves = [("f$_e$/f$_h$", m.transparency, computed.transparency, BLUE, "-", "o")]
+    if np.any(computed.rendered):
+        curves.append(("Z/Z$_e$", m.ratio, computed.ratio, VERMILION, "--", "s"))
+    figure, (size, phase) = stacked(2, 4.6)
+    level(size, 1.0)
+    level(phase)
+    for name, dots, line, color, dash, marker in curves:
+        look = hollow(color, marker, 5.0)
+        size.plot(f, np.abs(line), color=color, ls=dash, label=f"{name}, computed")
+        size.plot(m.frequency, np.abs(dots), label=f"{name}, measured", **look)
+        angle = np.degrees(np.unwrap(np.angle(line)))
+        near = np.interp(np.log(m.frequency), np.log(f), angle)
+        phase.plot(f, angle, color=color, ls=dash)
+        measured = np.degrees(np.angle(dots))
+        phase.plot(m.frequency, measured + 360.0 * np.round((near - measured) / 360.0), **look)
+    values = np.concatenate([[1.0], *(np.abs(x) for _, a, b, *_ in curves for x in (a, b))])
+    if spans_decades(values[np.isfinite(values)]):
+        size.set_yscale("log")
+    else:
+        _from_zero(size, values)
+    size.set_ylabel("magnitude")
+    phase.set_ylabel("phase [degrees]")
+    _frequency_axis(phase, f[0], f[-1])
+    add_legend(figure, 2 if narrow() else 4)
+    set_title(size, *_subject_parts(found.subject))
     return figure
 
 
+@figure_style()
 def mbk_plot(found: DeviceMBK) -> Figure:
     """Plots where virtual mass, damper and spring are stable over three planes, with runs."""
-    with figure_style():
-        rows, columns = (3, 1) if narrow() else (1, 3)
-        figure = Figure(figsize=figure_size(2, 10.2 if narrow() else 3.6))
-        axes = figure.subplots(rows, columns, squeeze=False).ravel()
-        for ax, (plane, region) in zip(axes, found.regions.items(), strict=True):
-            across, up = PLANES[plane]
-            high = np.where(np.isfinite(region.high), region.high, np.nan)
-            log = plane == "mass-stiffness"
-            low = np.maximum(region.low, 1e-9) if log else region.low
-            ax.fill_between(region.x, low, high, color=BLUE, alpha=0.15, lw=0.0, label="stable")
-            ax.plot(region.x, high, color=BLUE, label="exact border")
-            if up == "B":
-                ax.plot(region.x, low, color=BLUE)
-            _border_dots(ax, found.found[plane])
-            ax.set(xlabel=unit_text(PART_LABELS[across]), ylabel=unit_text(PART_LABELS[up]))
-            if log:
-                ax.set(yscale="log", ylim=(2e-4 * np.nanmax(high), 2.0 * np.nanmax(high)))
-                plain_ticks(ax.yaxis)
-            elif up == "K":
-                ax.set_ylim(0.0, None)
-            if across == "M":
-                ax.axvline(0.0, color=BLACK, lw=stroke(0.8))
-            third = ({"K", "B", "M"} - {across, up}).pop()
-            unit = {"K": "N/m", "B": "N.s/m", "M": "kg"}[third]
-            kept = getattr(region.wall, third)
-            ax.set_title(unit_text(f"{third} = {kept:g} {unit}"), loc="left", fontsize=points(9.0))
-        add_legend(figure, axes[0], 3)
+    figure, axes = side_by_side(3, 3.4 if narrow() else 3.6)
+    for ax, (plane, region) in zip(axes, found.regions.items(), strict=True):
+        across, up = PLANES[plane]
+        high = np.where(np.isfinite(region.high), region.high, np.nan)
+        log = plane == "mass-stiffness"
+        low = np.maximum(region.low, 1e-9) if log else region.low
+        ax.fill_between(region.x, low, high, color=BLUE, alpha=0.15, lw=0.0, label="stable")
+        ax.plot(region.x, high, color=BLUE, label="exact border")
+        if up == "B":
+            ax.plot(region.x, low, color=BLUE)
+        runs = [(b.x, b.y) for b in found.found[plane]]
+        mark(ax, runs, label="border by runs", **hollow(VERMILION, size=5.0))
+        label_axes(ax, *(f"{NAMES[x]} [{PART_UNITS[LETTERS[x]]}]" for x in (across, up)))
+        if log:
+            ax.set(yscale="log", ylim=(2e-4 * np.nanmax(high), 2.0 * np.nanmax(high)))
+            plain_ticks(ax)
+        elif up == "K":
+            ax.set_ylim(0.0, None)
+        if across == "M":
+            ax.axvline(0.0, color=BLACK, lw=stroke(0.8))
+        third = ({*LETTERS} - {across, up}).pop()
+        fixed = f"{third} = {getattr(region.wall, third):g} {PART_UNITS[LETTERS[third]]}"
+        set_title(ax, fixed, panel=True)
+    add_legend(figure, 3)
     return figure
 
 
+@figure_style()
 def dynamic_range_plot(found: DeviceMBK) -> Figure:
     """Plots |Z| of the free device and of its stiffest stable wall over frequency."""
-    r = found.range
+    r, w = found.range, found.range.stiffest
     f = r.omega / (2.0 * math.pi)
-    with figure_style():
-        figure = Figure(figsize=figure_size(1, 3.6))
-        ax = figure.add_subplot()
-        ax.fill_between(f, r.free, r.most, color=PALE_GREY, lw=0.0)
-        w = r.stiffest
-        text = f"stiffest wall, K = {1e-3 * w.K:.3g} kN/m, B = {w.B:.3g} N.s/m"
-        ax.plot(f, r.most, color=VERMILION, ls="--", label=unit_text(text))
-        ax.plot(f, r.free, color=BLUE, label="free device")
-        ax.plot(f, r.least, color=GREEN, ls="-.", label="least stable virtual mass")
-        ax.set(xscale="log", yscale="log", ylabel=unit_text("|Z| [N.s/m]"))
-        plain_ticks(ax.yaxis)
-        _frequency_axis(ax, f)
-        i = len(f) // 2
-        middle = math.sqrt(r.free[i] * r.most[i])
-        look: Any = dict(ha="center", va="center", fontsize=points(9.0), color=BLACK)
-        ax.text(f[i], middle, f"range {r.mean:.0f} dB in the mean", **look)
-        add_legend(figure, ax, 1)
+    figure, ax = single(3.6)
+    ax.fill_between(f, r.free, r.most, color=PALE_GREY, lw=0.0)
+    stiffest = f"stiffest wall, K = {1e-3 * w.K:.3g} kN/m, B = {w.B:.3g} N.s/m"
+    ax.plot(f, r.most, color=VERMILION, ls="--", label=stiffest)
+    ax.plot(f, r.free, color=BLUE, label="free device")
+    ax.plot(f, r.least, color=GREEN, ls="-.", label="least stable virtual mass")
+    ax.set_yscale("log")
+    label_axes(ax, y="|Z| [N.s/m]")
+    _frequency_axis(ax, f[0], f[-1])
+    i = len(f) // 2
+    look: Any = dict(ha="center", va="center", fontsize=points(9.0), color=BLACK)
+    ax.text(f[i], math.sqrt(r.free[i] * r.most[i]), f"range {r.mean:.0f} dB in the mean", **look)
+    add_legend(figure, 1)
     return figure
 
 
+@figure_style()
 def least_mass_plot(found: ArmMBK) -> Figure:
     """Plots the least virtual mass that the arm renders over its damper, with runs."""
     loop = found.loop
     timed = loop.Ts is not None or loop.delay > 0.0
     every = "worst hand tried of the box" if timed else "every hand of the box, exact"
-    with figure_style():
-        figure = Figure(figsize=figure_size(1, 4.0))
-        ax = figure.add_subplot()
-        absent = []
-        for (M, B), color, style, name in (
-            (found.worst, VERMILION, "--", every),
-            (found.nominal, BLUE, "-", f"{hand_name(loop.operator)}, exact"),
-        ):
-            there = np.isfinite(M) & (M > 0.0)
-            if np.any(there):
-                ax.plot(B[there], M[there], color=color, ls=style, label=name)
-            else:
-                absent.append(f"{name.partition(',')[0]}: every mass is stable")
-        if found.found:
-            x, y = [r.x for r in found.found], [r.y for r in found.found]
-            ax.plot(x, y, label="border by runs", **_dots(BLUE))
-        ax.set(xscale="log", yscale="log")
-        ax.set(xlabel=unit_text("virtual damper B [N.s/m]"), ylabel="least virtual mass M [kg]")
-        for side in (ax.xaxis, ax.yaxis):
-            plain_ticks(side)
-        for text in absent:  # in the legend, without a mark
-            ax.plot([], [], ls="none", label=text)
-        add_legend(figure, ax, 3 if not narrow() else 1)
-        how = "continuous time" if loop.Ts is None else f"sampled every {1e3 * loop.Ts:g} ms"
-        set_title(ax, f"arm, {loop.axis} axis", how, "stable above and to the right")
+    figure, ax = single(4.0)
+    absent = []
+    for (M, B), color, dash, name in (
+        (found.worst, VERMILION, "--", every),
+        (found.nominal, BLUE, "-", f"{hand_name(loop.operator)}, exact"),
+    ):
+        exists = np.isfinite(M) & (M > 0.0)
+        if np.any(exists):
+            ax.plot(B[exists], M[exists], color=color, ls=dash, label=name)
+        else:
+            absent.append(f"{name.partition(',')[0]}: every mass is stable")
+    runs = [(r.x, r.y) for r in found.found]
+    mark(ax, runs, label="border by runs", **hollow(size=5.0))
+    ax.set(xscale="log", yscale="log")
+    label_axes(ax, "virtual damper B [N.s/m]", "least virtual mass M [kg]")
+    plain_ticks(ax)
+    for text in absent:  # in the legend, without a mark
+        ax.plot([], [], ls="none", label=text)
+    add_legend(figure, 1 if narrow() else 3)
+    parts = loop_parts(loop, "axis", "Ts")
+    set_title(ax, f"arm, {parts[0]}", *parts[1:], "stable above and to the right")
     return figure
 
 
-def rendered_part(subject: Subject, part: str) -> float | None:
-    """Rendered value of a part of a wall or clay, beside the effective one; None if unknown."""
-    letters = {"stiffness": "K", "damping": "B", "mass": "M"}
-    if not isinstance(subject, VirtualWall):
-        letters = {"stiffness": "k", "damping": "b"}
-    value = getattr(subject, letters[part]) if part in letters else 0.0
-    return value or None
+def _subject_parts(subject: Subject) -> list[str]:
+    """Phrases that describe a wall or a loop in a title."""
+    return as_wall(subject).felt_phrases(hand_name(subject.operator))
 
 
-def _subject_name(subject: Subject) -> tuple[str, ...]:
-    how = "" if subject.Ts is None else f"sampled every {1e3 * subject.Ts:g} ms"
-    late = f"{1e3 * subject.delay:g} ms late" if subject.delay else ""
-    hand = hand_name(subject.operator)
-    if isinstance(subject, VirtualWall):
-        parts = (("K", "N/m"), ("B", "N.s/m"), ("M", "kg"))
-        wall = [f"{n} = {getattr(subject, n):g} {u}" for n, u in parts if getattr(subject, n)]
-        words = [*(wall or ["no wall"]), f"device {subject.device.mass:g} kg", hand, how, late]
+def _from_zero(ax: Axes, y: np.ndarray) -> None:
+    """A linear scale that begins at 0, or shows it."""
+    if np.nanmin(y) >= 0.0:
+        ax.set_ylim(0.0, 1.1 * np.nanmax(y[np.isfinite(y)]))
     else:
-        clay = f"b = {subject.b:g} N.s/m" + (f", k = {subject.k:g} N/m" if subject.k else "")
-        words = [f"{subject.axis} axis", clay, f"gain {subject.K:g}", hand]
-        words += [how or "continuous time", late]
-        words += [f"{subject.render} clay"] if subject.Ts else []
-    return tuple(unit_text(x) for x in words if x)
+        level(ax)
 
 
-def _dots(color: str = BLUE, mark: str = "o") -> Any:
-    return dict(
-        ls="", marker=mark, ms=stroke(5.0), mfc="white", mec=color, mew=stroke(1.2), zorder=3
-    )
-
-
-def _border_dots(ax: Axes, borders: tuple[Border, ...]) -> None:
-    if borders:
-        x, y = [b.x for b in borders], [b.y for b in borders]
-        ax.plot(x, y, label="border by runs", **_dots(VERMILION))
-
-
-def _scale(ax: Axes, y: np.ndarray, also: float | None, log: bool = True) -> None:
-    """A linear scale with zero, or logarithmic if log is True and positive values span much."""
-    some = y[np.isfinite(y)]
-    some = np.append(some, also) if also is not None else some
-    if log and some.min() > 0.0 and some.max() / some.min() > LOG_SPAN:
-        ax.set_yscale("log")
-    elif some.min() >= 0.0:
-        ax.set_ylim(0.0, 1.1 * some.max())
-    else:
-        ax.axhline(0.0, color=MID_GREY, lw=stroke(0.6))
-
-
-def _frequency_axis(ax: Axes, f: np.ndarray) -> None:
-    from matplotlib.ticker import NullFormatter, StrMethodFormatter
-
-    ax.set(xlabel=FREQUENCY, xlim=(f[0] / 1.05, f[-1] * 1.05))
-    ax.set_xticks([x for x in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100) if f[0] <= x <= f[-1]])
-    ax.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    ax.xaxis.set_minor_formatter(NullFormatter())
+def _frequency_axis(ax: Axes, low: float, high: float) -> None:
+    ax.set(xscale="log", xlabel="frequency [Hz]", xlim=(low / 1.05, high * 1.05))
+    plain_ticks(ax)

@@ -23,17 +23,7 @@ from ..live.session import Session
 from ..live.verdict import clay_here
 from ..model.constants import AXES
 from ..ports.guard import LOCAL, REFUSED, Guard, listening, url_host
-from .stage import (
-    ARROW_WIDTH,
-    GROUND,
-    THICKNESS,
-    Stage,
-    hardest,
-    held_words,
-    plotted_axes,
-    room_scale,
-)
-from .style import (
+from .palette import (
     CLAY_DEEP,
     FORCE_COLORS,
     GRID,
@@ -43,6 +33,16 @@ from .style import (
     cutting_force,
     rgb_bytes,
     verdict_color,
+)
+from .stage import (
+    ARROW_WIDTH,
+    GROUND,
+    THICKNESS,
+    Stage,
+    hardest,
+    held_words,
+    plotted_axes,
+    room_scale,
 )
 
 REFRESH_TIME = 1.0 / 30.0  # [s] between two updates of the scene

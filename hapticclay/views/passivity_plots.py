@@ -2,147 +2,104 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..studies.passivity_runs import EnergyOverTime, IndexOverFrequency, PassiveRegion
-from .style import (
-    BLACK,
-    BLUE,
-    CURVE_STYLES,
-    GREY,
-    VERMILION,
-    WHITE,
+from .palette import BLUE, GREY, VERMILION
+from .panels import (
+    MARKS,
     add_legend,
-    figure_size,
-    figure_style,
+    curve_look,
+    hollow,
+    label_axes,
+    level,
+    mark,
     plain_ticks,
+    positive,
     set_title,
-    stroke,
-    unit_text,
+    single,
+    stacked,
 )
+from .style import figure_style
 
 HERTZ = 2.0 * np.pi
-ACTIVE_LABEL = "active"
-ACTIVE_ROOM = 0.15  # least share of the height of a labelled half plane
+ROOM = 0.15  # least share of the height of the passive half plane
 BELOW_ZERO = 0.03  # share of the height shown below 0 where no curve is active
-REGION_MARKS = ("o", "s", "^", "D", "v")
 
 
+@figure_style()
 def index_plot(found: IndexOverFrequency) -> Figure:
     """Plots the excess damping over frequency, theory as lines and runs as marks."""
-    with figure_style():
-        figure = Figure(figsize=figure_size(1, 4.2))
-        ax = figure.add_subplot()
-        ax.set_xscale("log")
-        mark: Any = dict(ls="none", ms=stroke(6.0), mfc=WHITE, mew=stroke(1.2), zorder=4)
-        if found.index is not None:
-            label = "index (Colgate, Schenkel 1997)"
-            ax.plot(found.omega / HERTZ, found.index, color=BLUE, label=label)
-        if len(found.worst):
-            label = "runs: worst path of a hand"
-            ax.plot(found.worst_omega / HERTZ, found.worst, "o", mec=BLUE, label=label, **mark)
-        ax.plot(found.omega / HERTZ, found.damping, color=VERMILION, ls="--", label="Re Z")
-        if len(found.measured):
-            label = "runs: sines, mean power / mean v$^2$"
-            ax.plot(
-                found.measured_omega / HERTZ,
-                found.measured,
-                "s",
-                mec=VERMILION,
-                label=label,
-                **mark,
-            )
-        ax.set(xlabel="frequency [Hz]", ylabel=unit_text("damping to spare [N.s/m]"))
-        ax.set_xlim(found.omega[0] / HERTZ, found.omega[-1] / HERTZ * 1.05)
-        _shade_active(ax)
-        plain_ticks(ax.xaxis)
-        add_legend(figure, ax, 2)
-        verdict = "passive" if found.margin >= 0.0 else "not passive"
-        set_title(ax, unit_text(found.name), f"least {found.margin:.4g}: {verdict}")
+    figure, ax = single(4.2)
+    f = found.omega / HERTZ
+    if found.index is not None:
+        ax.plot(f, found.index, color=BLUE, label="index (Colgate, Schenkel 1997)")
+    worst = zip(found.worst_omega / HERTZ, found.worst, strict=True)
+    mark(ax, worst, label="runs: worst path of a hand", **hollow(BLUE))
+    ax.plot(f, found.damping, color=VERMILION, ls="--", label="Re Z")
+    sines = zip(found.measured_omega / HERTZ, found.measured, strict=True)
+    mark(ax, sines, label="runs: sines, mean power / mean v^2", **hollow(VERMILION, "s"))
+    ax.set(xscale="log", xlim=(f[0], f[-1] * 1.05))
+    label_axes(ax, "frequency [Hz]", "damping to spare [N.s/m]")
+    _shade_active(ax)
+    plain_ticks(ax)
+    add_legend(figure, 2)
+    verdict = "passive" if found.margin >= 0.0 else "not passive"
+    set_title(ax, found.name, f"least {found.margin:.4g}: {verdict}")
     return figure
 
 
 def _shade_active(ax: Axes) -> None:
-    """Shades the half plane in which a hand can draw energy, labelled in the emptier corner."""
-    points = np.concatenate([line.get_xydata() for line in ax.lines])
-    points = points[np.isfinite(points).all(axis=1)]
-    least = float(points[:, 1].min(initial=0.0))
-    low, high = ax.get_ylim()
-    if least >= 0.0:
-        low = -BELOW_ZERO * high
-    high = max(high, -ACTIVE_ROOM * low)
-    ax.axhline(0.0, color=BLACK, lw=stroke(0.8))
-    ax.set_ylim(low, high)
-    if least >= 0.0:
-        return
-    ax.axhspan(low, 0.0, color=GREY, alpha=0.15, lw=0, zorder=0)
-    if -low < ACTIVE_ROOM * (high - low):
-        return
-    shares = ax.transAxes.inverted().transform(ax.transData.transform(points))
-    corners = [(x, y) for y in (0.05, -low / (high - low) - 0.05) for x in (0.08, 0.92)]
-    x, y = max(corners, key=lambda c: np.hypot(*(shares - c).T).min())
-    side: Any = "left" if x < 0.5 else "right"
-    up: Any = "bottom" if y == corners[0][1] else "top"
-    where = (0.02 if side == "left" else 0.98, y - 0.02 if up == "bottom" else y + 0.02)
-    ax.text(*where, ACTIVE_LABEL, transform=ax.transAxes, ha=side, va=up, color=GREY)
+    """Shades the half plane in which a hand can draw energy."""
+    (low, high), lowest = ax.get_ylim(), min(np.nanmin(line.get_ydata()) for line in ax.lines)
+    level(ax)
+    if lowest >= 0.0:
+        ax.set_ylim(-BELOW_ZERO * high, high)
+    else:
+        ax.set_ylim(low, max(high, -ROOM * low))
+        ax.axhspan(low, 0.0, color=GREY, alpha=0.15, lw=0, zorder=0, label="active")
 
 
+@figure_style()
 def port_energy_plot(found: EnergyOverTime) -> Figure:
     """Plots the energy absorbed by rendered clay, and the velocity, of both runs."""
     looks = ((VERMILION, "-", "without controller"), (BLUE, "--", "with controller"))
     records = (found.without, found.controlled)
-    with figure_style():
-        figure = Figure(figsize=figure_size(1, 5.0))
-        top, low = figure.subplots(2, 1, sharex=True)
-        size = max(float(np.abs(e).max(initial=0.0)) for e in found.observed)
-        factor, unit = (1e3, "mJ") if size < 1.0 else (1.0, "J")
-        for record, energy, (color, dash, name) in zip(records, found.observed, looks, strict=True):
-            i = int(np.argmax(np.abs(record.v).max(axis=0, initial=0.0)))
-            time = 1e3 * record.t
-            top.plot(time, factor * energy, color=color, ls=dash, label=name)
-            low.plot(time, 1e3 * record.v[:, i], color=color, ls=dash)
-        top.axhline(0.0, color=BLACK, lw=stroke(0.8))
-        top.set_ylabel(f"energy that the\nclay has taken [{unit}]")
-        low.set(xlabel="time [ms]", ylabel="velocity [mm/s]")
-        figure.align_ylabels([top, low])
-        add_legend(figure, top, 2)
-        s = found.without.scenario
-        least = factor * float(found.observed[0].min(initial=0.0))
-        taken = f"draws {-least:.3g} {unit} without" if least < 0.0 else "takes energy"
-        clay = f"b = {s.clay.largest:g} N$\\cdot$s/m" if s.clay else "no clay"
-        set_title(top, clay, f"Ts = {1e3 * (s.Ts or s.dt):g} ms", taken)
+    figure, (top, low) = stacked(2, 5.0)
+    size = max(float(np.abs(e).max(initial=0.0)) for e in found.observed)
+    factor, unit = (1e3, "mJ") if size < 1.0 else (1.0, "J")
+    for record, energy, (color, dash, name) in zip(records, found.observed, looks, strict=True):
+        i = int(np.argmax(np.abs(record.v).max(axis=0, initial=0.0)))
+        top.plot(1e3 * record.t, factor * energy, color=color, ls=dash, label=name)
+        low.plot(1e3 * record.t, 1e3 * record.v[:, i], color=color, ls=dash)
+    level(top)
+    top.set_ylabel(f"energy that the\nclay has taken [{unit}]")
+    low.set(xlabel="time [ms]", ylabel="velocity [mm/s]")
+    add_legend(figure, 2)
+    s = found.without.scenario
+    least = factor * float(found.observed[0].min(initial=0.0))
+    taken = f"draws {-least:.3g} {unit} without" if least < 0.0 else "takes energy"
+    clay = f"b = {s.clay.largest:g} N.s/m" if s.clay else "no clay"
+    set_title(top, clay, f"Ts = {1e3 * (s.Ts or s.dt):g} ms", taken)
     return figure
 
 
+@figure_style()
 def region_plot(found: PassiveRegion) -> Figure:
     """Plots the largest passive stiffness over the control sample, a line per delay, with runs."""
-    with figure_style():
-        figure = Figure(figsize=figure_size(1, 4.2))
-        ax = figure.add_subplot()
-        ax.set(xscale="log", yscale="log")
-        for i, (delay, limits) in enumerate(zip(found.delays, found.limits, strict=True)):
-            color, dash = CURVE_STYLES[i % len(CURVE_STYLES)]
-            label = "no delay" if not delay else f"delay {delay:g} Ts"
-            ax.plot(1e3 * found.Ts, _where_passive(limits), color=color, ls=dash, label=label)
-            mark: Any = dict(mec=color, mfc=WHITE, ls="none", ms=stroke(6.5), mew=stroke(1.3))
-            mark["marker"] = REGION_MARKS[i % len(REGION_MARKS)]
-            ax.plot(1e3 * found.run_Ts, _where_passive(found.found[i]), zorder=4, **mark)
-        ax.set(xlabel="control sample Ts [ms]", ylabel="largest passive stiffness K [N/m]")
-        ax.set_xlim(1e3 * found.Ts[0], 1e3 * found.Ts[-1])
-        for axis in (ax.xaxis, ax.yaxis):
-            plain_ticks(axis)
-        add_legend(figure, ax, 4)
-        w = found.wall
-        told = [unit_text(f"b = {w.device.damper:g} N.s/m"), unit_text(f"B = {w.B:g} N.s/m")]
-        set_title(ax, *told, "lines: Colgate, Schenkel 1997; marks: runs")
+    figure, ax = single(4.2)
+    ax.set(xscale="log", yscale="log")
+    for i, (delay, limits) in enumerate(zip(found.delays, found.limits, strict=True)):
+        look, label = curve_look(i), f"delay {delay:g} Ts" if delay else "no delay"
+        ax.plot(1e3 * found.Ts, positive(limits), label=label, **look)
+        runs = hollow(look["color"], MARKS[i % len(MARKS)], 6.5)
+        ax.plot(1e3 * found.run_Ts, positive(found.found[i]), **runs)
+    ax.set(xlabel="control sample Ts [ms]", ylabel="largest passive stiffness K [N/m]")
+    ax.set_xlim(1e3 * found.Ts[0], 1e3 * found.Ts[-1])
+    plain_ticks(ax)
+    add_legend(figure, 4)
+    wall = [f"b = {found.wall.device.damper:g} N.s/m", f"B = {found.wall.B:g} N.s/m"]
+    set_title(ax, *wall, "lines: Colgate, Schenkel 1997; marks: runs")
     return figure
-
-
-def _where_passive(K: Sequence[float] | np.ndarray) -> np.ndarray:
-    K = np.asarray(K, dtype=float)
-    return np.where(np.isfinite(K) & (K > 0.0), K, np.nan)

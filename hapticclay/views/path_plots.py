@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -11,26 +12,17 @@ from matplotlib.patches import Rectangle
 
 from ..model.clay import Clay
 from ..simulation.record import Record
-from .captions import in_math, scenario_parts
+from .captions import clay_text, scenario_parts
+from .palette import CLAY_ALPHA, GREY, clay_color, clay_share
+from .panels import add_legend, draw_path, map_axes, set_title
 from .run_axes import MOST_BORDERS
-from .style import (
-    BLUE,
-    CLAY_ALPHA,
-    GREY,
-    add_legend,
-    clay_color,
-    clay_share,
-    figure_style,
-    map_size,
-    points,
-    set_title,
-    stroke,
-)
+from .style import figure_style, map_size, points, stroke
 
 BEYOND = 1e4  # [cm], past every path
 PICTURE_SIZE = 400  # pixels of a picture of other clay, along x and along y
 
 
+@figure_style()
 def path_plot(record: Record) -> Figure:
     """Plots the path of the handle over a map of the clay (Figs. 7, 9)."""
     p = 100.0 * record.p
@@ -38,52 +30,46 @@ def path_plot(record: Record) -> Figure:
     margin = 0.08 * max(float((high - low).max()), 0.1)
     breadth, depth = high - low + 1.0
     low, high = low - margin, high + margin
-    with figure_style():
-        figure = Figure(figsize=map_size(6.4, 1.0, depth / breadth))
-        ax = figure.add_subplot()
-        across, up = figure.get_figwidth() - stroke(0.9), figure.get_figheight() - stroke(1.3)
-        room = (high - low)[1] * across / up
-        wider = max(0.0, 0.5 * (room - (high - low)[0]))  # axes as wide as the title over them
-        low[0], high[0] = low[0] - wider, high[0] + wider
-        if record.scenario.clay:
-            _clay_map(ax, record.scenario.clay, low, high)
-        ax.plot(p[:, 0], p[:, 1], color=BLUE, label="handle")
-        ax.plot(*p[0], "o", color=BLUE, ms=stroke(5), label="start")
-        ax.plot(*p[-1], "s", color=BLUE, ms=stroke(5), label="end")
-        ax.set(xlabel="position x [cm]", ylabel="position y [cm]", aspect="equal")
-        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        ax.grid(False)
-        add_legend(figure, ax)
-        set_title(ax, *scenario_parts(record.scenario))
+    figure = Figure(figsize=map_size(6.4, 1.0, depth / breadth))
+    ax = figure.add_subplot()
+    across, up = figure.get_figwidth() - stroke(0.9), figure.get_figheight() - stroke(1.3)
+    room = (high - low)[1] * across / up
+    wider = max(0.0, 0.5 * (room - (high - low)[0]))  # axes as wide as the title over them
+    low[0], high[0] = low[0] - wider, high[0] + wider
+    if record.scenario.clay:
+        _clay_map(ax, record.scenario.clay, low, high)
+    draw_path(ax, p, "handle")
+    map_axes(ax, low, high)
+    add_legend(figure)
+    set_title(ax, *scenario_parts(record.scenario))
     return figure
 
 
 def _clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
     """Shades each region of the clay and labels its resistance."""
     for block in clay.blocks:
-        (x0, x1), (y0, y1) = block.x, block.y
-        size = 100.0 * (x1 - x0), 100.0 * (y1 - y0)
-        look: Any = dict(color=clay_color(1.0), alpha=CLAY_ALPHA, lw=0)
-        ax.add_patch(Rectangle((100.0 * x0, 100.0 * y0), *size, **look))
+        _shade(ax, *(100.0 * x for side in (block.x, block.y) for x in side), 1.0)
     edges = [sorted({-BEYOND, BEYOND, *(100.0 * x for x in e)}) for e in clay.edges]
     if "place" in clay.varies or max(map(len, edges)) > MOST_BORDERS:
         _clay_image(ax, clay, low, high)
         return
-    for x0, x1 in zip(edges[0], edges[0][1:], strict=False):
-        for y0, y1 in zip(edges[1], edges[1][1:], strict=False):
-            middle = 0.005 * (x0 + x1), 0.005 * (y0 + y1)
-            share = float(clay_share(clay, *middle))
-            if not share:
-                continue
-            shade: Any = dict(color=clay_color(share), alpha=CLAY_ALPHA, lw=0)
-            ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, **shade))
-            right, bottom = min(x1, high[0]), max(y0, low[1])
-            shown = np.array((right - max(x0, low[0]), min(y1, high[1]) - bottom)) / (high - low)
-            if shown[0] > 0.12 and shown[1] > 0.08:
-                place = np.array((right, bottom)) + (-0.01, 0.01) * (high - low)
-                text: Any = dict(ha="right", va="bottom", fontsize=points(8), color=GREY)
-                told = "\n".join(in_math(x.text()) for x in clay.here(middle))
-                ax.text(place[0], place[1], told, **text)
+    for (x0, x1), (y0, y1) in itertools.product(*map(itertools.pairwise, edges)):
+        middle = 0.005 * (x0 + x1), 0.005 * (y0 + y1)
+        share = float(clay_share(clay, *middle))
+        if not share:
+            continue
+        _shade(ax, x0, x1, y0, y1, share)
+        right, bottom = min(x1, high[0]), max(y0, low[1])
+        shown = np.array((right - max(x0, low[0]), min(y1, high[1]) - bottom)) / (high - low)
+        if shown[0] > 0.12 and shown[1] > 0.08:
+            place = np.array((right, bottom)) + (-0.01, 0.01) * (high - low)
+            text: Any = dict(ha="right", va="bottom", fontsize=points(8), color=GREY)
+            ax.text(*place, "\n".join(clay_text(x.text()) for x in clay.here(middle)), **text)
+
+
+def _shade(ax: Axes, x0: float, x1: float, y0: float, y1: float, share: float) -> None:
+    look: Any = dict(color=clay_color(share), alpha=CLAY_ALPHA, lw=0)
+    ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, **look))
 
 
 def _clay_image(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import style
+from .palette import BLACK, BLUE, CLAY_PALE, GREY, VERMILION
+from .style import styled
 
 SIZE, DPI = (7.2, 3.6), 100.0  # [in], pixels per inch
 FRAME = 1e-3  # [s] that a window gets for its events
@@ -15,35 +16,21 @@ PATH = 600  # points of a path that are drawn
 
 
 class Plan(NamedTuple):
-    """Content of a picture.
+    """Content of a picture, lengths in m."""
 
-    Attributes:
-        joints: shoulder, elbow and handle [m], shape (3, 2).
-        path: of the handle [m], shape (n, 2).
-        line: reference line [m], shape (k, 2); None for none.
-        blocks: of clay, (x, y, width, height) [m]; () for clay everywhere.
-        radius: of the tool [m].
-        close: middle of the closer view and half its side, (x, y, half) [m].
-        title: above the closer view.
-    """
-
-    joints: np.ndarray
-    path: np.ndarray
-    line: np.ndarray | None
-    blocks: Sequence[tuple[float, float, float, float]]
-    radius: float
-    close: tuple[float, float, float]
-    title: str
+    joints: np.ndarray  # shoulder, elbow and handle, shape (3, 2)
+    path: np.ndarray  # of the handle, shape (n, 2)
+    line: np.ndarray | None  # reference line, shape (k, 2); None for none
+    blocks: Sequence[tuple[float, float, float, float]]  # of clay: x, y, width, height; () for all
+    radius: float  # of the tool
+    close: tuple[float, float, float]  # middle of the closer view and half its side, x, y, half
+    title: str  # above the closer view
 
 
 class PlanPicture:
-    """A picture that is redrawn repeatedly.
+    """A picture that is redrawn repeatedly: as an image, or in a window where there is a display.
 
-    Args:
-        window: whether to show it in a window, where matplotlib has a display.
-
-    Attributes:
-        unseen: why there is no window although one was asked for; "" otherwise.
+    `unseen` says why there is no window although one was asked for.
     """
 
     def __init__(self, window: bool):
@@ -51,7 +38,7 @@ class PlanPicture:
         from matplotlib.figure import Figure
 
         self._pyplot, self.unseen = None, ""
-        with style.styled("screen"):
+        with styled("screen"):
             if window:
                 self._pyplot, self._figure, self.unseen = _window()
             if self._pyplot is None:
@@ -60,8 +47,8 @@ class PlanPicture:
             self._axes = self._figure.subplots(1, 2)
 
     def draw(self, plan: Plan) -> np.ndarray | None:
-        """Draws."""
-        with style.styled("screen"):
+        """Draws; returns the picture, or None if the window shows it."""
+        with styled("screen"):
             for ax, closer in zip(self._axes, (False, True), strict=True):
                 ax.clear()
                 _fill(ax, plan, closer)
@@ -112,29 +99,27 @@ def _fill(ax: Any, plan: Plan, closer: bool) -> None:
     unit = 1000.0 if closer else 100.0
     ax.grid(False)
     if not plan.blocks:
-        ax.set_facecolor(style.CLAY_PALE)
+        ax.set_facecolor(CLAY_PALE)
     for x, y, w, h in plan.blocks:
-        ax.add_patch(
-            Rectangle((unit * x, unit * y), unit * w, unit * h, color=style.CLAY_PALE, lw=0)
-        )
+        size = unit * w, unit * h
+        ax.add_patch(Rectangle((unit * x, unit * y), *size, color=CLAY_PALE, lw=0))
     if plan.blocks:
         for point in plan.path[-PATH:]:  # the removed clay
             ax.add_patch(Circle(unit * point, unit * plan.radius, color=ax.get_facecolor(), lw=0))
     if plan.line is not None:
-        ax.plot(*(unit * plan.line.T), color=style.BLACK, lw=1.0, ls="--", label="line")
-    ax.plot(*(unit * plan.path[-PATH:].T), color=style.BLUE, lw=1.6, label="path")
+        ax.plot(*(unit * plan.line.T), color=BLACK, lw=1.0, ls="--", label="line")
+    ax.plot(*(unit * plan.path[-PATH:].T), color=BLUE, lw=1.6, label="path")
     if closer:
         x, y, half = plan.close
         ax.set(xlim=(unit * (x - half), unit * (x + half)))
         ax.set(ylim=(unit * (y - half), unit * (y + half)), xlabel="x [mm]", ylabel="y [mm]")
-        ax.add_patch(
-            Circle(unit * plan.joints[2], unit * plan.radius, fill=False, color=style.VERMILION)
-        )
+        tool = Circle(unit * plan.joints[2], unit * plan.radius, fill=False, color=VERMILION)
+        ax.add_patch(tool)
         ax.set_title(plan.title, fontsize=9)
     else:
-        ax.plot(*(unit * plan.joints.T), color=style.GREY, lw=3.0, solid_capstyle="round")
-        ax.plot(*(unit * plan.joints[0]), "o", color=style.BLACK, ms=8)
-        ax.plot(*(unit * plan.joints[1:].T), "o", color=style.BLACK, ms=5)
+        ax.plot(*(unit * plan.joints.T), color=GREY, lw=3.0, solid_capstyle="round")
+        ax.plot(*(unit * plan.joints[0]), "o", color=BLACK, ms=8)
+        ax.plot(*(unit * plan.joints[1:].T), "o", color=BLACK, ms=5)
         ax.set(xlim=(-40, 18), ylim=(-30, 28), xlabel="x [cm]", ylabel="y [cm]")
         ax.set_title("shoulder, elbow, handle", fontsize=9)
     ax.set_aspect("equal")

@@ -11,17 +11,9 @@ from ..errors import ParameterError, choice
 from ..model.constants import AXES
 from ..simulation.record import Record, port_energy
 from . import path_plots, run_axes, run_figures, run_plots
-from .style import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    VERMILION,
-    add_legend,
-    figure_size,
-    figure_style,
-    set_title,
-    stroke,
-)
+from .palette import BLUE, GREEN, ORANGE, VERMILION
+from .panels import add_legend, set_title, single
+from .style import figure_style, stroke
 
 AXIS_CHOICES = (*AXES, "xy")
 OVER_CHOICES = ("time", "position")
@@ -34,9 +26,6 @@ class RecordPlots:
     paper's figures.
 
     Args:
-        record: the run.
-
-    Attributes:
         record: the run.
     """
 
@@ -58,10 +47,8 @@ class RecordPlots:
     def velocity(self, axis: str | None = None) -> Figure:
         """Velocity over position, with the expected steady speeds (Fig. 8, top; Fig. 10)."""
         record = self._sampled()
-        axis = (
-            choice("axis", axis, AXIS_CHOICES) if axis else run_figures.shown_axes(record.scenario)
-        )
-        return _with_picture(run_plots.velocity_plot(record, axis))
+        axis = axis or run_figures.shown_axes(record.scenario)
+        return _with_picture(run_plots.velocity_plot(record, choice("axis", axis, AXIS_CHOICES)))
 
     def force(self, axis: str | None = None, over: str | None = None) -> Figure:
         """The forces of hand and clay: their ratio to the velocity over position (Fig. 8, bottom).
@@ -71,7 +58,7 @@ class RecordPlots:
         """
         record = self._sampled()
         s = record.scenario
-        axis = choice("axis", axis, AXES) if axis else run_axes.main_axis(s)
+        axis = choice("axis", axis or run_axes.main_axis(s), AXES)
         if over or s.muscle is not None or (s.clay and not s.clay.viscous):
             over = choice("over", over or "time", OVER_CHOICES)
             return _with_picture(run_plots.maneuver_plot([record], axis, over))
@@ -115,6 +102,7 @@ def energies(record: Record) -> dict[str, np.ndarray]:
     }
 
 
+@figure_style()
 def energy_plot(record: Record) -> Figure:
     """Plots `energies` over time, and as dots the run's own energy balance.
 
@@ -126,20 +114,16 @@ def energy_plot(record: Record) -> Figure:
         "clay": (BLUE, "-", "taken by the clay"),
         "kinetic": (VERMILION, "--", "kinetic, of the arm"),
     }
-    found = energies(record)
-    with figure_style():
-        figure = Figure(figsize=figure_size(1, 3.6))
-        ax = figure.add_subplot()
-        for name, (color, style, label) in looks.items():
-            ax.plot(record.t, found[name], color=color, ls=style, label=label)
-        if total := _added_up(record):
-            label = "added up by the run"
-            for name, value in total.items():
-                ax.plot(record.t[-1], value, "o", color=looks[name][0], ms=stroke(5.0), label=label)
-                label = "_"
-        ax.set(xlabel="time [s]", ylabel="energy [J]")
-        add_legend(figure, ax, ncols=3)
-        set_title(ax, record.scenario.name, record.status)
+    figure, ax = single(3.6)
+    for name, values in energies(record).items():
+        color, dash, label = looks[name]
+        ax.plot(record.t, values, color=color, ls=dash, label=label)
+    for name, value in _added_up(record).items():
+        look = dict(color=looks[name][0], ms=stroke(5.0), label="added up by the run")
+        ax.plot(record.t[-1], value, "o", **look)
+    ax.set(xlabel="time [s]", ylabel="energy [J]")
+    add_legend(figure, 3)
+    set_title(ax, record.scenario.name, record.status)
     return figure
 
 
@@ -155,10 +139,10 @@ def _added_up(record: Record) -> dict[str, float]:
 def _with_picture(figure: Figure) -> Figure:
     """The figure, displayed by a notebook without pyplot."""
 
+    @figure_style()
     def picture() -> bytes:
         file = io.BytesIO()
-        with figure_style():
-            figure.savefig(file, format="png")
+        figure.savefig(file, format="png")
         return file.getvalue()
 
     figure._repr_png_ = picture  # type: ignore[attr-defined]

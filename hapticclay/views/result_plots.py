@@ -7,46 +7,34 @@ from matplotlib.figure import Figure
 
 from ..theory.design import Design
 from ..theory.impedance import Impedance
-from .style import BLACK, BLUE, figure_size, figure_style, set_title, stroke, unit_text
+from .impedance_plots import parts_panels
+from .palette import BLUE
+from .panels import label_axes, level, set_title, stacked
+from .style import figure_style
 
 DESIGN_OMEGA = np.geomspace(0.1, 1000.0, 500)  # [rad/s]
 
 
+@figure_style()
 def effective_parts_plot(found: Impedance) -> Figure:
     """Plots effective stiffness, damping and mass over frequency."""
-    panels = [
-        (label, y)
-        for label, y in (
-            ("stiffness [N/m]", found.stiffness),
-            ("damping [N.s/m]", found.damping),
-            ("mass [kg]", found.mass),
-        )
-        if np.isfinite(y).any()
-    ]
-    with figure_style():
-        figure = Figure(figsize=figure_size(1, 1.0 + 1.7 * len(panels)))
-        axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-        for ax, (label, y) in zip(axes, panels, strict=True):
-            ax.semilogx(found.frequency, y, color=BLUE)
-            ax.set_ylabel(unit_text(label))
-        axes[-1].set_xlabel(unit_text("frequency [Hz]"))
-        figure.align_ylabels(list(axes))
-        set_title(axes[0], "impedance that the hand feels")
+    figure, panels = parts_panels([found])
+    for part, ax in panels.items():
+        ax.plot(found.frequency, getattr(found, part), color=BLUE)
+    set_title(figure.axes[0], "impedance that the hand feels")
     return figure
 
 
+@figure_style()
 def design_plot(design: Design) -> Figure:
     """Plots magnitude and phase of the compensator K C."""
     s, c = 1j * DESIGN_OMEGA, design.compensator
     response = design.K * np.polyval(c.num, s) / np.polyval(c.den, s)
-    with figure_style():
-        figure = Figure(figsize=figure_size(1, 4.4))
-        top, low = figure.subplots(2, 1, sharex=True)
-        top.loglog(DESIGN_OMEGA, np.abs(response), color=BLUE)
-        low.semilogx(DESIGN_OMEGA, np.degrees(np.unwrap(np.angle(response))), color=BLUE)
-        low.axhline(-180.0, color=BLACK, lw=stroke(0.8))
-        top.set_ylabel(unit_text("magnitude of K C [m/N]"))
-        low.set(xlabel=unit_text("frequency [rad/s]"), ylabel="phase [degrees]")
-        figure.align_ylabels([top, low])
-        set_title(top, design.headline())
+    figure, (top, low) = stacked(2, 4.4)
+    top.loglog(DESIGN_OMEGA, np.abs(response), color=BLUE)
+    low.semilogx(DESIGN_OMEGA, np.degrees(np.unwrap(np.angle(response))), color=BLUE)
+    level(low, -180.0)
+    label_axes(top, y="magnitude of K C [m/N]")
+    label_axes(low, "frequency [rad/s]", "phase [degrees]")
+    set_title(top, design.headline())
     return figure

@@ -1,8 +1,9 @@
-"""Axes over the position: the clay shaded, expected speeds, where clay held the handle."""
+"""Axes over the position: the clay shaded, expected values, where clay held the handle."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,51 +16,18 @@ from ..model.signals import Multisine
 from ..model.smooth import Smooth
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
-from .style import (
-    ORANGE,
-    SHADED,
-    VERMILION,
-    figure_size,
-    panel_grid,
-    shade_clay,
-    stroke,
-)
+from .palette import CLAY_ALPHA, ORANGE, SHADED, clay_color
+from .panels import side_by_side
+from .style import stroke
 
 MOST_BORDERS = 20  # of clay that is drawn region by region
-SHADES = 100  # of smooth clay along a path
+MOST_SHADES = 100  # of smooth clay along a path
 MOST_DOTS = 20_000  # of a kind in a plot
 
 
-def spread(where: np.ndarray, most: int) -> np.ndarray:
+def spread(where: np.ndarray, most: int = MOST_DOTS) -> np.ndarray:
     """Evenly spaced selection of indices, at most a given number."""
     return where[:: -(-len(where) // most) or 1]
-
-
-def expected_speeds(ax: Axes, record: Record, axis: str) -> None:
-    """Draws the expected steady speed over each stretch of the path."""
-    i, label = AXES.index(axis), "expected, steady"
-    pieces = record.stretches(axis)
-    for piece in pieces if len(pieces) <= MOST_BORDERS else pieces[:3]:
-        speed, x = record.expected_speed(axis, piece), 100.0 * record.p[piece, i]
-        if speed is not None and math.isfinite(speed):
-            look: Any = dict(color=VERMILION, ls="--", lw=stroke(1.4), label=label)
-            ax.plot([x.min(), x.max()], [speed] * 2, **look)
-            label = "_"
-
-
-def mark_held(ax: Axes, record: Record, i: int, y: np.ndarray) -> None:
-    """Marks where clay held the handle, on a curve over the position."""
-    some = spread(np.flatnonzero(record.held()[:, i]), MOST_DOTS)
-    if len(some):
-        look: Any = dict(color=ORANGE, ms=stroke(5), mew=0, zorder=4, label="held still")
-        ax.plot(100.0 * record.p[some, i], y[some], "o", **look)
-
-
-def held_spans(record: Record, axis: str) -> list[tuple[float, float]]:
-    """Times at which clay held an axis, (begin, end) [s]."""
-    end = float(record.t[-1])
-    stops = [x for x in record.stops if axis in x.axis]
-    return [(x.start, end if x.end is None else x.end) for x in stops]
 
 
 def is_viscous(s: Scenario) -> bool:
@@ -69,20 +37,17 @@ def is_viscous(s: Scenario) -> bool:
 
 def main_axis(s: Scenario) -> str:
     """The axis along which the operator pushes most."""
-    size = s.force
+    size = np.abs(s.force)
     if isinstance(s.muscle, Multisine):
-        size = s.muscle.rms
+        size = np.abs(s.muscle.rms)
     elif s.muscle is not None:
-        x, y = np.abs(s.muscle(np.linspace(0.0, s.t_max, 501)) + s.force).max(axis=0)
-        size = float(x), float(y)
-    return "y" if abs(size[1]) > abs(size[0]) else "x"
+        size = np.abs(s.muscle(np.linspace(0.0, s.t_max, 501)) + s.force).max(axis=0)
+    return "y" if size[1] > size[0] else "x"
 
 
 def position_axes(record: Record, axes: str) -> tuple[Figure, list[Axes]]:
     """A panel over the position along each axis, the clay shaded."""
-    rows, columns = panel_grid(len(axes))
-    figure = Figure(figsize=figure_size(columns, 3.6 * rows))
-    panels = list(figure.subplots(rows, columns, squeeze=False).ravel())
+    figure, panels = side_by_side(len(axes), 3.6)
     for name, ax in zip(axes, panels, strict=True):
         x = 100.0 * record.p[:, AXES.index(name)]
         low, high = float(x.min()), float(x.max())
@@ -90,6 +55,45 @@ def position_axes(record: Record, axes: str) -> tuple[Figure, list[Axes]]:
         shade_clay(ax, *shades(record, name))
         ax.set(xlabel=f"position {name} [cm]", xlim=(low - margin, high + margin))
     return figure, panels
+
+
+def draw_stretches(
+    ax: Axes, record: Record, i: int, expected: Callable[[np.ndarray], Any], **look: Any
+) -> None:
+    """Draws the value expected of each stretch of the path, if there is one."""
+    pieces = record.stretches(AXES[i])
+    if len(pieces) > MOST_BORDERS:  # an unstable run that chatters over a border
+        pieces = pieces[:3]
+    for piece in pieces:
+        x, y = 100.0 * record.p[piece, i], expected(piece)
+        if y is None or not np.isfinite(y).any():
+            continue
+        if np.ptp(y) == 0.0:
+            x, y = [x.min(), x.max()], [np.max(y)] * 2
+        ax.plot(x, y, lw=stroke(1.4), zorder=3, **look)
+
+
+def mark_held(ax: Axes, record: Record, i: int, y: np.ndarray) -> None:
+    """Marks where clay held the handle, on a curve over the position."""
+    held = spread(np.flatnonzero(record.held()[:, i]))
+    if len(held):
+        look: Any = dict(color=ORANGE, ms=stroke(5), mew=0, zorder=4, label="held still")
+        ax.plot(100.0 * record.p[held, i], y[held], "o", **look)
+
+
+def held_spans(record: Record, axis: str) -> list[tuple[float, float]]:
+    """Times at which clay held an axis, (begin, end) [s]."""
+    end = float(record.t[-1])
+    stops = [x for x in record.stops if axis in x.axis]
+    return [(x.start, end if x.end is None else x.end) for x in stops]
+
+
+def shade_clay(ax: Axes, edges: Sequence[float], forces: Sequence[float]) -> None:
+    """Shades the intervals of the x axis with clay, darker where it is harder to cut."""
+    for (low, high), force in zip(pairwise((-1.0, *edges, 1.0)), forces, strict=False):
+        if force > 0.0:
+            look: Any = dict(color=clay_color(force / max(forces)), alpha=CLAY_ALPHA, lw=0)
+            ax.axvspan(100.0 * low, 100.0 * high, label="clay", **look)
 
 
 def shades(record: Record, axis: str) -> tuple[list[float], list[float]]:
@@ -101,26 +105,12 @@ def shades(record: Record, axis: str) -> tuple[list[float], list[float]]:
     if spans and not law.some.any():
         return list(spans[0]), [0.0, 1.0, 0.0]
     if isinstance(law, Profile):
-        seen = law.along == axis
-        return list(law.edges) * seen, law.forces(clay.kinds, *SHADED).ravel().tolist() * seen
+        varies = law.along == axis
+        return list(law.edges) * varies, law.forces(clay.kinds, *SHADED).ravel().tolist() * varies
     x, first = np.unique(record.p[:, i], return_index=True)
-    if isinstance(law, Smooth) and len(x) > SHADES:
-        near = np.searchsorted(x, np.linspace(x[0], x[-1], SHADES))
+    if isinstance(law, Smooth) and len(x) > MOST_SHADES:
+        near = np.searchsorted(x, np.linspace(x[0], x[-1], MOST_SHADES))
         x, first = x[near], first[near]
-    x_met, y_met = record.p[first].T
-    force = law.forces_at(clay.kinds, x_met, y_met, *SHADED)
+    force = law.forces_at(clay.kinds, *record.p[first].T, *SHADED)
     change = np.flatnonzero(np.diff(force))
     return (0.5 * (x[change] + x[change + 1])).tolist(), force[[*change, -1]].tolist()
-
-
-def steps_of_law(ax: Axes, record: Record, i: int, law: Any, **look: Any) -> None:
-    """Draws law(b) over each stretch of the path with constant b."""
-    pieces = record.stretches(AXES[i])
-    if len(pieces) > MOST_BORDERS:  # an unstable run that chatters over a border
-        pieces = pieces[:3]
-    for piece in pieces:
-        x, b = 100.0 * record.p[piece, i], record.b[piece, i]
-        constant = np.ptp(b) == 0.0
-        x, y = ([x.min(), x.max()], [law(float(b[0]))] * 2) if constant else (x, law(b))
-        ax.plot(x, y, lw=stroke(1.4), zorder=3, **look)
-        look["label"] = "_"

@@ -23,7 +23,7 @@ from .run_plots import force_ratio_plot, maneuver_plot, velocity_plot
 
 
 def _clay_along_both_axes(s: Scenario) -> bool:
-    return s.clay is not None and s.clay.along == AXES[0] + AXES[1]
+    return s.clay is not None and s.clay.along == "xy"
 
 
 def shown_axes(s: Scenario) -> str:
@@ -56,14 +56,14 @@ def _path(record: Record) -> Figure | None:
 
 def _force_position(record: Record) -> Figure | None:
     s = record.scenario
-    some = s.muscle is not None or record.ground is not None
-    return maneuver_plot([record], main_axis(s), "position") if some else None
+    applies = s.muscle is not None or record.ground is not None
+    return maneuver_plot([record], main_axis(s), "position") if applies else None
 
 
 def _force_velocity(record: Record) -> Figure | None:
     clay = record.scenario.clay
-    told = clay is not None and clay.of_velocity and not clay.viscous
-    return force_velocity_plot(record) if told and len(record.t) else None
+    applies = clay is not None and clay.of_velocity and not clay.viscous
+    return force_velocity_plot(record) if applies and len(record.t) else None
 
 
 def _ground(record: Record) -> Figure | None:
@@ -94,17 +94,11 @@ def _cells(record: Record) -> dict[str, dict[str, Any]]:
 
 
 class RunFigure(NamedTuple):
-    """A figure of a run.
+    """A figure of a run: how it is drawn, and the numbers that it shows."""
 
-    Attributes:
-        draw: returns the figure for a record, or None if it does not apply.
-        columns: columns of the record that it shows.
-        tables: other numbers that it shows, by the name of their table and of their column.
-    """
-
-    draw: Callable[[Record], Figure | None]
-    columns: tuple[str, ...]
-    tables: Callable[[Record], dict[str, dict[str, Any]]] = lambda _: {}
+    draw: Callable[[Record], Figure | None]  # None if it does not apply
+    columns: tuple[str, ...]  # of the record
+    tables: Callable[[Record], dict[str, dict[str, Any]]] = lambda _: {}  # by table and column
 
 
 FIGURES = {
@@ -129,14 +123,14 @@ def record_figures(record: Record) -> dict[str, shown.Figure]:
     }
 
 
-def run_tables(record: Record, name: str) -> dict[str, dict[str, Any]]:
+def run_tables(record: Record, figure: str) -> dict[str, dict[str, Any]]:
     """Returns the numbers that a figure of FIGURES shows."""
     samples: dict[str, Any] = {"time [s]": record.t}
-    for part in FIGURES[name].columns:
+    for part in FIGURES[figure].columns:
         for i, axis in enumerate(AXES):
-            word = axis if part == "p" else f"{part}_{axis}"
-            samples[f"{word} [{COLUMN_UNITS[part]}]"] = getattr(record, part)[:, i]
-    return {"samples": samples, **FIGURES[name].tables(record)}
+            name = axis if part == "p" else f"{part}_{axis}"
+            samples[f"{name} [{COLUMN_UNITS[part]}]"] = getattr(record, part)[:, i]
+    return {"samples": samples, **FIGURES[figure].tables(record)}
 
 
 def figure_files(folder: Path) -> set[Path]:

@@ -11,43 +11,28 @@ from matplotlib.figure import Figure
 
 from ..model.constants import AXES
 from ..simulation.record import Record
-from .flow_plots import flows_met, law_curve
-from .run_axes import held_spans, is_viscous, shades
-from .style import (
-    BLUE,
-    GREEN,
-    GREY,
-    VERMILION,
-    along_motion,
-    figure_style,
-    shade_clay,
-    shade_held,
-    stroke,
-)
+from .flow_plots import draw_laws, flows_met
+from .motion import resolved
+from .palette import BLUE, GREEN, GREY, VERMILION
+from .panels import shade_held
+from .run_axes import held_spans, is_viscous, shade_clay, shades
+from .style import figure_style, stroke
 
 FILM_DPI = 100
+TEXT_SIZE = 7.5  # [points]
 LEAST_PANEL = (120, 100)  # width and height [pixels] that the numbers of a running plot need
 ROOMY_PANEL = (180, 110)  # ... and the names of its axes
+LEGEND_WIDTH = 230  # [pixels] from which a legend fits beside the title
 
 
 class Panel(NamedTuple):
-    """A running plot.
+    """A running plot, with names that fit its size."""
 
-    Attributes:
-        x: of its curves, shape (n,); NaN where they break.
-        y_range: least range of the y axis.
-        labels: labels of x and y, drawn where there is room.
-        title: where there is room for labels.
-        short: title used without labels.
-        curves: (y, colour) of each curve.
-    """
-
-    x: np.ndarray
-    y_range: np.ndarray
-    labels: tuple[str, str]
+    x: np.ndarray  # of its curves; NaN where they break
+    y_range: np.ndarray  # values that the y axis spans
+    labels: tuple[str, str]  # of x and y
     title: str
-    short: str
-    curves: tuple[tuple[np.ndarray, str], ...]
+    curves: tuple[tuple[np.ndarray, str, str], ...]  # y, colour, name in the legend
 
 
 def plots_fit(width: int, height: int) -> bool:
@@ -73,84 +58,85 @@ class RunningPlots:
                 (line,) = ax.plot([], [], color=color, lw=stroke(1.4))
             self._curves.append((line, known, x[known], y[known]))
 
+    @figure_style()
     def draw(self, n: int) -> np.ndarray:
         """Draws the first samples of the run."""
         self._canvas.restore_region(self._axes)
         for line, known, x, y in self._curves:
             end = int(np.searchsorted(known, n))
-            with figure_style():
-                line.set_data(x[:end], y[:end])
-                line.axes.draw_artist(line)
+            line.set_data(x[:end], y[:end])
+            line.axes.draw_artist(line)
         return np.asarray(self._canvas.buffer_rgba())[..., :3]
 
 
+@figure_style(font_size=TEXT_SIZE, lines_linewidth=1.0)
 def running_figure(
     record: Record, width: int, height: int
 ) -> tuple[Figure, list[tuple[Axes, np.ndarray, np.ndarray, str]]]:
-    """Draws the axes of the running plots."""
+    """Draws the axes of the running plots, with a legend where there is room for it."""
     count = max(1, min(3, height // LEAST_PANEL[1]))
     roomy = width >= ROOMY_PANEL[0] and height >= ROOMY_PANEL[1] * count
     i = int(np.ptp(record.p[:, 1]) > 1.2 * np.ptp(record.p[:, 0]))
     plans = _running_panels(record, i, roomy)[:count]
-    with figure_style(font_size=7.5, lines_linewidth=1.0):
-        figure = Figure(figsize=(width / FILM_DPI, height / FILM_DPI), dpi=FILM_DPI)
-        panels: Any = figure.subplots(count, 1, squeeze=False)[:, 0]
-        for ax, plan in zip(panels, plans, strict=True):
-            ax.set(xlim=_limits(plan.x), ylim=_limits(plan.y_range))
-            ax.set_xlabel(plan.labels[0], labelpad=1)
-            ax.set_ylabel(plan.labels[1] if roomy else "", labelpad=2)
-            title = plan.title if roomy else plan.short
-            ax.set_title(title, fontsize=7.5, color=GREY, pad=2, loc="left")
-        viscous = is_viscous(record.scenario)
-        for ax in panels[: 2 if viscous else 1]:
-            shade_clay(ax, *shades(record, AXES[i]))
-        for ax in panels[1:2]:
-            _running_laws(ax, record, i)
-        for ax in panels[2:]:
-            shade_held(ax, held_spans(record, AXES[i]))
-        b = np.unique(record.b[:, i])
-        for value in b[b > 0.0] if len(b) <= 4 and len(panels) > 1 and viscous else ():
-            panels[1].axhline(value, color=VERMILION, ls="--", lw=stroke(0.9))
-            at: Any = dict(xycoords=("axes fraction", "data"), textcoords="offset points")
-            panels[1].annotate("b", (1.0, value), (-2, 2), color=VERMILION, ha="right", **at)
-        canvas = FigureCanvasAgg(figure)
-        figure.draw_without_rendering()  # fixes the ticks and the space that they need
-        canvas.draw()
+    figure = Figure(figsize=(width / FILM_DPI, height / FILM_DPI), dpi=FILM_DPI)
+    panels: Any = figure.subplots(count, 1, squeeze=False)[:, 0]
+    for ax, plan in zip(panels, plans, strict=True):
+        ax.set(xlim=_limits(plan.x), ylim=_limits(plan.y_range))
+        ax.set_xlabel(plan.labels[0], labelpad=1)
+        ax.set_ylabel(plan.labels[1], labelpad=2)
+        ax.set_title(plan.title, fontsize=TEXT_SIZE, color=GREY, pad=2, loc="left")
+        for _, color, name in plan.curves:
+            ax.plot([], [], color=color, lw=stroke(1.4), label=name)
+    viscous = is_viscous(record.scenario)
+    for ax in panels[: 2 if viscous else 1]:
+        shade_clay(ax, *shades(record, AXES[i]))
+    for ax in panels[1:2]:
+        _running_laws(ax, record, i)
+    for ax in panels[2:]:
+        shade_held(ax, held_spans(record, AXES[i]))
+    for ax in panels if width >= LEGEND_WIDTH else ():
+        entries = dict(zip(*ax.get_legend_handles_labels()[::-1], strict=True))
+        place: Any = dict(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
+        place |= dict(borderpad=0.15, handlelength=1.3, columnspacing=1.0, handletextpad=0.5)
+        if entries:
+            ax.legend(entries.values(), entries, ncols=len(entries), fontsize=TEXT_SIZE, **place)
+    canvas = FigureCanvasAgg(figure)
+    figure.draw_without_rendering()  # fixes the ticks and the space that they need
+    canvas.draw()
     both = zip(panels, plans, strict=True)
-    return figure, [(ax, plan.x, y, color) for ax, plan in both for y, color in plan.curves]
+    return figure, [(ax, plan.x, y, color) for ax, plan in both for y, color, _ in plan.curves]
 
 
 def _running_panels(r: Record, i: int, roomy: bool) -> tuple[Panel, ...]:
-    axis = AXES[i]
+    axis, clay = AXES[i], r.scenario.clay
     x, v, fe, fh = 100.0 * r.p[:, i], r.v[:, i], r.fe[:, i], r.fh[:, i]
-    top = max(float(r.b[:, i].max(initial=0.0)), 1.0)
-    ratio = np.clip(r.ratio(r.fe)[:, i], -top, 2.0 * top)  # 0/0 as a run begins or turns
+
+    def panel(x: Any, y_range: Any, over: str, name: str, title: str, *curves: Any) -> Panel:
+        """Where there is no room, the title names the y axis."""
+        labels = (over, name) if roomy else (over.replace("position ", "").replace("time", "t"), "")
+        return Panel(x, y_range, labels, title if roomy else name, curves)
+
+    where = f"position {axis} [cm]"
+    if is_viscous(r.scenario):
+        top = max(float(r.b[:, i].max(initial=0.0)), 1.0)
+        ratio = np.clip(r.ratio(r.fe)[:, i], -top, 2.0 * top)  # 0/0 as a run begins or turns
+        share = np.array((0.0, 1.25 * top))
+        second = panel(x, share, where, "f$_e$/v [N·s/m]", "", (ratio, BLUE, "f$_e$/v"))
+    elif clay is not None and clay.of_velocity:
+        u, force = _over_velocity(r, i)
+        over = "v along the motion [m/s]" if clay.along_motion else f"v$_{axis}$ [m/s]"
+        over = over if roomy else over.replace(" along the motion", "")
+        second = panel(u, np.append(force, 0.0), over, "clay f$_e$ [N]", "", (force, BLUE, "f$_e$"))
+    else:
+        second = panel(x, np.append(fe, 0.0), where, "clay f$_e$ [N]", "", (fe, BLUE, "f$_e$"))
     usual = np.percentile(np.concatenate((fh, fe)), (1.0, 99.0))  # not the spike at a border
-    where, when = (f"position {axis} [cm]", "time [s]") if roomy else (f"{axis} [cm]", "t [s]")
-    speed, share = f"v$_{axis}$ [m/s]", "f$_e$/v [N$\\cdot$s/m]"
-    force_curves = ((fh, GREEN), (fe, BLUE))
-    second = Panel(x, np.array((0.0, 1.25 * top)), (where, share), "", share, ((ratio, BLUE),))
-    told = "clay f$_e$ [N]"
-    clay = r.scenario.clay
-    if clay and not clay.of_velocity:
-        second = Panel(x, np.append(fe, 0.0), (where, told), "", told, ((fe, BLUE),))
-    elif clay and not clay.viscous:
-        u, along = _over_velocity(r, i)
-        over = speed
-        if clay.along_motion:
-            over = "v along the motion [m/s]" if roomy else "v [m/s]"
-        second = Panel(u, np.append(along, 0.0), (over, told), "", told, ((along, BLUE),))
+    hand, by_clay = ("operator f$_h$", "clay f$_e$") if roomy else ("f$_h$", "f$_e$")
+    forces = (fh, GREEN, hand), (fe, BLUE, by_clay)
+    name = f"v$_{axis}$ [m/s]"
     return (
-        Panel(x, v, (where, f"velocity {speed}"), r.scenario.name, speed, ((v, BLUE),)),
+        panel(x, v, where, name, r.scenario.name, (v, BLUE, f"v$_{axis}$")),
         second,
-        Panel(
-            r.t,
-            np.append(1.15 * usual, 0.0),
-            (when, "force [N]"),
-            f"operator f$_h$, clay f$_e${'; shaded: held still' if r.stops else ''}",
-            "f$_h$, f$_e$ [N]",
-            force_curves,
-        ),
+        panel(r.t, np.append(1.15 * usual, 0.0), "time [s]", "force [N]", "", *forces),
     )
 
 
@@ -158,29 +144,25 @@ def _over_velocity(r: Record, i: int) -> tuple[np.ndarray, np.ndarray]:
     """Velocity and force of the clay, along the motion if it resists along it; NaN in free air."""
     clay = r.scenario.clay
     assert clay is not None
-    v, fe = along_motion(r.v, r.fe, i) if clay.along_motion else (r.v[:, i], r.fe[:, i])
-    law = clay.laws[i]
+    (v, fe), law = resolved(clay, r.v, r.fe, i), clay.laws[i]
     return np.where(law.some[law.index(*r.p.T)], v, np.nan), fe
 
 
 def _running_laws(ax: Axes, r: Record, i: int) -> None:
-    """Draws the laws of yielding clay over the velocity, if they apply to one axis alone."""
-    clay = r.scenario.clay
-    if (
-        clay is None
-        or clay.viscous
-        or not clay.of_velocity
-        or clay.varies
-        or clay.angle
-        or (clay.along_motion and not np.array_equal(r.b[:, 0], r.b[:, 1]))
-        or len(flows_met(r, i)) > 4
-    ):
+    """Draws b of viscous clay, or the laws of yielding clay over the velocity, if they are few."""
+    clay, b = r.scenario.clay, np.unique(r.b[:, i])
+    if clay is None:
         return
-    v, fe = _over_velocity(r, i)
-    for flow, where in flows_met(r, i).items():
-        back = fe[where].min() < -0.01 * flow.Fy
-        x, y = law_curve(flow, min(float(v[where].min()), 0.0), float(v[where].max()), back)
-        ax.plot(x, y, color=VERMILION, ls="--", lw=stroke(0.9))
+    if clay.viscous:
+        for value in b[b > 0.0] if len(b) <= 4 else ():
+            ax.axhline(value, color=VERMILION, ls="--", lw=stroke(0.9), label="b")
+    elif (
+        clay.of_velocity
+        and not (clay.varies or clay.angle)
+        and not (clay.along_motion and not np.array_equal(r.b[:, 0], r.b[:, 1]))
+        and len(met := flows_met(r, i)) <= 4
+    ):
+        draw_laws(ax, met, *_over_velocity(r, i), 0.9)
 
 
 def _limits(values: np.ndarray) -> tuple[float, float]:

@@ -3,32 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from ..studies.stability_map import StabilityMap
-from .style import (
-    BLACK,
-    CURVE_STYLES,
-    GREY,
-    LIGHT_GREY,
-    UNSTABLE,
-    VERMILION,
-    WHITE,
+from .captions import loop_parts
+from .palette import BLACK, GREY, LIGHT_GREY, UNSTABLE, WHITE
+from .panels import (
     add_legend,
-    figure_size,
-    figure_style,
-    hand_name,
-    points,
+    curve_look,
+    hollow,
+    label_axes,
+    mark,
+    plain_ticks,
+    positive,
+    ring,
     set_title,
-    stroke,
-    unit_text,
+    single,
 )
+from .style import figure_style, points, stroke
 
 X_SCALES = {  # of the x axis: factor, unit of the data, unit shown
     "delay-damping": (1e3, "[s]", "[ms]"),
@@ -42,6 +37,7 @@ CELL_MARKS: Any = {
 BOUNDARY_MARKS: Any = (dict(marker="o", mfc=BLACK), dict(marker="D", mfc=WHITE))
 
 
+@figure_style()
 def stability_map_plot(chart: StabilityMap) -> Figure:
     """Plots a map of stability.
 
@@ -50,50 +46,41 @@ def stability_map_plot(chart: StabilityMap) -> Figure:
     linear loop of these runs is unstable.
     """
     factor, unit, shown = X_SCALES.get(chart.kind, (1.0, "", ""))
-    with figure_style():
-        figure = Figure(figsize=figure_size(1, 6.0, 7.4))
-        ax = figure.add_subplot()
-        ax.set_yscale("log")
-        if chart.kind != "gain-pose":
-            ax.set_xscale("log")
-
-        def mark(x: Sequence[float], y: Any, **look: Any) -> None:
-            ax.plot(factor * np.array(x), y, ls="none", **look)
-
-        low, high = _map_span(chart)
-        for (name, (x, y)), (color, style) in zip(chart.lines.items(), CURVE_STYLES, strict=False):
-            look: Any = dict(color=color, ls=style, label=name)
-            if x[0] == x[-1]:  # upright: it does not end where the cells do
-                ax.axvline(factor * x[0], **look)
-            else:
-                ax.plot(factor * np.array(x), _positive(y), **look)
-        if chart.limit:
-            x, y = chart.lines[chart.limit]
-            beyond = np.clip(y, low, high)
-            hatched = UNSTABLE | {"edgecolor": LIGHT_GREY}  # behind marks and lines
-            ax.fill_between(factor * np.array(x), beyond, high, zorder=0, **hatched)
-        for name, look in CELL_MARKS.items():
-            if mine := [c for c in chart.cells if c.simulated == name]:
-                look = dict(look, color=GREY, ms=stroke(6), mew=stroke(1.2), label=f"run: {name}")
-                mark([c.x for c in mine], [c.y for c in mine], **look)
-        if wrong := [c for c in chart.cells if c.cause]:
-            look = dict(marker="o", mfc="none", color=VERMILION, ms=stroke(13), mew=stroke(1.5))
-            label = "differs from the nominal continuous loop"
-            mark([c.x for c in wrong], [c.y for c in wrong], label=label, **look)
-        for (name, (x, y)), look in zip(chart.found.items(), BOUNDARY_MARKS, strict=False):
-            label = name.replace("runs", "boundary found by runs")
-            mark(x, _positive(y), color=BLACK, ms=stroke(7), zorder=5, label=label, **look)
-        found = [(a, b) for x, y in chart.found.values() for a, b in zip(x, y, strict=True)]
-        if beyond := [a for a, b in found if b > high]:
-            look = dict(transform=ax.get_xaxis_transform(), clip_on=False, zorder=5, marker="^")
-            label = "runs: stable up to here"
-            mark(beyond, [1.0] * len(beyond), color=BLACK, ms=stroke(8), label=label, **look)
-        ax.set_ylim(low, high)
-        _log_ticks(ax, chart)
-        x_name = chart.x_name.replace(unit, shown) if unit else chart.x_name
-        ax.set(xlabel=unit_text(x_name), ylabel=unit_text(chart.y_name))
-        add_legend(figure, ax, 2, fontsize=points(9))
-        set_title(ax, *_map_parts(chart), pad=10.0)  # over the triangles
+    figure, ax = single(6.0, 7.4)
+    ax.set(yscale="log", xscale="linear" if chart.kind == "gain-pose" else "log")
+    low, high = _map_span(chart)
+    for i, (name, (x, y)) in enumerate(chart.lines.items()):
+        if x[0] == x[-1]:  # upright: it does not end where the cells do
+            ax.axvline(factor * x[0], label=name, **curve_look(i))
+        else:
+            ax.plot(factor * np.array(x), positive(y), label=name, **curve_look(i))
+    if chart.limit:
+        x, y = chart.lines[chart.limit]
+        unstable = UNSTABLE | {"edgecolor": LIGHT_GREY}  # behind marks and lines
+        ax.fill_between(factor * np.array(x), np.clip(y, low, high), high, zorder=0, **unstable)
+    for outcome, look in CELL_MARKS.items():
+        cells = [(factor * c.x, c.y) for c in chart.cells if c.simulated == outcome]
+        look = dict(color=GREY, ms=stroke(6), mew=stroke(1.2), label=f"run: {outcome}") | look
+        mark(ax, cells, **look)
+    wrong = [(factor * c.x, c.y) for c in chart.cells if c.cause]
+    mark(ax, wrong, label="differs from the nominal continuous loop", **ring())
+    for (name, (x, y)), look in zip(chart.found.items(), BOUNDARY_MARKS, strict=False):
+        label = name.replace("runs", "boundary found by runs")
+        look = hollow(BLACK, size=7, zorder=5, label=label) | look
+        ax.plot(factor * np.array(x), positive(y), **look)
+    found = [place for x, y in chart.found.values() for place in zip(x, y, strict=True)]
+    look = dict(transform=ax.get_xaxis_transform(), clip_on=False, zorder=5, marker="^")
+    look |= dict(color=BLACK, ms=stroke(8), label="runs: stable up to here")
+    mark(ax, [(factor * x, 1.0) for x, y in found if y > high], **look)
+    ax.set_ylim(low, high)
+    plain_ticks(ax)
+    label_axes(ax, chart.x_name.replace(unit, shown) if unit else chart.x_name, chart.y_name)
+    add_legend(figure, 2, fontsize=points(9))
+    shaping = "" if chart.kind == "gain-pose" else "shaping"
+    quantity = {"delay-damping": "K", "gain-pose": "b"}.get(chart.kind, "")
+    timing = ("Ts",) if chart.kind == "delay-damping" else ("Ts", "delay")
+    parts = loop_parts(chart.loop, "axis", quantity, "hand", *timing, shaping)
+    set_title(ax, *parts[:-1], parts[-1] + "; stable below the lines", pad=10.0)  # over triangles
     return figure
 
 
@@ -105,36 +92,3 @@ def _map_span(chart: StabilityMap) -> tuple[float, float]:
     high = 1.3 * max(cells + found)
     lines = [y for _, v in chart.lines.values() for y in v if 0.0 < y < high]
     return 0.7 * min(cells + found + lines), high
-
-
-def _log_ticks(ax: Axes, chart: StabilityMap) -> None:
-    """Labels 1, 2, 5 on a short logarithmic axis, powers of ten on a long one."""
-    for side in (ax.yaxis,) if chart.kind == "gain-pose" else (ax.xaxis, ax.yaxis):
-        low, high = ax.get_xlim() if side is ax.xaxis else ax.get_ylim()
-        decades = math.log10(high / low)
-        some = (1.0, 2.0, 5.0) if decades < 3.0 else (1.0,)
-        side.set_major_locator(LogLocator(subs=(1, 2, 3, 5, 7) if decades < 1.2 else some))
-        side.set_major_formatter(FormatStrFormatter("%g"))
-        side.set_minor_formatter(NullFormatter())
-
-
-def _positive(y: Sequence[float]) -> np.ndarray:
-    a = np.array(y, dtype=float)
-    return np.where(np.isfinite(a) & (a > 0.0), a, np.nan)
-
-
-def _map_parts(chart: StabilityMap) -> list[str]:
-    """Phrases that describe the loop of a map in its title."""
-    s = chart.loop
-    parts = [f"{s.axis} axis"]
-    if chart.kind == "delay-damping":
-        parts.append(f"K = {s.K:g} 1/kg")
-    elif chart.kind == "gain-pose":
-        parts.append(unit_text(f"b = {s.b:g} N.s/m"))
-    parts.append(hand_name(s.operator))
-    parts.append(f"Ts = {1e3 * s.Ts:g} ms" if s.Ts else "continuous time")
-    if s.delay and chart.kind != "delay-damping":
-        parts.append(f"delay {1e3 * s.delay:g} ms")
-    if chart.kind != "gain-pose":
-        parts.append("inertia_shaping" if s.inertia_shaping else "no shaping")
-    return [*parts[:-1], parts[-1] + "; stable below the lines"]

@@ -17,7 +17,7 @@ from ..model.arm import PAPER, Arm
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
 from ..studies.removal import TOOL, Removal, Tool
-from .style import BLUE, PART_COLORS, SKY_BLUE, clay_color, clay_share, cutting_force, rgb
+from .palette import BLUE, PART_COLORS, SKY_BLUE, clay_color, clay_share, cutting_force, rgb
 
 CAMERAS = ("room", "top", "close")
 HIDDEN = (0.0, 0.0, -5.0)  # position of the hand's target without a pull [m]

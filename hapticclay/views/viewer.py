@@ -29,17 +29,9 @@ from ..model.clay import Clay
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
 from ..studies.removal import Tool
+from .motion import resolved
+from .palette import BLACK, COLOR_NAMES, FORCE_COLORS, PALE_GREY, WHITE, rgb, verdict_color
 from .stage import Stage, plotted_axes
-from .style import (
-    BLACK,
-    COLOR_NAMES,
-    FORCE_COLORS,
-    PALE_GREY,
-    WHITE,
-    along_motion,
-    rgb,
-    verdict_color,
-)
 
 Rows = tuple[tuple[str, str], ...]
 PLOTS_WIDTH = 0.32  # of the window's
@@ -277,13 +269,10 @@ def _ratio(force: float, v: float) -> float:
     return force / v if abs(v) > 1e-4 else math.nan
 
 
-def _law_point(f: Frame, i: int, isotropic: bool) -> tuple[float, float]:
+def _law_point(f: Frame, i: int, clay: Clay) -> tuple[float, float]:
     """Velocity [cm/s] and force of the clay, along the motion if it resists so; NaN in air."""
-    v, fe = f.v[i], f.fe[i]
-    if isotropic:
-        (speed,), (force,) = along_motion(np.array([f.v]), np.array([f.fe]), i)
-        v, fe = float(speed), float(force)
-    return (100.0 * v, fe) if any(f.fe) else (math.nan, math.nan)
+    (v,), (fe,) = resolved(clay, np.array([f.v]), np.array([f.fe]), i)
+    return (100.0 * float(v), float(fe)) if any(f.fe) else (math.nan, math.nan)
 
 
 def _plots(axes: tuple[int, ...], clay: Clay | None = None) -> tuple[LivePlot, ...]:
@@ -331,7 +320,7 @@ def _law_plot(colors: dict[int, str], clay: Clay | None, place: str, named: str)
             f"clay, fe [N]{named}", place, lambda f, i: (100.0 * f.p[i], f.fe[i]), 0.1, colors
         )
     axes, told = (list(colors)[:1], " along the motion") if clay.along_motion else (colors, named)
-    law = functools.partial(_law_point, isotropic=clay.along_motion)
+    law = functools.partial(_law_point, clay=clay)
     return plot(f"clay, fe [N]{told}", "velocity [cm/s]", law, 0.1, axes)
 
 

@@ -4,37 +4,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 
 from ..scene.virtual_wall import VirtualWall
+from ..studies.wall import as_wall
 from ..studies.zwidth import BY_GROWTH, ZRegion, ZWidth
-from .style import (
-    BLACK,
-    BLUE,
-    CURVE_STYLES,
-    GREEN,
-    ORANGE,
-    PURPLE,
-    SKY_BLUE,
-    VERMILION,
-    WHITE,
+from .captions import hand_name, unit_text
+from .palette import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY_BLUE, VERMILION, WHITE
+from .panels import (
+    MARKS,
     add_legend,
-    figure_size,
-    figure_style,
-    hand_name,
-    narrow,
+    curve_look,
+    hollow,
+    label_axes,
     plain_ticks,
-    points,
+    positive,
+    ring,
     set_title,
-    stroke,
-    unit_text,
+    single,
 )
+from .style import figure_style, narrow, points, stroke
 
 LIMIT_LOOKS: dict[str, Any] = {  # by the first word of the name
     "exact,": dict(color=BLUE, ls="-"),
@@ -43,7 +38,6 @@ LIMIT_LOOKS: dict[str, Any] = {  # by the first word of the name
     "Abbott,": dict(color=PURPLE, marker="D", ls="none"),
     "any": dict(color=ORANGE, ls=(0, (1, 1))),
 }
-FAMILY_MARKS = "osD^vPX"
 KIND_WORDS = {"exact": "", "sufficient": " (sufficient)", "rule": " (rule)"}
 REGION_ALPHA = 0.22
 LABEL_ROOM = 0.05  # share of the height that the name of a region takes
@@ -53,51 +47,40 @@ NEAR_ORIGIN = 0.05  # share of an axis below which a wall is not legible on a li
 LABEL_SIDE = 0.15  # share of the width beside its ends, where a centred label would cross the axis
 
 
+@figure_style()
 def zwidth_plot(chart: ZWidth) -> Figure:
     """Plots the region of stable walls, or a family of regions.
 
     Markers are runs and lines are theory. Each region of a family has its runs, the exact line of
     its linear loop and, where there is room, its name.
     """
-    with figure_style():
-        figure = Figure(figsize=figure_size(1, 5.4))
-        ax = figure.add_subplot()
-        _set_axes(ax, chart.regions)
-        if len(chart.regions) == 1:
-            _draw_region(ax, chart.regions[0])
-        else:
-            _draw_family(ax, chart.regions)
-            if not narrow():
-                _name_regions(ax, chart.regions)
-        _label_plane(figure, ax)
-        set_title(ax, *_device_parts(chart))
+    figure, ax = single(5.4)
+    _set_axes(ax, chart.regions)
+    if len(chart.regions) == 1:
+        _draw_region(ax, chart.regions[0])
+    else:
+        _draw_family(ax, chart.regions)
+        if not narrow():
+            _name_regions(ax, chart.regions)
+    add_legend(figure, 2)
+    set_title(ax, *_device_parts(chart))
     return figure
 
 
+@figure_style()
 def regions_plot(regions: Sequence[ZRegion], walls: Sequence[VirtualWall]) -> Figure:
     """Plots the regions of several devices superimposed, and one wall of each."""
-    with figure_style():
-        figure = Figure(figsize=figure_size(1, 5.0))
-        ax = figure.add_subplot()
-        _set_axes(ax, regions, walls)
-        _draw_family(ax, regions)
-        for i, wall in enumerate(walls):
-            color, _ = CURVE_STYLES[i % len(CURVE_STYLES)]
-            look: Any = dict(ms=stroke(10.0), mfc="none", mec=color, mew=stroke(2.0))
-            bottom = ax.get_ylim()[0]
-            mark = "o" if wall.K >= bottom else "v"
-            ax.plot(wall.B, max(wall.K, bottom), mark, clip_on=False, zorder=6, **look)
-        _label_plane(figure, ax)
-        set_title(ax, "lines: exact linear loop", "marks: runs", "rings: the walls themselves")
+    figure, ax = single(5.0)
+    _set_axes(ax, regions, walls)
+    _draw_family(ax, regions)
+    bottom = ax.get_ylim()[0]
+    for i, wall in enumerate(walls):
+        look = ring(curve_look(i)["color"], 10.0) | dict(clip_on=False, zorder=6)
+        look["marker"] = "o" if wall.K >= bottom else "v"
+        ax.plot(wall.B, max(wall.K, bottom), **look)
+    add_legend(figure, 2)
+    set_title(ax, "lines: exact linear loop", "marks: runs", "rings: the walls themselves")
     return figure
-
-
-def _label_plane(figure: Figure, ax: Axes) -> None:
-    ax.set(
-        xlabel=unit_text("virtual damping B [N.s/m]"),
-        ylabel=unit_text("virtual stiffness K [N/m]"),
-    )
-    add_legend(figure, ax, 2)
 
 
 def _draw_region(ax: Axes, r: ZRegion) -> None:
@@ -105,38 +88,37 @@ def _draw_region(ax: Axes, r: ZRegion) -> None:
     bottom = ax.get_ylim()[0]
     ax.fill_between(*_region_edge(r), bottom, color=SKY_BLUE, alpha=REGION_ALPHA, lw=0, zorder=0.5)
     for limit in r.limits:
-        look = dict(LIMIT_LOOKS[limit.name.split(" ")[0]])
+        look = LIMIT_LOOKS[limit.name.split(" ")[0]]
         if limit.name.startswith("exact"):
-            label = limit.name if r.linear else f"linear loop, {_left_out(r)} left out"
+            left_out = ", ".join(as_wall(r.wall).left_out)
+            label = limit.name if r.linear else f"linear loop, {left_out} left out"
             label = label.partition(",")[0] + " alone" if narrow() and not r.linear else label
         else:  # one column has no room for the kind beside two names
             label = limit.name + ("" if narrow() else KIND_WORDS[limit.kind])
-        if look.get("marker"):
-            look |= dict(ms=stroke(8), mfc=WHITE, mew=stroke(1.8), zorder=6, clip_on=False)
-        ax.plot(limit.B, _where_stable(limit.K), label=label, **look)
+        if "marker" in look:
+            mark = dict(mew=stroke(1.8), zorder=6, clip_on=False)
+            look = hollow(look["color"], look["marker"], 8.0, **mark)
+        ax.plot(limit.B, positive(limit.K), label=label, **look)
     runs: Any = dict(ls="none", color=BLACK, ms=stroke(6), zorder=5, clip_on=False)
     how = "stability" if r.verdict == BY_GROWTH else "rest"
-    ax.plot(r.B, _marked(r.K, bottom), marker="o", label=f"runs: limit of {how}", **runs)
+    ax.plot(r.B, _above(r.K, bottom), marker="o", label=f"runs: limit of {how}", **runs)
     if r.box:
         label = "runs with the worst hand"
-        ax.plot(r.B, _marked(r.box_K, bottom), marker="s", mfc=WHITE, label=label, **runs)
+        ax.plot(r.B, _above(r.box_K, bottom), marker="s", mfc=WHITE, label=label, **runs)
 
 
 def _draw_family(ax: Axes, regions: Sequence[ZRegion]) -> None:
     """Runs and exact line of each region."""
     bottom = ax.get_ylim()[0]
     for i, r in enumerate(regions):
-        color, style = CURVE_STYLES[i % len(CURVE_STYLES)]
-        marker = FAMILY_MARKS[i % len(FAMILY_MARKS)]
+        look = curve_look(i)
         if r.linear:
-            limit = r.limits[0]
-            ax.plot(limit.B, _where_stable(limit.K), color=color, ls=style)
+            ax.plot(r.limits[0].B, positive(r.limits[0].K), **look)
         else:
-            ax.plot(*_region_edge(r), color=color, ls=style, lw=stroke(1.0))
-        look: Any = dict(color=color, marker=marker, ls="none", ms=stroke(5), clip_on=False)
-        if i % 2:
-            look["mfc"] = WHITE
-        ax.plot(r.B, _marked(r.K, bottom), label=unit_text(r.name), zorder=5, **look)
+            ax.plot(*_region_edge(r), lw=stroke(1.0), **look)
+        color, fill = look["color"], WHITE if i % 2 else look["color"]
+        marks = hollow(color, MARKS[i % len(MARKS)], 5, mfc=fill, clip_on=False, zorder=5)
+        ax.plot(r.B, _above(r.K, bottom), label=r.name, color=color, **marks)
 
 
 def _name_regions(ax: Axes, regions: Sequence[ZRegion]) -> None:
@@ -149,8 +131,7 @@ def _name_regions(ax: Axes, regions: Sequence[ZRegion]) -> None:
     def room(side: str) -> float:
         """Least distance of two edges there, as a share of the height."""
         at = ax.transAxes.inverted().transform(ax.transData.transform(places[side]))
-        heights = sorted(y for _, y in at)
-        return min((b - a for a, b in zip(heights, heights[1:], strict=False)), default=1.0)
+        return min((b - a for a, b in pairwise(sorted(y for _, y in at))), default=1.0)
 
     if not all(K > 0.0 for _, K in places["left"]):
         places.pop("left")
@@ -158,22 +139,15 @@ def _name_regions(ax: Axes, regions: Sequence[ZRegion]) -> None:
     if room(side) < LABEL_ROOM:
         return  # the legend names them
     for i, (r, place) in enumerate(zip(regions, places[side], strict=True)):
-        left = side == "left"
+        left, color = side == "left", curve_look(i)["color"]
         share = ax.transAxes.inverted().transform(ax.transData.transform(place))[0]
         beside = left or share < LABEL_SIDE
         ends = "left" if beside else "right" if share > 1.0 - LABEL_SIDE else "center"
-        ax.annotate(
-            unit_text(r.name),
-            place,
-            xytext=(stroke(7.0) if beside else 0.0, stroke(-5.0 if left else 6.0)),
-            textcoords="offset points",
-            color=CURVE_STYLES[i % len(CURVE_STYLES)][0],
-            fontsize=points(9.0),
-            ha=ends,
-            va="top" if left else "bottom",
-            zorder=7,
-            path_effects=[withStroke(linewidth=stroke(3.0), foreground=WHITE)],
-        )
+        offset = stroke(7.0) if beside else 0.0, stroke(-5.0 if left else 6.0)
+        look: Any = dict(color=color, fontsize=points(9.0), ha=ends, va="top" if left else "bottom")
+        look["path_effects"] = [withStroke(linewidth=stroke(3.0), foreground=WHITE)]
+        name = unit_text(r.name)
+        ax.annotate(name, place, offset, textcoords="offset points", zorder=7, **look)
 
 
 def _region_edge(r: ZRegion) -> tuple[list[float], list[float]]:
@@ -184,20 +158,14 @@ def _region_edge(r: ZRegion) -> tuple[list[float], list[float]]:
     return (B, K) if math.isnan(r.most_B) else ([*B, r.most_B], [*K, 0.0])
 
 
-def _where_stable(K: Sequence[float]) -> np.ndarray:
-    """K, with a gap where there is none."""
-    a = np.array(K, dtype=float)
-    return np.where(np.isfinite(a) & (a > 0.0), a, np.nan)
-
-
-def _marked(K: Sequence[float], bottom: float) -> np.ndarray:
+def _above(K: Sequence[float], bottom: float) -> np.ndarray:
     """K of markers, kept above the axes."""
-    a = _where_stable(K)
-    return np.where(a >= bottom, a, np.nan)
+    return positive(np.where(np.asarray(K) >= bottom, K, np.nan))
 
 
 def _set_axes(ax: Axes, regions: Sequence[ZRegion], walls: Sequence[VirtualWall] = ()) -> None:
     """Scales and limits for every run: logarithmic where values span much, with B = 0."""
+    label_axes(ax, "virtual damping B [N.s/m]", "virtual stiffness K [N/m]")
     B = sorted({x for r in regions for x in r.B if x > 0.0} | {w.B for w in walls if w.B > 0.0})
     K = [x for r in regions for x in (*r.K, *r.box_K) if x > 0.0] + [w.K for w in walls]
     least = [x for r in regions for x in r.K[:1] if x > 0.0] + [w.K for w in walls if w.K]
@@ -214,45 +182,17 @@ def _set_axes(ax: Axes, regions: Sequence[ZRegion], walls: Sequence[VirtualWall]
     ax.set_xlim(0.0, 1.35 * top)
     powers = [10.0**n for n in range(math.ceil(math.log10(first)), math.floor(math.log10(top)) + 1)]
     ax.set_xticks([0.0, *(powers or [first])])
-    ax.xaxis.set_minor_locator(NullLocator())
+    ax.set_xticks([], minor=True)
+    ax.xaxis.set_major_formatter("{x:g}")
     ax.set_yscale("log")
     ax.set_ylim(max(0.4 * min([*least, most]), SHOWN_SHARE * most), 2.0 * most)
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
-    ax.xaxis.set_minor_formatter(NullFormatter())
-    plain_ticks(ax.yaxis)
-
-
-def _left_out(r: ZRegion) -> str:
-    """Effects that the linear loop neglects."""
-    assert isinstance(r.wall, VirtualWall)
-    d = r.wall.device
-    parts = [name for name, x in (("friction", d.friction), ("encoder", d.quantum)) if x]
-    return ", ".join(parts + ["surface"] * r.wall.unilateral)
+    plain_ticks(ax)
 
 
 def _device_parts(chart: ZWidth) -> list[str]:
     """Phrases for the title: the parts of the device common to all regions."""
-    w = chart.regions[0].wall
-    told = {"Ts": f"Ts = {1e3 * (w.Ts or 0.0):g} ms"}
-    if w.delay:
-        told["delay"] = f"delay = {1e3 * w.delay:g} ms"
-    if isinstance(w, VirtualWall):
-        d = w.device
-        told = {"mass": f"m = {d.mass:g} kg", "damper": f"b = {d.damper:g} N.s/m"} | told
-        if d.friction:
-            told["friction"] = f"fc = {d.friction:g} N"
-        if d.quantum:
-            told["quantum"] = f"Delta = {1e6 * d.quantum:g} um"
-        if w.velocity_window > 1:
-            told["velocity_window"] = f"window = {w.velocity_window} samples"
-        if w.velocity_filter:
-            told["filter"] = f"filter = {w.velocity_filter:g} Hz"
-        if w.unilateral:
-            told["surface"] = "surface"
-    else:
-        told = {"axis": f"arm, {w.axis} axis", "gain": f"Kc = {w.K:g} 1/kg"} | told
-    parts = [unit_text(text) for name, text in told.items() if name != chart.vary]
-    parts.append(hand_name(w.operator))
-    if any(r.verdict != BY_GROWTH for r in chart.regions):
-        parts.append(f"rest within {1e6 * chart.press.still:g} um")
-    return parts
+    wall = as_wall(chart.regions[0].wall)
+    parts = [text for name, text in wall.phrases().items() if name != chart.vary]
+    rest = any(r.verdict != BY_GROWTH for r in chart.regions)
+    still = f"rest within {1e6 * chart.press.still:g} um" if rest else ""
+    return [*parts, hand_name(wall.subject.operator), still]

@@ -11,54 +11,39 @@ from matplotlib.patches import Arc
 from matplotlib.patheffects import withStroke
 
 from ..model.constants import AXES, L1, L2, ORIGIN, PATH_LENGTH
-from ..studies.identification import (
-    NOMINAL_POSE,
-    endpoint_mobility,
-    printed_form,
-)
+from ..studies.identification import NOMINAL_POSE, endpoint_mobility, printed_form
 from ..studies.workspace import DRIFT_BLOCKS, Drift
-from .style import (
-    BLACK,
-    MID_GREY,
-    VERMILION,
-    WHITE,
-    add_legend,
-    figure_size,
-    figure_style,
-    narrow,
-    points,
-    set_title,
-    stroke,
-)
+from .palette import BLACK, MID_GREY, VERMILION, WHITE
+from .panels import add_legend, set_title
+from .style import figure_size, figure_style, narrow, points, stroke
 
 MOBILITY_POINTS = 81  # along the y side of the map on which the contours of W are drawn
 
 
+@figure_style(axes_grid=False)
 def workspace_plot(drift: Drift) -> Figure:
     """Plots the gain of Sh over the workspace: fitted in cells, bare mobility as contours."""
-    with figure_style(axes_grid=False):
-        figure = Figure(figsize=figure_size(2, 9.6 if narrow() else 5.6, 9.4))
-        shape = (4, 1) if narrow() else (2, 2)
-        axes: Any = figure.subplots(*shape, sharex=True, sharey=True).reshape(2, 2)
-        for i, row in enumerate(axes):
-            fitted = drift.coefficients[:, :, DRIFT_BLOCKS.index("S"), i, 0]
-            top = max(float(drift.mobility[:, i].max()), float(fitted.max()))
-            mesh: Any = None
-            for k, ax in enumerate(row):
-                mesh = _pose_cells(ax, drift, fitted[:, k], 1.02 * top)
-                if k == 0:
-                    _mobility_contours(ax, i, top)
-                _workspace_frame(ax)
-                title = ("without inertia shaping", "with inertia shaping")[k]
-                set_title(ax, f"gain of S$_{AXES[i]}$, {title}", panel=True)
-            bar = figure.colorbar(mesh, ax=row, pad=0.01, aspect=16)
-            bar.set_label("gain [1/kg] (line: printed)")
-            bar.ax.axhline(printed_form("S", AXES[i])[0], color=VERMILION, lw=stroke(2.0))
-            for ax in row if narrow() else row[:1]:
-                ax.set_ylabel("world y [m]")
-        for ax in axes[1, 1:] if narrow() else axes[1]:
-            ax.set_xlabel("world x [m]")
-        add_legend(figure, axes[0, 0])
+    figure = Figure(figsize=figure_size(2, 9.6 if narrow() else 5.6, 9.4))
+    shape = (4, 1) if narrow() else (2, 2)
+    axes: Any = figure.subplots(*shape, sharex=True, sharey=True).reshape(2, 2)
+    for i, row in enumerate(axes):
+        fitted = drift.coefficients[:, :, DRIFT_BLOCKS.index("S"), i, 0]
+        top = max(float(drift.mobility[:, i].max()), float(fitted.max()))
+        for k, ax in enumerate(row):
+            mesh = _pose_cells(ax, drift, fitted[:, k], 1.02 * top)
+            if k == 0:
+                _mobility_contours(ax, i, top)
+            _workspace_frame(ax)
+            title = ("without inertia shaping", "with inertia shaping")[k]
+            set_title(ax, f"gain of S$_{AXES[i]}$, {title}", panel=True)
+        bar = figure.colorbar(mesh, ax=row, pad=0.01, aspect=16)
+        bar.set_label("gain [1/kg] (line: printed)")
+        bar.ax.axhline(printed_form("S", AXES[i])[0], color=VERMILION, lw=stroke(2.0))
+        for ax in row if narrow() else row[:1]:
+            ax.set_ylabel("world y [m]")
+    for ax in axes[1, 1:] if narrow() else axes[1]:
+        ax.set_xlabel("world x [m]")
+    add_legend(figure)
     return figure
 
 

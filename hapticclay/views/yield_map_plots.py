@@ -7,22 +7,12 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from ..studies.yield_map import YieldMap
-from .style import (
-    BLACK,
-    VERMILION,
-    WHITE,
-    add_legend,
-    figure_size,
-    figure_style,
-    hand_name,
-    points,
-    set_title,
-    stroke,
-    unit_text,
-)
+from .captions import loop_parts
+from .palette import BLACK, VERMILION, WHITE
+from .panels import add_legend, label_axes, mark, plain_ticks, ring, set_title, single
+from .style import figure_style, points, stroke
 
 PUSH_MARKS: Any = {
     "sticks": dict(marker="_", color=BLACK, mew=2.0),
@@ -32,6 +22,7 @@ PUSH_MARKS: Any = {
 PUSH_NAMES = {"sticks": "sticks", "limit cycle": "buzzes (colour: its speed)", "grows": "grows"}
 
 
+@figure_style()
 def yield_map_plot(chart: YieldMap) -> Figure:
     """Plots the outcome of a push over yield force and gain.
 
@@ -51,49 +42,33 @@ def yield_map_plot(chart: YieldMap) -> Figure:
     goes = push >= np.outer(np.where(K < chart.least, np.inf, critical), Fy)
     cycle = 1e3 * np.where(goes, np.outer(each, Fy), np.nan)
     grows = goes & (K >= chart.limit)[:, None]
-    with figure_style():
-        figure = Figure(figsize=figure_size(1, 5.6, 7.4))
-        ax = figure.add_subplot()
-        ax.set(xscale="log", yscale="log", xlim=(Fy[0], Fy[-1]), ylim=(bottom, top))
-        known = cycle[np.isfinite(cycle)]
-        colors = LogNorm(known.min(), min(known.max(), 1e4)) if len(known) else LogNorm(1.0, 10.0)
-        shaded = ax.pcolormesh(Fy, K, cycle, norm=colors, cmap="cividis", rasterized=True)
-        ax.contourf(Fy, K, grows, levels=(0.5, 1.5), colors="none", hatches=["///"])
-        edge = np.where(K < chart.least, np.nan, push / critical)
-        ax.plot(edge, K, color=BLACK, label=unit_text("theory: edge of sticking"))
-        for level, style, name in (
-            (chart.least, "--", "no limit cycle below"),
-            (chart.limit, "-.", "unstable in flowing clay above"),
-        ):
-            if level < top:
-                ax.axhline(level, color=VERMILION, ls=style, label=f"theory: {name}")
-        for name, look in PUSH_MARKS.items():
-            mine = [c for c in chart.cells if c.simulated == name]
-            for i, c in enumerate(mine):
-                own = dict(look)
-                if name == "limit cycle":
-                    own["mfc"] = shaded.cmap(colors(1e3 * c.speed))
-                label = f"a run: {PUSH_NAMES[name]}" if i == 0 else None
-                ax.plot(c.Fy, c.K, ls="none", ms=stroke(8), label=label, **own)
-        if wrong := [c for c in chart.cells if c.simulated != c.expected]:
-            look: Any = dict(
-                marker="o", mfc="none", color=VERMILION, ms=stroke(14), mew=stroke(1.5), ls="none"
-            )
-            ax.plot([c.Fy for c in wrong], [c.K for c in wrong], label="unlike theory", **look)
-        ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5, 7)))
-        for side in (ax.xaxis, ax.yaxis):
-            side.set_major_formatter(FormatStrFormatter("%g"))
-            side.set_minor_formatter(NullFormatter())
-        bar = figure.colorbar(shaded, ax=ax, format="%g")
-        bar.set_label(unit_text("largest speed of the limit cycle [mm/s]"))
-        ax.set(xlabel=unit_text("yield force Fy [N]"), ylabel=unit_text("gain K [1/kg]"))
-        add_legend(figure, ax, 2, fontsize=points(9))
-        s = chart.loop
-        parts = [f"{s.axis} axis, push of {1e3 * push:g} mm/s", unit_text(f"b = {s.b:g} N.s/m")]
-        parts += [
-            hand_name(s.operator),
-            "continuous time",
-            "inertia_shaping" if s.inertia_shaping else "no shaping",
-        ]
-        set_title(ax, *parts[:-1], parts[-1] + "; hatched: grows; white: sticks")
+    figure, ax = single(5.6, 7.4)
+    ax.set(xscale="log", yscale="log", xlim=(Fy[0], Fy[-1]), ylim=(bottom, top))
+    known = cycle[np.isfinite(cycle)]
+    colors = LogNorm(known.min(), min(known.max(), 1e4)) if len(known) else LogNorm(1.0, 10.0)
+    shaded = ax.pcolormesh(Fy, K, cycle, norm=colors, cmap="cividis", rasterized=True)
+    ax.contourf(Fy, K, grows, levels=(0.5, 1.5), colors="none", hatches=["///"])
+    edge = np.where(K < chart.least, np.nan, push / critical)
+    ax.plot(edge, K, color=BLACK, label="theory: edge of sticking")
+    for K_limit, dash, name in (
+        (chart.least, "--", "no limit cycle below"),
+        (chart.limit, "-.", "unstable in flowing clay above"),
+    ):
+        if K_limit < top:
+            ax.axhline(K_limit, color=VERMILION, ls=dash, label=f"theory: {name}")
+    for c in sorted(chart.cells, key=lambda c: list(PUSH_MARKS).index(c.simulated)):
+        look = dict(ls="none", ms=stroke(8), label=f"a run: {PUSH_NAMES[c.simulated]}")
+        if c.simulated == "limit cycle":
+            look["mfc"] = shaded.cmap(colors(1e3 * c.speed))
+        ax.plot(c.Fy, c.K, **look, **PUSH_MARKS[c.simulated])
+    wrong = [(c.Fy, c.K) for c in chart.cells if c.simulated != c.expected]
+    mark(ax, wrong, label="unlike theory", **ring())
+    plain_ticks(ax)
+    bar = figure.colorbar(shaded, ax=ax, format="%g")
+    bar.set_label("largest speed of the limit cycle [mm/s]")
+    label_axes(ax, "yield force Fy [N]", "gain K [1/kg]")
+    add_legend(figure, 2, fontsize=points(9))
+    axis, *parts = loop_parts(chart.loop, "axis", "b", "hand", "Ts", "shaping")
+    notes = "hatched: grows; white: sticks"
+    set_title(ax, f"{axis}, push of {1e3 * push:g} mm/s", *parts[:-1], f"{parts[-1]}; {notes}")
     return figure

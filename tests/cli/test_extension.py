@@ -22,8 +22,9 @@ from hapticclay.scene.experiments import (
     PathExperiment,
     parameter_unit,
 )
-from hapticclay.studies.sampling import Sweep, parse_grid
-from hapticclay.studies.sweep_store import read_sweep
+from hapticclay.studies.sampling import parse_grid
+from hapticclay.studies.store import read_sweep
+from hapticclay.studies.sweep import Sweep
 from hapticclay.views import sweep_plots
 
 

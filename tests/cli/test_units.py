@@ -16,9 +16,9 @@ from hapticclay.cli import app
 from hapticclay.cli import words as cli_words
 from hapticclay.cli.fields import field_list
 from hapticclay.errors import ParameterError
+from hapticclay.fields import leaves
 from hapticclay.scene.changes import named_values
 from hapticclay.scene.experiments import EXPERIMENTS
-from hapticclay.scene.fields import fields_of
 from hapticclay.simulation.asked_error import parse_error
 from hapticclay.studies.distribution import Distribution
 from hapticclay.studies.sampling import Range, parse_grid
@@ -132,7 +132,7 @@ def test_clay_and_a_hand_take_units(capsys):
 def test_what_fields_shows_as_a_default_can_be_set(experiment):
     """Of each field of the built scenario: its own value, given again, changes nothing."""
     base = EXPERIMENTS[experiment].of({})
-    lines = [x for x in field_list(fields_of(hc.Scenario, part=base)).splitlines() if x[0] != " "]
+    lines = [x for x in field_list(leaves(hc.Scenario, part=base)).splitlines() if x[0] != " "]
     tried = 0
     for line in lines:
         name, _, rest = line.partition(" = ")

@@ -2,6 +2,9 @@
 
 import json
 import math
+import signal
+import subprocess
+import sys
 
 import gymnasium
 import numpy as np
@@ -10,6 +13,7 @@ import pytest
 import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.gym import dataset
+from hapticclay.studies import store
 
 CUT, NAME = "CutLine-v0", "hapticclay/test/a-v0"
 OF_WORDS = ["gym", "dataset", CUT, "--engine", "python", "--name", NAME]
@@ -99,7 +103,7 @@ def test_an_interrupted_recording_goes_on_to_the_same_bits(folder, capsys):
         with pytest.raises(KeyboardInterrupt):
             dataset.record(CUT, NAME, 3, engine="python", progress=stopped_after(n))
         assert not (folder / NAME).exists()
-    kept = sorted(folder.rglob("episode_*.npz"))
+    kept = sorted(folder.rglob("part-*.parquet"))
     assert len(kept) == 2
     kept[1].write_bytes(kept[1].read_bytes()[:100])
     counts = []
@@ -110,9 +114,44 @@ def test_an_interrupted_recording_goes_on_to_the_same_bits(folder, capsys):
     assert seeds == [0, 1, 2] and told["total_episodes"] == 3
     files = [folder / x / "data" / "main_data.hdf5" for x in (NAME, "whole-v0")]
     assert files[0].read_bytes() == files[1].read_bytes()
-    assert not list(folder.rglob("*.npz"))
+    assert not list(folder.rglob("*.parquet"))
     for row in rows:  # noise is of each episode, not shared
         assert row[2] != rows[row[0] - 1][2]
+
+
+KILLED = """
+import os, signal, sys
+from hapticclay.gym import dataset
+
+def end(count):
+    if count == 2:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+dataset.record("CutLine-v0", sys.argv[1], 4, engine="python", progress=end)
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="POSIX")
+@pytest.mark.parametrize("episodes", [1, 3])
+def test_a_killed_recording_goes_on_with_any_number_of_episodes(folder, episodes):
+    """Two of four are kept; the data set is that of a call of its own with that many."""
+    pytest.importorskip("minari")
+    killed = subprocess.run([sys.executable, "-c", KILLED, NAME], timeout=120)
+    assert killed.returncode == -signal.SIGKILL
+    counts = []
+    dataset.record(CUT, NAME, episodes, engine="python", progress=counts.append)
+    assert counts == ([1] if episodes == 1 else [2, 3])
+    dataset.record(CUT, "whole-v0", episodes, engine="python")
+    assert rows_of(folder, NAME) == rows_of(folder, "whole-v0")
+
+
+def test_of_two_recordings_at_once_one_is_refused(folder):
+    pytest.importorskip("minari")
+    with store.claimed(
+        dataset.Recording(CUT, 0.1, 0, 2, "auto"), folder / "hapticclay/test/.a-v0.part"
+    ):
+        with pytest.raises(hc.ParameterError, match="another recording is at work"):
+            dataset.record(CUT, NAME, 2, engine="python")
 
 
 def test_the_command_goes_on_and_other_arguments_are_refused(folder, capsys, monkeypatch):
@@ -130,7 +169,7 @@ def test_the_command_goes_on_and_other_arguments_are_refused(folder, capsys, mon
     assert "1 of 2 episodes are kept; the same command continues" in capsys.readouterr().out
     monkeypatch.setattr(dataset, "record", record)
     assert app.main([*OF_WORDS, "--episodes", "2", "--noise", "0.2"]) == 2
-    assert "must be 0.1, as in the interrupted recording" in capsys.readouterr().err
+    assert "holds another recording (noise = 0.1)" in capsys.readouterr().err
     assert app.main([*OF_WORDS, "--episodes", "2"]) == 0
     assert f"{NAME}: 2 episodes, " in capsys.readouterr().out
     assert app.main([*OF_WORDS, "--episodes", "2"]) == 2

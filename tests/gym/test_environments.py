@@ -305,11 +305,11 @@ def test_a_loop_beyond_its_gain_limit_ends_the_episode_within_a_period():
     env = made("hapticclay/AdaptiveGain-v0")
     env.reset(seed=0, options=options)
     inner = env.unwrapped
-    run, m = hc.Simulation(inner.task.scenario(inner._episode.truth), engine="python"), None
+    run, m = hc.Simulation(inner.task.scenario(inner._episodes.truth), engine="python"), None
     reached, t = None, 0
     while True:
         _, reward, terminated, _, info = env.step(np.ones(1, np.float32))
-        m = inner._episode.memory
+        m = inner._episodes.memory
         push = m["muscle"][t] * min((t + 1) / 20, 1.0)
         run.set(gain=(info["K"], 0.2))
         for _ in range(inner.task.steps):
@@ -350,7 +350,7 @@ def test_a_diverging_run_ends_its_episode_within_20_ms(name):
         _, _, ended, cut_off, info = env.step(action)
         n += 1
         assert not cut_off
-    scene = inner.task.scenario(inner._episode.truth)
+    scene = inner.task.scenario(inner._episodes.truth)
     force = tuple(getattr(inner.task, "most", task.FORCE) * x for x in (0.5, 1.0))
     end = n * inner.task.steps * scene.dt
     fields = {"force": force, "t_max": end + 0.1, "stop_when_unstable": False}

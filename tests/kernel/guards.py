@@ -9,7 +9,6 @@ import contextlib
 import math
 
 from hapticclay.kernel import kick, march, methods, records, sampled
-from hapticclay.kernel.layout import Kind, Many
 
 TYPES = {"double": float, "long long": int}
 
@@ -20,8 +19,8 @@ class WrongType(AssertionError):
 
 def check(kind, name, x):
     """Refuses a value that is not of the type of a field; int is not float, nor bool int."""
-    if type(x) is not TYPES[kind.c]:
-        raise WrongType(f"{name} = {x!r}: {type(x).__name__}, not {TYPES[kind.c].__name__}")
+    if type(x) is not TYPES[kind.of]:
+        raise WrongType(f"{name} = {x!r}: {type(x).__name__}, not {TYPES[kind.of].__name__}")
 
 
 class Numbers(list):
@@ -33,8 +32,8 @@ class Numbers(list):
         self.check(values)
 
     def check(self, values):
-        if len(values) != self.kind.shape:
-            raise WrongType(f"{self.name}: {len(values)} numbers, not {self.kind.shape}")
+        if len(values) != self.kind.n:
+            raise WrongType(f"{self.name}: {len(values)} numbers, not {self.kind.n}")
         for x in values:
             check(self.kind, self.name, x)
 
@@ -51,9 +50,9 @@ class Numbers(list):
 def checked(record, name, x):
     """Sets a field of a record, if the value is of its type."""
     kind = type(record).kinds.get(name)
-    if isinstance(kind, Kind) and not kind.is_place:
+    if kind is not None and not (kind.is_record or kind.is_place):
         told = f"{type(record).__name__}.{name}"
-        if kind.shape:
+        if kind.n:
             x = Numbers(kind, told, x)
         else:
             check(kind, told, x)
@@ -78,13 +77,11 @@ def spoil(record, *but):
         if name in but:
             continue
         x = getattr(record, name)
-        if isinstance(kind, Many):
-            for each in x:
+        if kind.is_record:
+            for each in x if kind.n else [x]:
                 spoil(each)
-        elif not isinstance(kind, Kind):
-            spoil(x)
-        elif kind.c == "double":
-            setattr(record, name, [math.nan] * kind.shape if kind.shape else math.nan)
+        elif kind.of == "double":
+            setattr(record, name, [math.nan] * kind.n if kind.n else math.nan)
 
 
 @contextlib.contextmanager

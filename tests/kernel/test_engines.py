@@ -398,7 +398,7 @@ def test_a_field_of_the_wrong_type_is_refused_by_name():
 def test_stale_scratch_and_an_effect_of_an_event_are_seen(monkeypatch):
     """The guards see a kick that reads what another left, and an event with an effect."""
     s = dataclasses.replace(KINDS["held: plain"]["plain"], t_max=0.02)
-    r, drive, act = hc.simulate(s, engine="python"), hardware.drive, kick.act
+    r, drive, load = hc.simulate(s, engine="python"), hardware.drive, kick.load
 
     def counts(m, s, t1, t2):
         s.steps += 1
@@ -406,7 +406,7 @@ def test_stale_scratch_and_an_effect_of_an_event_are_seen(monkeypatch):
 
     def stale(m, s, k):
         left = k.x.u if s.i > 3 else 0.0
-        act(m, s, k)
+        load(m, s, k)
         k.x.f += 0.0 * left
 
     with monkeypatch.context() as patch:
@@ -414,7 +414,7 @@ def test_stale_scratch_and_an_effect_of_an_event_are_seen(monkeypatch):
         once = hc.simulate(s, engine="python")
         with guards.repeated():
             assert hc.simulate(s, engine="python").steps > once.steps > r.steps
-    monkeypatch.setattr(kick, "act", stale)
+    monkeypatch.setattr(kick, "load", stale)
     assert hc.simulate(s, engine="python").outcome.code == r.outcome.code
     with guards.spoiled_scratch():
         assert hc.simulate(s, engine="python").outcome.code != r.outcome.code

@@ -13,7 +13,6 @@ import hapticclay as hc
 from hapticclay.formulas import arm, damping
 from hapticclay.kernel import arm as arms
 from hapticclay.kernel import kick, path
-from hapticclay.kernel.layout import Kind, Many
 from hapticclay.model.operator import NO_HAND, Operator
 from hapticclay.simulation import run as runs
 from hapticclay.simulation.run import Run
@@ -255,13 +254,11 @@ def numbers_in(record):
     """All numbers in a record."""
     for name, kind in type(record).kinds.items():
         x = getattr(record, name)
-        if isinstance(kind, Many):
-            for each in x:
+        for each in x if kind.n else [x]:
+            if kind.is_record:
                 yield from numbers_in(each)
-        elif not isinstance(kind, Kind):
-            yield from numbers_in(x)
-        elif not kind.is_place:
-            yield from x if kind.shape else [x]
+            elif not kind.is_place:
+                yield each
 
 
 def test_a_kick_counts_half_of_the_clay_on_either_side_and_all_of_the_muscle():
@@ -269,9 +266,9 @@ def test_a_kick_counts_half_of_the_clay_on_either_side_and_all_of_the_muscle():
     m, s, k = row.m, row.s, row.s.k
     s.x.b, s.y.b = s.x.old, s.y.old = 8.0, 6.0
     kick.begin(k, 1e-3, 1e-3)
-    kick.take_up(m, s, k)
+    kick.take_over(m, s, k)
     arms.handle_at(m, k, s.q1, s.q2, 0.0, 0.0)
-    kick.act(m, s, k)
+    kick.load(m, s, k)
     assert (k.x.b0, k.y.b0, k.x.b1, k.y.b1) == (4.0, 3.0, 4.0, 3.0)
     assert (k.L, k.x.uh, k.y.uh) == (0.5, 2.0, 0.0)
-    assert k.over == 0.0 and (k.x.d, k.y.d, k.dxy) == (4.0, 3.0, 0.0)
+    assert k.splits == 0.0 and (k.x.d, k.y.d, k.dxy) == (4.0, 3.0, 0.0)

@@ -199,7 +199,7 @@ def test_regions_of_random_clay_are_those_of_the_place(n, m, seed):
             "image = .*: must have pi",
         ),
         (lambda: Grid.of_image([[1.0]], (1, 0), (0, 1), (0, 1)), "x = .*: must be strictly ascend"),
-        (lambda: Grid.of_image([[1.0]], (0, 1), (0, 1), (0, -1)), r"b\[y\] = -1: .* N.s/m"),
+        (lambda: Grid.of_image([[1.0]], (0, 1), (0, 1), (0, -1)), r"b\[white\] = -1: .* N.s/m"),
         (lambda: Grid.of_image([[1.0]], (0, 1), (0, 1), (0, 1), -1), "outside = -1: .* N.s/m"),
     ],
 )
@@ -273,7 +273,7 @@ def test_the_nodes_of_an_image_are_the_centres_of_its_pixels():
         ),
         (lambda: Smooth.of_image([[2.0]], (0, 1), (0, 1), (0, 1)), "image"),
         (lambda: Smooth.of_image([[0.5]], (1, 0), (0, 1), (0, 1)), "x = .*strictly ascending"),
-        (lambda: Smooth.of_image([[0.5]], (0, 1), (0, 1), (0, -1)), r"b\[y\] = -1"),
+        (lambda: Smooth.of_image([[0.5]], (0, 1), (0, 1), (0, -1)), r"b\[white\] = -1"),
     ],
 )
 def test_bad_smooth_clay_is_refused_by_name(make, said):

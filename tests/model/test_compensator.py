@@ -444,7 +444,7 @@ def test_a_kick_shows_the_output_at_its_sample_and_ends_half_a_step_later(c, bef
     shown = k.y.delta + k.y.feed * f
     scale = np.abs(C).sum() + abs(D)
     assert shown == pytest.approx(C @ at[:n] + D * f, abs=1e-11 * scale * (1 + np.abs(at).max()))
-    servo.states_behind(m, s, k, 1)
+    servo.advance_states(m, s, k, 1)
     z = k.y.z
     bound = 1e-11 * (1 + np.abs(end).max())
     np.testing.assert_allclose(z[:n], end[:n], atol=bound)

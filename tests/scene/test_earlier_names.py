@@ -7,8 +7,7 @@ import pytest
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.scene.earlier_names import with_present_names
-from hapticclay.studies import sampling
-from hapticclay.studies.sweep import Sweep
+from hapticclay.studies.sweep import Sweep, load_sweep
 
 FILES = Path(__file__).parent.parent / "release_0_2"
 SPRINGS = (hc.Spring(), hc.Spring(k=1e4, limit=3.0, unilateral=True), hc.Spring())
@@ -61,7 +60,7 @@ def test_a_sweep_and_a_flag_of_0_2(tmp_path):
         'experiment = "constant"\n[vary]\n"operator.mass" = [0.5, 1.0]\n'
         "[fixed]\nimpedance = true\nshaping = true\n"
     )
-    s = Sweep(**sampling.load_sweep(spec))
+    s = Sweep(**load_sweep(spec))
     found = s.run_scenario(s.points(0, 1)[0])
     assert found.operator == hc.Operator(0.5) and found.inertia_shaping
     data = {"impedance": True, "operator": {"mass": 0.5}, "experiment": "constant"}

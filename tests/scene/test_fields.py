@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hapticclay as hc
-from hapticclay import errors
-from hapticclay.errors import Bound, ParameterError, check_fields, field_types
-from hapticclay.scene import fields
+from hapticclay.errors import Bound, ParameterError
+from hapticclay.fields import check_fields, field_descriptions, nodes_of
 from hapticclay.scene.experiments import EXPERIMENTS, Experiment, parameters
 
 CLAY = hc.Clay(hc.Profile((0.0,), (0.0, 9.0)), hc.Profile((0.0,), (0.0, 9.0)))
@@ -36,32 +35,27 @@ PARTS = {  # a valid one of each, and what its errors put before the field
     "compensator.": (hc.Compensator(),),
 }
 BOUNDED = [
-    (prefix, part, name, bound)
+    (prefix, part, name, node.bound)
     for prefix, parts in PARTS.items()
     for part in parts
-    for name, (_, bound) in field_types(type(part)).items()
-    if bound
+    for name, node in nodes_of(type(part)).items()
+    if node.bound != Bound()
 ]
 OUTSIDE = {float: math.nextafter, int: lambda x, to: x + (1 if to > x else -1)}
 
 
-def number_types(hint):
+def number_types(node):
     """The type of the numbers of a field, and how many stand in a tuple, 0 for none."""
-    for kind in errors.get_args(hint) or (hint,):
-        if kind in (float, int):
-            return kind, 2 if errors.get_origin(hint) is tuple else 0
-        if errors.get_origin(kind) is tuple:
-            return float, 2
-    raise AssertionError(hint)
+    return int if node.hint in (int, int | None) else float, 0 if node.arity == 1 else 2
 
 
 @pytest.mark.parametrize(
     "prefix,part,name,bound", BOUNDED, ids=[f"{type(p).__name__}.{n}" for _, p, n, _ in BOUNDED]
 )
 def test_a_value_on_a_bound_is_taken_and_the_next_one_is_not(prefix, part, name, bound):
-    hint, _ = field_types(type(part))[name]
-    kind, count = number_types(hint)
-    check = {n: c for n, _, c in errors._field_checks(type(part), prefix)}[name]
+    node = nodes_of(type(part))[name]
+    kind, count = number_types(node)
+    check = node.check
     low = getattr(part, bound.low) if isinstance(bound.low, str) else bound.low
     for end, away, allowed in ((low, -math.inf, not bound.above), (bound.high, math.inf, True)):
         if math.isinf(end):
@@ -93,9 +87,9 @@ def test_no_number_field_takes_anything_else(case, value):
 @given(st.sampled_from(BOUNDED), st.floats(0.0, 1.0))
 def test_numbers_of_other_types_become_floats(case, u):
     prefix, part, name, bound = case
-    hint, _ = field_types(type(part))[name]
-    kind, count = number_types(hint)
-    check = {n: c for n, _, c in errors._field_checks(type(part), prefix)}[name]
+    node = nodes_of(type(part))[name]
+    kind, count = number_types(node)
+    check = node.check
     low = getattr(part, bound.low) if isinstance(bound.low, str) else bound.low
     x = kind(max(low, -10.0) + u * (min(bound.high, 10.0) - max(low, -10.0)))
     if bound.above and x <= low:
@@ -161,10 +155,11 @@ def test_a_type_without_a_check_is_no_field():
     "kind", [type(p) for k in PARTS for p in PARTS[k]], ids=lambda k: k.__name__
 )
 def test_docstrings_name_the_unit_of_every_bound(kind):
-    told = fields.field_descriptions(kind)
-    for name, (_, bound) in field_types(kind).items():
+    told = field_descriptions(kind)
+    for name, node in nodes_of(kind).items():
+        unit = node.bound.unit
         assert told[name], name
-        assert not bound or not bound.unit or f"[{bound.unit}]" in told[name], name
+        assert not unit or f"[{unit}]" in told[name], name
 
 
 @pytest.mark.parametrize("name", EXPERIMENTS)

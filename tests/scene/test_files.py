@@ -15,15 +15,13 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay import errors, files, units
-from hapticclay.errors import Bound, ParameterError, field_types
+from hapticclay.errors import Bound, ParameterError
+from hapticclay.fields import UNSET, leaves, make_part, nodes_of, plain_data
 from hapticclay.model.constants import SecondOrder
 from hapticclay.model.controller import Servo
-from hapticclay.scene import field_kinds, fields
 from hapticclay.scene import files as scene_files
 from hapticclay.scene.changes import named_values, nested, with_fields
 from hapticclay.scene.experiments import EXPERIMENTS, parameter_unit
-from hapticclay.scene.given_values import make_part
-from hapticclay.scene.plain_data import plain_data
 from tests.hunt import examples
 
 
@@ -564,7 +562,7 @@ def test_without_a_kind_a_part_is_of_the_usual_class():
         with pytest.raises(ParameterError) as e:
             make_part(Drum, data)
         assert said in str(e.value)
-    names = [f.name for f in fields.fields_of(Drum)]
+    names = [f.name for f in leaves(Drum)]
     assert "wave.rms" in names and "wave.at" in names and "two.at" in names
 
 
@@ -629,13 +627,13 @@ def test_another_kind_of_unit_is_refused(text, unit):
 
 def test_every_unit_of_a_bound_is_known():
     for kind in (hc.Scenario, *EXPERIMENTS.values()):
-        for field in fields.fields_of(kind):
+        for field in leaves(kind):
             unit = field.bound.unit
             if unit.endswith("^n"):  # of a consistency, which depends on n
                 assert units.parse_unit(unit) is None
                 continue
             assert not unit or units.parse_unit(unit), field.name
-    assert field_types(hc.Scenario)["dt"][1].unit == "s"
+    assert nodes_of(hc.Scenario)["dt"].bound.unit == "s"
 
 
 def test_words():
@@ -679,8 +677,8 @@ def test_the_fields_of_a_scenario_are_all_there():
         ),
         operator=hc.Operator(),
     )
-    for field in fields.fields_of(hc.Scenario, part=scenario):
-        if field.default is field_kinds.UNSET or field.name.startswith(NOT_GIVEN):
+    for field in leaves(hc.Scenario, part=scenario):
+        if field.default is UNSET or field.name.startswith(NOT_GIVEN):
             continue
         x = scenario
         for name in field.name.split("."):

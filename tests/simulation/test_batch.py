@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.kernel import layout, native, records
+from hapticclay.kernel import native, records
 from hapticclay.kernel.row import NativeRow
 from hapticclay.model.controller import SERVO, Servo
 from hapticclay.simulation import batch, many, record
 from hapticclay.simulation.run import Place
+from tests.kernel.test_engines import ALL as ALL_HARDWARE
 from tests.simulation.test_column_batch import GUARDED, RICH
 
 pytestmark = pytest.mark.skipif(not native.is_there(), reason="needs the compiled kernel")
@@ -101,6 +102,22 @@ def test_summaries_of_short_runs_are_those_of_simulate_bit_for_bit(threads, n):
     assert found["crossings"].max() >= 2
 
 
+OTHER_HARDWARE = ALL_HARDWARE | dict(adc_range=40.0, filter_order=1)
+
+
+@pytest.mark.parametrize("name", [x.name for x in dataclasses.fields(hc.Hardware)])
+def test_runs_whose_hardware_differs_in_any_field_are_of_different_kinds(name):
+    """But for a delay, which each run may have of its own, and the seed of noise that is absent."""
+    like = {x: OTHER_HARDWARE[x] for x in ("adc_bits", "delay", "force_filter", "velocity")}
+    both = hc.Hardware(**like), hc.Hardware(**like | {name: OTHER_HARDWARE[name]})
+    assert both[0] != both[1] or name in like
+    first, second = (many.kind_key(dataclasses.replace(WIRED, hardware=x)) for x in both)
+    if name in like:
+        none = dataclasses.replace(both[0], **{name: getattr(hc.Hardware(), name)})
+        second = many.kind_key(dataclasses.replace(WIRED, hardware=none))
+    assert (first == second) == (name == "seed")
+
+
 def test_runs_of_one_kind_are_made_together_and_others_are_left():
     source = kinds(random.Random(5))
     scenes = [next(source) for _ in range(20 * 8)]
@@ -117,7 +134,7 @@ def test_runs_of_one_kind_are_made_together_and_others_are_left():
 NUMBERS = [
     name
     for name, kind in records.Model.kinds.items()
-    if name not in ("span", "law") and not (isinstance(kind, layout.Kind) and kind.is_place)
+    if name not in ("span", "law") and not kind.is_place
 ]
 
 

@@ -12,7 +12,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.scene.given_values import make_part
+from hapticclay.fields import make_part
 from hapticclay.scene.scenario import Scenario
 from hapticclay.simulation import export, tables
 

@@ -11,7 +11,7 @@ import pytest
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.studies.column_runs import ColumnRuns, run_columns
-from hapticclay.studies.sweep_store import read_sweep
+from hapticclay.studies.store import read_sweep
 
 pytest.importorskip("pyarrow")
 BASE = replace(hc.constant_cut(operator=hc.Operator()), length=None, t_max=0.004)
@@ -75,3 +75,14 @@ def test_other_columns_have_another_folder(tmp_path):
         run_columns(BASE, HANDS | {"force.x": HANDS["force.x"] + 1e-9}, tmp_path, workers=1)
     with pytest.raises(ParameterError, match=r"force.x\[3\]"):
         ColumnRuns(BASE, {"force.x": [1.0, 2.0, 3.0, np.inf]}, 5)
+
+
+def test_columns_have_their_units_and_descriptions(tmp_path):
+    run_columns(BASE, HANDS, tmp_path, chunk=20, workers=1)
+    table = read_sweep(tmp_path)
+    notes = {
+        f.name: [f.metadata[k].decode() for k in (b"unit", b"description")] for f in table.schema
+    }
+    assert notes["p_y"] == ["m", "position at the end"]
+    assert notes["b_x"] == ["N.s/m", "damping of the clay at the end"]
+    assert notes["operator.mass"] == ["kg", "parameter of the run"]

@@ -14,8 +14,7 @@ from matplotlib.figure import Figure
 import hapticclay as hc
 from benchmarks import intervals
 from hapticclay.cli import app
-from hapticclay.scene.given_values import make_part
-from hapticclay.scene.plain_data import plain_data
+from hapticclay.fields import make_part, plain_data
 from hapticclay.studies import identification
 from hapticclay.studies.identification import fit, measured, response
 from hapticclay.studies.workspace import Drift, poses

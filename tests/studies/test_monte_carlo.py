@@ -15,7 +15,7 @@ from scipy import stats
 import hapticclay as hc
 from benchmarks import robustness
 from hapticclay.cli import app
-from hapticclay.studies import growth, sweep_store, verdicts
+from hapticclay.studies import growth, store, verdicts
 from hapticclay.studies import robustness as study
 from hapticclay.studies.boundary import PushedLoop, pose_matrix
 from hapticclay.studies.sampling import Range
@@ -261,7 +261,7 @@ def test_an_interrupted_study_goes_on(tmp_path):
     # what the cost says of the room on disk: files are of whole chunks, within 30 %
     size = sum(f.stat().st_size for f in (tmp_path / "data").glob("part-*")) / 50
     assert costs[0].size / 30 == pytest.approx(size, rel=0.3)
-    sweep_store.sweep_part(tmp_path, 1).write_bytes(b"damaged")
+    store.part_file(tmp_path, 1).write_bytes(b"damaged")
     again = hc.studies.monte_carlo(STUDY, out=tmp_path)
     assert again.unstable.tolist() == whole.unstable.tolist()
     with pytest.raises(hc.ParameterError, match="holds another sweep"):

@@ -23,8 +23,9 @@ import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.cli import sweep as sweep_command
 from hapticclay.errors import ParameterError
-from hapticclay.studies import sampling, sweep, sweep_rows, sweep_store
-from hapticclay.studies.sampling import Range, Sweep, parse_fixed, parse_grid
+from hapticclay.studies import store, store_runs, sweep, sweep_rows
+from hapticclay.studies.sampling import Range, parse_fixed, parse_grid
+from hapticclay.studies.sweep import Sweep
 from hapticclay.views import sweep_plots
 
 GRID = "b=10:1000:3log gain.x=1:2:2"
@@ -168,7 +169,7 @@ def test_a_sweep_starts_from_a_scenario_file(tmp_path):
     spec = tmp_path / "spec.toml"
     spec.write_text('scenario = "mine.toml"\n[vary]\narm.l2 = "0.3:0.4:2"\n"gain.x" = [1, 2]\n'
                     '[fixed]\nt_max = 0.01\noperator = true\n"operator.mass" = 0.5\n')  # fmt: skip
-    s = Sweep(**sampling.load_sweep(spec))
+    s = Sweep(**sweep.load_sweep(spec))
     assert s.title == "mine" and list(s.vary) == ["arm.l2", "gain.x"]
     got = s.run_scenario(s.points(1, 2)[0])
     assert (got.arm, got.gain, got.operator) == (hc.Arm(0.3, 0.3), (2.0, 0.4), hc.Operator(0.5))
@@ -182,7 +183,7 @@ def test_a_sweep_starts_from_a_scenario_file(tmp_path):
     ):
         spec.write_text(f"{text}\n[vary]\narm.l2 = [1, 2]\n")
         with pytest.raises(ParameterError, match=said):
-            sampling.load_sweep(spec)
+            sweep.load_sweep(spec)
 
 
 @pytest.mark.parametrize(
@@ -211,7 +212,7 @@ def test_bad_sweeps_are_refused(kw, word):
 def test_rows_say_what_the_runs_said(tmp_path):
     s = Sweep("constant", parse_grid("b=90 gain.y=0.5,1"), {}, chunk=2)
     assert sweep.run_sweep(s, tmp_path, workers=1) == 2
-    rows = sweep_store.read_sweep(tmp_path).to_pylist()
+    rows = store.read_sweep(tmp_path).to_pylist()
     assert [r["status"] for r in rows] == ["finished", "diverged"]
     r = hc.simulate(hc.constant_cut())
     assert [rows[0][f"crossing{k}"] for k in (1, 2, 3)] == [c.time for c in r.crossings]
@@ -237,7 +238,7 @@ def test_clay_that_yields_has_no_linear_gain_margin(margin):
 def test_a_refused_run_is_a_row(tmp_path):
     s = Sweep("constant", parse_grid("b=90 dt=0.001,0.5"), {"t_max": 0.01})
     sweep.run_sweep(s, tmp_path, workers=1)
-    rows = sweep_store.read_sweep(tmp_path).to_pylist()
+    rows = store.read_sweep(tmp_path).to_pylist()
     assert [r["status"] for r in rows] == ["time limit", "refused"] and "dt = 0.5" in rows[1][
         "cause"
     ]
@@ -248,18 +249,18 @@ def test_only_what_is_missing_is_done_and_the_result_is_the_same(tmp_path):
     assert sweep.run_sweep(small(), whole, workers=1) == 6
     assert sweep.run_sweep(small(), whole, workers=1) == 0
     sweep.run_sweep(small(), torn, workers=1)
-    sweep_store.sweep_part(torn, 1).unlink()
+    store.part_file(torn, 1).unlink()
     (torn / "data" / ".part-000001.parquet.abc").write_bytes(b"half a file")
-    assert sweep_store.missing_parts(small(), torn) == [range(2, 4)]
+    assert store.missing_parts(small(), torn) == [range(2, 4)]
     assert sweep.run_sweep(small(), torn, workers=1) == 2
-    assert columns(sweep_store.read_sweep(torn)) == columns(sweep_store.read_sweep(whole))
+    assert columns(store.read_sweep(torn)) == columns(store.read_sweep(whole))
 
 
 def test_two_processes_give_the_same(tmp_path):
     one, two = tmp_path / "1", tmp_path / "2"
     sweep.run_sweep(small(), one, workers=1)
     sweep.run_sweep(small(), two, workers=2)
-    assert columns(sweep_store.read_sweep(one)) == columns(sweep_store.read_sweep(two))
+    assert columns(store.read_sweep(one)) == columns(store.read_sweep(two))
 
 
 def test_a_changed_sweep_is_refused_not_mixed(tmp_path):
@@ -268,7 +269,7 @@ def test_a_changed_sweep_is_refused_not_mixed(tmp_path):
         sweep.run_sweep(small(seed=1), tmp_path, workers=1)
     (tmp_path / "sweep.json").write_text("{")
     with pytest.raises(ParameterError, match="another sweep"):
-        sweep_store.begin_sweep(small(), tmp_path)
+        store.begin(small(), tmp_path)
 
 
 def test_spec_file(tmp_path):
@@ -277,7 +278,7 @@ def test_spec_file(tmp_path):
         'experiment = "free"\nchunk = 3\n'
         '[vary]\n"gain.x" = "1:2:2"\nforce = [1, 2]\n[fixed]\nt_max = 0.01\n'
     )
-    s = Sweep(**sampling.load_sweep(spec))
+    s = Sweep(**sweep.load_sweep(spec))
     assert (s.experiment, len(s), s.chunk) == ("free", 4, 3)
     for text, word in (
         ("experiment = ", "TOML"),
@@ -286,9 +287,9 @@ def test_spec_file(tmp_path):
     ):
         spec.write_text(text)
         with pytest.raises(ParameterError, match=word):
-            sampling.load_sweep(spec)
+            sweep.load_sweep(spec)
     with pytest.raises(ParameterError, match="spec"):
-        sampling.load_sweep(tmp_path / "none.toml")
+        sweep.load_sweep(tmp_path / "none.toml")
 
 
 COMMAND = [
@@ -329,21 +330,21 @@ def test_interrupted_and_killed_sweeps_go_on(tmp_path, capsys, how, code):
         said, told = p.communicate(timeout=60)
         assert p.returncode == code
     if how == signal.SIGINT:
-        assert "resumes the sweep" in said and told.count(sweep.FINISHING) == 1
+        assert "resumes the sweep" in said and told.count(store_runs.FINISHING) == 1
         assert "Traceback" not in told
     done = len(list((out / "data").glob("part-*")))
     assert 2 <= done < 20
-    sweep_store.read_sweep(out)  # whatever is there is valid
+    store.read_sweep(out)  # whatever is there is valid
     words = [*COMMAND[COMMAND.index("sweep") :], "--workers", "1", "--out", str(out)]
     assert app.main(words) == 0 and "80 runs" in capsys.readouterr().out
-    assert sweep_store.read_sweep(out)["run"].to_pylist() == list(range(80))
+    assert store.read_sweep(out)["run"].to_pylist() == list(range(80))
 
 
 def test_command_draws_maps_and_complains_in_one_line(tmp_path, capsys, monkeypatch):
     args = ["sweep", "--grid", GRID, "--fixed", "t_max=0.02", "--out", str(tmp_path)]
     assert app.main([*args, "--workers", "1"]) == 0
     assert "6 runs" in capsys.readouterr().out and (tmp_path / "status.png").stat().st_size > 5000
-    monkeypatch.setattr(sweep, "run_part", None)  # nothing is left to make, whatever the workers
+    monkeypatch.setattr(store_runs, "run_part", None)  # nothing is left to make
     assert app.main([*args, "--no-maps"]) == 0 and "6 runs" in capsys.readouterr().out
     for extra, word in (
         (["--grid", "b=1:2"], "b = "),
@@ -366,11 +367,11 @@ def test_maps(tmp_path):
         tmp_path,
         workers=1,
     )
-    table = sweep_store.read_sweep(tmp_path)
+    table = store.read_sweep(tmp_path)
     figure = sweep_plots.sweep_plot(table)
     ax = figure.axes[0]
     assert (
-        ax.get_xlabel() == "b [N.s/m]" and ax.get_xscale() == "log" and ax.get_yscale() == "linear"
+        ax.get_xlabel() == "b [N·s/m]" and ax.get_xscale() == "log" and ax.get_yscale() == "linear"
     )
     shown = {t.get_text() for t in figure.legends[0].get_texts()}
     assert shown == {
@@ -442,7 +443,7 @@ def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path, scheduler
         assert sweep.run_sweep(s, far, scheduler=address, progress=kill) >= 24
         assert killed and workers[0].wait(10) == -9
         sweep.run_sweep(s, here, workers=1)
-        assert columns(sweep_store.read_sweep(far)) == columns(sweep_store.read_sweep(here))
+        assert columns(store.read_sweep(far)) == columns(store.read_sweep(here))
     finally:
         for p in workers:
             p.kill()
@@ -454,7 +455,7 @@ def test_unreachable_scheduler_is_one_line(tmp_path):
     with pytest.raises(ParameterError, match="scheduler"):
         sweep.run_sweep(small(), tmp_path, scheduler="tcp://127.0.0.1:9")
     assert time.monotonic() - begin < 60.0  # it ends: dask alone would try for ever by None
-    assert 2.0 * sweep.SCHEDULER_PATIENCE < 10.0  # dask tries for twice as long
+    assert 2.0 * store_runs.SCHEDULER_PATIENCE < 10.0  # dask tries for twice as long
 
 
 def test_a_scheduler_that_dies_is_one_line(tmp_path, capfd, scheduler):
@@ -470,29 +471,29 @@ def test_a_scheduler_that_dies_is_one_line(tmp_path, capfd, scheduler):
 
 def test_a_damaged_folder_is_refused(tmp_path):
     with pytest.raises(ParameterError, match="hapticclay sweep has written"):
-        sweep_store.read_sweep(tmp_path)
+        store.read_sweep(tmp_path)
     Path(tmp_path / "data").mkdir()
     with pytest.raises(ParameterError):
-        sweep_store.read_sweep(tmp_path)
+        store.read_sweep(tmp_path)
 
 
 def test_parts_without_marks_as_0_1_0_wrote_them_are_read(tmp_path):
     import pyarrow.parquet as pq
 
     sweep.run_sweep(small(), tmp_path, workers=1)
-    marked = columns(sweep_store.read_sweep(tmp_path))
+    marked = columns(store.read_sweep(tmp_path))
     for n in range(3):
-        file = sweep_store.sweep_part(tmp_path, n)
-        pq.write_table(sweep_store._read_part(file).replace_schema_metadata(None), file)
-    assert columns(sweep_store.read_sweep(tmp_path)) == marked
+        file = store.part_file(tmp_path, n)
+        pq.write_table(store.read_part(file).replace_schema_metadata(None), file)
+    assert columns(store.read_sweep(tmp_path)) == marked
 
 
 def test_an_estimate_leaves_out_the_first_run_and_patience_is_limited(monkeypatch):
     """On a made-up clock: the first run compiles for a minute, each further one takes `each`."""
     s = Sweep("constant", parse_grid("b=10:1000:40log gain.x=1:2:25"), {"t_max": 0.01})
-    real = sweep_rows.run_point
+    real = sweep.run_point
     for each, runs in (
-        (0.25, sweep_rows.PROBES + 1),
+        (0.25, sweep.PROBES + 1),
         (0.5, 12),
         (30.0, 2),
     ):  # 11 of 0.5 s are more than 5 s, and one of 30
@@ -503,7 +504,7 @@ def test_an_estimate_leaves_out_the_first_run_and_patience_is_limited(monkeypatc
             made.append(args[1])
             return real(*args)
 
-        monkeypatch.setattr(sweep_rows, "run_point", timed)
+        monkeypatch.setattr(sweep, "run_point", timed)
         monkeypatch.setattr(sweep_command.time, "perf_counter", lambda clock=clock: clock[0])
         assert sweep.estimate_time(s)[0] == pytest.approx(each, rel=1e-12)
         assert len(made) == runs and made[0] == made[1]
@@ -549,7 +550,7 @@ def test_without_a_terminal_a_line_tells_every_tenth(tmp_path, capsys, monkeypat
     ]
     assert [(int(m[1]), int(m[2])) for m in told if m] == [(6 * k, 10 * k) for k in range(1, 11)]
     for n in range(30):
-        sweep_store.sweep_part(tmp_path, n).unlink()
+        store.part_file(tmp_path, n).unlink()
     ticks = iter(range(0, 10**6, 100))  # seconds, 100 from one look at the clock to the next
     monkeypatch.setattr(sweep_command.time, "monotonic", lambda: next(ticks))
     assert app.main(args) == 0
@@ -599,7 +600,7 @@ def test_a_map_shows_what_was_never_reached_as_such(tmp_path):
         tmp_path,
         workers=1,
     )
-    table = sweep_store.read_sweep(tmp_path)
+    table = store.read_sweep(tmp_path)
     for value in ("fe_over_v_x", "speed_x"):
         assert (
             sweep_plots.missing_reasons(table, value)
@@ -668,7 +669,7 @@ def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
         seed=4,
     )
     sweep.run_sweep(s, tmp_path, workers=1)
-    table = sweep_store.read_sweep(tmp_path)
+    table = store.read_sweep(tmp_path)
     why = sweep_plots.missing_reasons(table, "fe_over_v_x")
     marks = {
         c.get_label(): len(c.get_offsets())
@@ -684,7 +685,7 @@ def test_a_sampled_map_marks_what_has_no_figure(tmp_path):
 def test_every_column_and_parameter_has_its_unit(tmp_path):
     """Units of the docstrings; a ratio names what it is relative to."""
     sweep.run_sweep(small(), tmp_path, workers=1)
-    table = sweep_store.read_sweep(tmp_path)
+    table = store.read_sweep(tmp_path)
     units = {
         "end_time": "s",
         "crossing2": "s",
@@ -721,7 +722,7 @@ def files_of(out):
 
 def whole(plan, out):
     """Whether the folder has each run once, in order."""
-    return sweep_store.read_sweep(out)["run"].to_pylist() == list(range(len(plan)))
+    return store.read_sweep(out)["run"].to_pylist() == list(range(len(plan)))
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -763,7 +764,7 @@ def test_runs_handed_out_in_any_order_are_made_once(data):
     plan = Sweep("constant", {"b": Range(1.0, 2.0 + n, n)})
     cuts = sorted(data.draw(st.sets(st.integers(0, n), max_size=6)) | {0, n})
     gaps = [range(a, b) for a, b in zip(cuts, cuts[1:], strict=False)][::2]
-    work, jobs, made = sweep.Work(plan, gaps, 1.0), [], []
+    work, jobs, made = store_runs.Work(plan, gaps, 1.0), [], []
     while True:
         while len(jobs) < crew and (runs := work.take(crew)):
             jobs.append(runs)
@@ -777,7 +778,7 @@ def test_runs_handed_out_in_any_order_are_made_once(data):
 
 
 def test_ctrl_c_waits_for_one_run_and_loses_none(tmp_path, monkeypatch):
-    free, real, made = replace(small(), chunk=None), sweep_rows.run_point, []
+    free, real, made = replace(small(), chunk=None), sweep.run_point, []
 
     def struck(plan, index, point):
         if index == 3:
@@ -788,9 +789,9 @@ def test_ctrl_c_waits_for_one_run_and_loses_none(tmp_path, monkeypatch):
     monkeypatch.setattr(sweep, "run_point", struck)
     with pytest.raises(KeyboardInterrupt):
         sweep.run_sweep(free, tmp_path, workers=1)
-    assert made == [0, 1, 2, 3] and sweep_store.missing_parts(free, tmp_path) == [range(4, 6)]
+    assert made == [0, 1, 2, 3] and store.missing_parts(free, tmp_path) == [range(4, 6)]
     with pytest.warns(hc.Warning, match="4 of 6 runs are in"):
-        sweep_store.read_sweep(tmp_path)
+        store.read_sweep(tmp_path)
     monkeypatch.undo()
     assert sweep.run_sweep(free, tmp_path, workers=1) == 2 and whole(free, tmp_path)
 
@@ -799,25 +800,25 @@ def test_ctrl_c_waits_for_one_run_and_loses_none(tmp_path, monkeypatch):
 def test_a_lost_file_is_made_again_between_the_others(tmp_path, lost):
     """Files of any size, as they remain after interruptions."""
     free = replace(small(), chunk=None)
-    with sweep_store.claimed(free, tmp_path) as (plan, _):
+    with store.claimed(free, tmp_path) as (plan, _):
         for a, b in ((0, 1), (1, 4), (4, 6)):
-            sweep.run_part(plan, range(a, b), str(tmp_path))
-    same = columns(sweep_store.read_sweep(tmp_path))
+            store_runs.run_part(plan, range(a, b), str(tmp_path))
+    same = columns(store.read_sweep(tmp_path))
     gone = [(0, 1), (1, 4), (4, 6)][lost]
-    sweep_store.sweep_part(tmp_path, gone[0]).unlink()
-    assert sweep_store.missing_parts(free, tmp_path) == [range(*gone)]
+    store.part_file(tmp_path, gone[0]).unlink()
+    assert store.missing_parts(free, tmp_path) == [range(*gone)]
     assert sweep.run_sweep(free, tmp_path, workers=1) == gone[1] - gone[0]
-    assert columns(sweep_store.read_sweep(tmp_path)) == same
+    assert columns(store.read_sweep(tmp_path)) == same
 
 
 def test_files_that_share_runs_are_refused_and_made_again(tmp_path, capsys):
     """As a worker of a cluster would leave them that was thought dead."""
     free = replace(small(), chunk=None)
-    with sweep_store.claimed(free, tmp_path) as (plan, _):
+    with store.claimed(free, tmp_path) as (plan, _):
         for a, b in ((0, 4), (2, 5), (5, 6)):
-            sweep.run_part(plan, range(a, b), str(tmp_path))
+            store_runs.run_part(plan, range(a, b), str(tmp_path))
     with pytest.raises(ParameterError, match="must have each run once"):
-        sweep_store.read_sweep(tmp_path)
+        store.read_sweep(tmp_path)
     assert sweep.run_sweep(free, tmp_path, workers=1) == 1 and whole(free, tmp_path)
     assert "part-000002.parquet (has runs of another)" in capsys.readouterr().err
 
@@ -825,7 +826,7 @@ def test_files_that_share_runs_are_refused_and_made_again(tmp_path, capsys):
 def test_a_resumed_sweep_keeps_its_chunks(tmp_path):
     free, given_ = replace(small(), chunk=None), replace(small(), chunk=4)
     sweep.run_sweep(given_, tmp_path, workers=1)
-    sweep_store.sweep_part(tmp_path, 1).unlink()
+    store.part_file(tmp_path, 1).unlink()
     assert sweep.run_sweep(free, tmp_path, workers=1) == 2  # the chunk of the folder
     assert sweep.run_sweep(given_, tmp_path, workers=1) == 0
     with pytest.raises(ParameterError, match="another sweep"):
@@ -841,15 +842,15 @@ def test_results_are_the_same_bits_whatever_the_chunk(tmp_path, monkeypatch):
     for size in (1, 4, 100, None):
         plan, out = replace(small(), chunk=size), tmp_path / str(size)
         sweep.run_sweep(plan, out, workers=1)
-        found.append(columns(sweep_store.read_sweep(out)))
+        found.append(columns(store.read_sweep(out)))
     assert found[1:] == found[:1] * 3
 
 
 def test_of_two_workers_only_the_chunks_in_progress_are_finished(tmp_path):
     """An interruption waits for one chunk a worker, none that stands ready behind them."""
     plan = Sweep("constant", parse_grid("b=10:1000:20log gain.x=1:2:2"), {"t_max": 0.2}, chunk=2)
-    with sweep_store.claimed(plan, tmp_path) as (_, todo):
-        results = sweep.run_chunks(plan, tmp_path, todo, 2)
+    with store.claimed(plan, tmp_path) as (_, todo):
+        results = store_runs.run_chunks(plan, tmp_path, todo, 2)
         assert next(results) == 2
         with contextlib.suppress(KeyboardInterrupt):
             results.throw(KeyboardInterrupt)
@@ -857,7 +858,7 @@ def test_of_two_workers_only_the_chunks_in_progress_are_finished(tmp_path):
 
 
 def test_ctrl_c_with_one_worker_finishes_the_chunk(tmp_path, monkeypatch, capsys):
-    real = sweep_rows.run_point
+    real = sweep.run_point
 
     def struck(plan, index, point):
         if index == 2:  # the first of the second chunk
@@ -868,8 +869,8 @@ def test_ctrl_c_with_one_worker_finishes_the_chunk(tmp_path, monkeypatch, capsys
     monkeypatch.setattr(sweep, "run_point", struck)
     with pytest.raises(KeyboardInterrupt):
         sweep.run_sweep(small(), tmp_path, workers=1)
-    assert sweep_store.missing_parts(small(), tmp_path) == [range(4, 6)]
+    assert store.missing_parts(small(), tmp_path) == [range(4, 6)]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     monkeypatch.undo()
     sweep.run_sweep(small(), tmp_path, workers=1)
-    assert len(sweep_store.read_sweep(tmp_path)) == len(small())
+    assert len(store.read_sweep(tmp_path)) == len(small())

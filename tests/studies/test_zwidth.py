@@ -12,11 +12,12 @@ from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
 from hapticclay.studies import boundary, wall_lines, wall_runs
 from hapticclay.studies import zwidth as study
+from hapticclay.studies.wall import KINDS, DeviceWall, as_wall
 from hapticclay.studies.wall_lines import theoretical_damping, worst_hand
-from hapticclay.studies.wall_runs import Press, come_to_rest, growth_rates
+from hapticclay.studies.wall_runs import Press, come_to_rest, growth_rates, stiffest
 from hapticclay.studies.zwidth import BY_REST, zwidth
 from hapticclay.theory import gain_crossings
-from hapticclay.views.style import unit_text
+from hapticclay.views.captions import unit_text
 from hapticclay.views.wall_plots import zwidth_plot
 from tests.oracles.sampled_wall import sample_map
 
@@ -62,7 +63,7 @@ def largest_stiffness(wall):
 @pytest.mark.usefixtures("few_points")
 def test_boundary_of_runs_is_that_of_the_sampled_loop(change):
     wall = replace(BARE, **change)
-    top = theoretical_damping(wall)
+    top = theoretical_damping(as_wall(wall))
     B = (0.0, 0.1 * top, 0.7 * top)
     r = zwidth(wall, B=B).regions[0]
     expected = [largest_stiffness(replace(wall, B=x)) for x in B]
@@ -91,7 +92,7 @@ def test_growth_of_a_run_is_that_of_the_map():
 @pytest.mark.usefixtures("few_points")
 def test_automatic_dampings_reach_from_zero_to_the_largest():
     r = zwidth(BARE, quick=True).regions[0]
-    top = theoretical_damping(BARE)
+    top = theoretical_damping(as_wall(BARE))
     assert stable(replace(BARE, K=1e-3, B=0.999 * top))
     assert not stable(replace(BARE, K=1e-3, B=1.001 * top))
     assert r.B[0] == 0.0 and 0.9 * top < r.B[-1] < top and len(r.B) == 7
@@ -112,7 +113,7 @@ def test_every_hand_of_the_box_holds_the_limit_of_the_worst():
         limits = [largest_stiffness(w) for w in each]
         assert K == pytest.approx(min(limits), rel=1e-4)  # here the worst is a corner
         assert found == pytest.approx(K, rel=3e-3)
-        assert worst_hand(replace(wall, B=B), box) == each[int(np.argmin(limits))].operator
+        assert worst_hand(as_wall(replace(wall, B=B)), box) == each[int(np.argmin(limits))].operator
 
 
 @pytest.mark.usefixtures("few_points")
@@ -161,7 +162,7 @@ def test_a_buzz_without_friction_is_that_of_a_relay():
     device, swings = hc.Device(0.1, 0.5, quantum=2e-5), []
     for K in (50.0, 200.0):
         wall = replace(BARE, K=K, device=device)
-        record = hc.simulate(wall_runs._pressed(wall, Press(), 16.0, 4), every=4)
+        record = hc.simulate(as_wall(wall).rest_run(Press(), 16.0, 4), every=4)
         swing, _ = wall_runs._swing(record, 0.8, 1.0)
         assert amplitude(K, 0.5e-3) < 0.5 * swing < amplitude(K, 1e-3)
         swings.append(swing / K)
@@ -284,7 +285,7 @@ def test_a_wall_is_saved_and_loaded(tmp_path, ending):
     ],
 )
 def test_a_family_is_named_by_symbol_and_unit(vary, values, names):
-    assert [name for name, _ in study._family_walls(BARE, vary, values)] == names
+    assert [name for name, _ in study._family_walls(as_wall(BARE), vary, values)] == names
 
 
 def test_tables_hold_what_the_figure_shows():
@@ -303,10 +304,28 @@ def test_tables_hold_what_the_figure_shows():
 
 
 def test_the_passive_line_has_points_enough_to_be_drawn_smoothly():
-    lines = wall_lines.theory_limits(BARE, 150.0, (0.0, 150.0))
+    lines = wall_lines.theory_limits(as_wall(BARE), 150.0, (0.0, 150.0))
     passive = next(x for x in lines if x.name.startswith("Colgate"))
     inside = [B for B in passive.B if B <= BARE.device.damper]
     assert len(inside) >= wall_lines.LIMIT_POINTS
     assert np.diff(inside).max() <= 0.02 * BARE.device.damper
     # a straight line between its points: 2 (b - B)/Ts
     assert passive.at(0.2) == pytest.approx(2.0 * (BARE.device.damper - 0.2) / BARE.Ts)
+
+
+def test_studies_take_a_third_kind_of_wall(monkeypatch):
+    class Third(hc.VirtualWall):
+        pass
+
+    class ThirdWall(DeviceWall):
+        @property
+        def damping(self):
+            return 1.0
+
+    monkeypatch.setitem(KINDS, Third, ThirdWall)
+    assert type(as_wall(Third())) is ThirdWall and type(as_wall(BARE)) is DeviceWall
+    found = [
+        stiffest([wall], [1.0], 1.0, Press(), lambda share: None)
+        for wall in (Third(device=BARE.device), replace(BARE, B=1.0))
+    ]
+    assert found[0] == found[1]

@@ -72,8 +72,9 @@ def test_a_symptom_page_prints_what_it_says_and_names_the_program_of_its_picture
     assert (ROOT / "examples" / "symptoms" / f"{picture}.py").is_file()
 
 
-def test_the_groove_page_says_what_it_prints(tmp_path):
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "groove.md").read_text(), re.S)
+@pytest.mark.parametrize("page", ["groove.md", "own_controller.md"])
+def test_the_page_says_line_by_line_what_it_prints(page, tmp_path):
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / page).read_text(), re.S)
     out = printed_by(code, tmp_path)
     assert out.splitlines() == re.findall(r"^# (.*)", code, re.M) != []
 

@@ -7,7 +7,7 @@ import matplotlib
 import matplotlib.pyplot as plt
 import pytest
 
-from hapticclay.views import style
+from hapticclay.views import palette, style
 from tests.hunt import HUNTS
 
 ROOT = Path(__file__).parents[2]
@@ -100,5 +100,5 @@ def test_the_style_sheet_is_the_style_of_the_figures():
     )
     assert all(sheet[name] == value for name, value in style.STYLE.items())
     colors = [x["color"] for x in sheet["axes.prop_cycle"]]
-    assert colors == [style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE,
-                      style.SKY_BLUE]  # fmt: skip
+    names = "BLUE", "VERMILION", "GREEN", "PURPLE", "ORANGE", "SKY_BLUE"
+    assert colors == [getattr(palette, name) for name in names]

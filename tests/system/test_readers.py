@@ -23,8 +23,8 @@ from hapticclay.ports.device import Trajectory
 from hapticclay.ports.exchanges import Exchanges
 from hapticclay.results import Result
 from hapticclay.studies.measurement import Measurement
-from hapticclay.studies.sampling import load_sweep
-from hapticclay.studies.sweep_store import read_sweep
+from hapticclay.studies.store import read_sweep
+from hapticclay.studies.sweep import load_sweep
 from hapticclay.views.images import gray_image
 
 PATIENCE = 20  # [s], as an alarm: what waits for ever fails rather than hangs

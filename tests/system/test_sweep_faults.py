@@ -16,8 +16,9 @@ import pytest
 import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.errors import ParameterError
-from hapticclay.studies import sweep, sweep_store
-from hapticclay.studies.sampling import Sweep, parse_grid
+from hapticclay.studies import store, store_runs, sweep
+from hapticclay.studies.sampling import parse_grid
+from hapticclay.studies.sweep import Sweep
 
 RUNS = 80
 
@@ -88,7 +89,7 @@ def copy(swept, tmp_path):
 @pytest.fixture(scope="module")
 def whole(swept):
     """What every sweep of `command` must come to."""
-    return columns(sweep_store.read_sweep(swept))
+    return columns(store.read_sweep(swept))
 
 
 @pytest.fixture
@@ -118,14 +119,14 @@ def test_a_full_disk_is_one_line_and_the_sweep_goes_on_with_room(small_disk, who
     done = subprocess.run(command(out, workers=workers), capture_output=True, text=True)
     one_line_of_a_full_disk(done, "No space left")
     assert not temporary(out)
-    there = len(sweep_store.read_sweep(out))  # all that is there is valid
+    there = len(store.read_sweep(out))  # all that is there is valid
     assert 0 < there < RUNS
     with pytest.raises(ParameterError, match="No space left"):
         sweep.run_sweep(plan(), out, workers=1)
-    assert len(sweep_store.read_sweep(out)) >= there
+    assert len(store.read_sweep(out)) >= there
     subprocess.run(["mount", "-o", "remount,size=4m", small_disk], check=True)
     sweep.run_sweep(plan(), out, workers=1)
-    assert columns(sweep_store.read_sweep(out)) == whole
+    assert columns(store.read_sweep(out)) == whole
 
 
 def test_a_disk_that_is_full_from_the_start_is_one_line(small_disk):
@@ -152,7 +153,7 @@ def test_a_file_beyond_the_limit_of_the_process_is_one_line(tmp_path, whole, wor
     one_line_of_a_full_disk(done, "File too large")
     assert not temporary(tmp_path) and not list((tmp_path / "data").iterdir())
     sweep.run_sweep(plan(), tmp_path, workers=1)
-    assert columns(sweep_store.read_sweep(tmp_path)) == whole
+    assert columns(store.read_sweep(tmp_path)) == whole
 
 
 def alive(process):
@@ -192,10 +193,10 @@ def test_a_killed_parent_is_outlived_by_no_worker_and_no_lock(tmp_path, how):
         p.send_signal(how)
         p.wait()
         assert p.returncode == (-how if how == signal.SIGKILL else 128 + how)
-        with sweep_store.claimed(ours, tmp_path) as (_, todo):
+        with store.claimed(ours, tmp_path) as (_, todo):
             assert 0 < len(todo) < RUNS
         assert until(lambda: not any(map(alive, children)), 5.0)
-    assert sweep_store.missing_parts(ours, tmp_path)  # none had gone on
+    assert store.missing_parts(ours, tmp_path)  # none had gone on
 
 
 def test_a_killed_worker_is_one_line_and_the_sweep_goes_on(tmp_path):
@@ -205,7 +206,7 @@ def test_a_killed_worker_is_one_line_and_the_sweep_goes_on(tmp_path):
         said = [line for line in err.splitlines() if " to go" not in line]
         assert p.returncode == 1 and len(said) == 1 and "worker was killed" in said[0]
     assert sweep.run_sweep(plan(t_max=0.3), tmp_path, workers=1) > 0
-    assert len(sweep_store.read_sweep(tmp_path)) == RUNS
+    assert len(store.read_sweep(tmp_path)) == RUNS
 
 
 def truncated(file, out):
@@ -241,25 +242,25 @@ def flipped(file, out):
 
 
 def copied(file, out):
-    shutil.copy(sweep_store.sweep_part(out, 2), file)
+    shutil.copy(store.part_file(out, 2), file)
 
 
 def foreign(file, out):
     other = out.parent / "other"
     sweep.run_sweep(plan("10:1000:4log"), other, workers=1)
-    shutil.copy(sweep_store.sweep_part(other, 1), file)
+    shutil.copy(store.part_file(other, 1), file)
 
 
 def short(file, out):
     import pyarrow.parquet as pq
 
-    pq.write_table(sweep_store._read_part(file).slice(0, 3), file)
+    pq.write_table(store.read_part(file).slice(0, 3), file)
 
 
 def columnless(file, out):
     import pyarrow.parquet as pq
 
-    pq.write_table(sweep_store._read_part(file).drop_columns(["cause"]), file)
+    pq.write_table(store.read_part(file).drop_columns(["cause"]), file)
 
 
 @pytest.mark.parametrize(
@@ -278,10 +279,10 @@ def columnless(file, out):
 def test_bad_parts_are_named_and_made_again(copy, capsys, whole, harm, fault):
     out = copy
     for n in (1, 7):
-        harm(sweep_store.sweep_part(out, n), out)
+        harm(store.part_file(out, n), out)
     if harm is not short:
         with pytest.raises(ParameterError, match="part-00000[17].parquet"):
-            sweep_store.read_sweep(out)
+            store.read_sweep(out)
     capsys.readouterr()
     assert sweep.run_sweep(plan(), out, workers=1) == 8
     said = capsys.readouterr().err
@@ -289,30 +290,30 @@ def test_bad_parts_are_named_and_made_again(copy, capsys, whole, harm, fault):
         said
         == f"hapticclay: made again: part-000001.parquet ({fault}), part-000007.parquet ({fault})\n"
     )
-    assert columns(sweep_store.read_sweep(out)) == whole
+    assert columns(store.read_sweep(out)) == whole
     assert sweep.run_sweep(plan(), out, workers=1) == 0 and not capsys.readouterr().err
 
 
 def test_many_bad_parts_are_one_short_line(copy, capsys):
     for n in range(12):
-        empty(sweep_store.sweep_part(copy, n), copy)
-    assert len(sweep_store.begin_sweep(plan(), copy)) == 12
+        empty(store.part_file(copy, n), copy)
+    assert len(store.begin(plan(), copy)) == 12
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and said.count(".parquet") == 5 and "7 more" in said
 
 
 def test_a_stray_file_among_the_parts_is_refused_and_kept(copy):
     stray = copy / "data" / "part-000001 (copy).parquet"
-    shutil.copy(sweep_store.sweep_part(copy, 1), stray)
+    shutil.copy(store.part_file(copy, 1), stray)
     with pytest.raises(ParameterError, match="does not belong to the sweep"):
         sweep.run_sweep(plan(), copy, workers=1)
     with pytest.raises(ParameterError, match="copy"):
-        sweep_store.read_sweep(copy)
+        store.read_sweep(copy)
     assert stray.is_file()
 
 
 def test_a_part_that_cannot_be_read_is_refused_not_removed(copy):
-    part = sweep_store.sweep_part(copy, 3)
+    part = store.part_file(copy, 3)
     part.unlink()
     part.symlink_to(part)  # the system finds no end of it, and no fault of the file
     with pytest.raises(ParameterError, match="part-000003.*[Tt]oo many"):
@@ -327,17 +328,17 @@ def to_zeros(part):
 @pytest.mark.parametrize("make", [to_zeros, os.mkfifo, os.mkdir])
 def test_a_part_that_is_no_file_is_refused_at_once(copy, capsys, whole, make):
     """A device that never ends and a pipe without a writer would be read for ever."""
-    part = sweep_store.sweep_part(copy, 3)
+    part = store.part_file(copy, 3)
     part.unlink()
     make(part)
     with pytest.raises(ParameterError, match="part-000003.parquet.*damaged"):
-        sweep_store.read_sweep(copy)
+        store.read_sweep(copy)
     if make is os.mkdir:
         with pytest.raises(ParameterError, match="damaged and cannot be removed"):
             sweep.run_sweep(plan(), copy, workers=1)
         part.rmdir()
     sweep.run_sweep(plan(), copy, workers=1)
-    assert columns(sweep_store.read_sweep(copy)) == whole
+    assert columns(store.read_sweep(copy)) == whole
 
 
 def test_a_part_that_claims_too_many_rows_is_not_read(copy):
@@ -345,11 +346,11 @@ def test_a_part_that_claims_too_many_rows_is_not_read(copy):
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    part = sweep_store.sweep_part(copy, 3)
+    part = store.part_file(copy, 3)
     pq.write_table(pa.table({"run": np.zeros(2_000_000, dtype=np.int64)}), part)
     assert part.stat().st_size < 10_000
     with pytest.raises(ParameterError, match="part-000003.parquet.*damaged"):
-        sweep_store.read_sweep(copy)
+        store.read_sweep(copy)
 
 
 def sweep_study(out, progress):
@@ -368,6 +369,15 @@ def trial_study(out, progress):
     return hc.studies.monte_carlo(trials, out=out, progress=progress)
 
 
+def episode_study(out, progress):
+    pytest.importorskip("gymnasium")
+    from hapticclay.gym.dataset import Recording
+
+    recording = Recording("ProbeClay-v0", 0.1, seed=0, episodes=4, engine="auto")
+    with contextlib.closing(recording.env):
+        return store_runs.run_plan(recording, out, 1, progress=progress)
+
+
 def remove_all(out):
     shutil.rmtree(out)
 
@@ -382,7 +392,10 @@ def replace_sweep(out):
     sweep.run_sweep(plan("1:2:2"), out, workers=1)
 
 
-@pytest.mark.parametrize("study", [sweep_study, column_study, trial_study])
+STUDIES = {sweep_study: RUNS, column_study: 8, trial_study: 8, episode_study: 4}
+
+
+@pytest.mark.parametrize("study", STUDIES)
 @pytest.mark.parametrize(
     "harm, said",
     [
@@ -408,9 +421,9 @@ def test_a_folder_removed_at_work_is_an_error_and_is_made_again(tmp_path, study,
             study(out, lambda n: None)
         shutil.rmtree(out)
     study(out, lambda n: None)
-    table = sweep_store.read_sweep(out)
+    table = store.read_sweep(out)
     assert table["run"].to_pylist() == list(range(table.num_rows))
-    assert table.num_rows == (RUNS if study is sweep_study else 8)
+    assert table.num_rows == STUDIES[study]
 
 
 def test_a_folder_removed_after_the_last_file_is_an_error(tmp_path):
@@ -420,7 +433,7 @@ def test_a_folder_removed_after_the_last_file_is_an_error(tmp_path):
     def progress(n):
         made.append(n)
         if sum(made) == RUNS:
-            sweep_store.sweep_part(tmp_path, 5).unlink()
+            store.part_file(tmp_path, 5).unlink()
 
     with pytest.raises(FileNotFoundError, match=f"76 of {RUNS} runs are in"):
         sweep_study(tmp_path, progress)
@@ -455,14 +468,14 @@ def test_of_sweeps_started_at_once_one_wins_and_the_others_are_refused(tmp_path)
         assert said.count("\n") == 1
         assert "another sweep is at work" in said or "holds another sweep" in said
     winner = plan(b[[code for _, _, code in ends].index(0)], t_max=0.3)
-    table = sweep_store.read_sweep(tmp_path)
+    table = store.read_sweep(tmp_path)
     assert table["run"].to_pylist() == list(range(RUNS))
     assert table["b"].to_pylist() == winner.points(0, RUNS)[:, 0].tolist()
-    assert sweep_store.begin_sweep(winner, tmp_path) == []
+    assert store.begin(winner, tmp_path) == []
 
 
 def test_a_folder_is_held_by_one_until_it_ends(tmp_path, capsys):
-    with sweep_store.claimed(plan(), tmp_path) as (_, todo):
+    with store.claimed(plan(), tmp_path) as (_, todo):
         assert len(todo) == 20
         for again in (plan(), plan("1:2:3")):
             with pytest.raises(
@@ -474,7 +487,7 @@ def test_a_folder_is_held_by_one_until_it_ends(tmp_path, capsys):
         assert not list(tmp_path.glob("data/*"))
     with pytest.raises(ParameterError, match="holds another sweep"):
         sweep.run_sweep(plan("1:2:3"), tmp_path)
-    with sweep_store.claimed(plan(), tmp_path) as (_, todo):
+    with store.claimed(plan(), tmp_path) as (_, todo):
         assert len(todo) == 20
 
 

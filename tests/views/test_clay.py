@@ -13,7 +13,7 @@ import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.studies.removal import removed
 from hapticclay.views import run_figures, run_plots, stage
-from hapticclay.views.style import clay_color
+from hapticclay.views.palette import clay_color
 
 DOCS = Path(__file__).parents[2] / "docs"
 

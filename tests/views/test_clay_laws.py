@@ -14,7 +14,7 @@ from hapticclay.model import clay as clay_module
 from hapticclay.model.clay import LAWS
 from hapticclay.model.traits import Column, Hold, Law, Told
 from hapticclay.scene.text import clay_text
-from hapticclay.views import run_figures, style
+from hapticclay.views import palette, run_figures
 from hapticclay.views.captions import scenario_parts
 
 PLAIN = hc.Profile((0.02, 0.06), (0.0, 20.0, 0.0))
@@ -132,7 +132,7 @@ def test_clay_that_holds_says_with_how_much():
 def test_the_hardest_clay_has_the_darkest_shade(name):
     clay = CLAYS[name]
     x, y = np.meshgrid(np.linspace(-0.01, 0.1, 45), np.linspace(-0.03, 0.03, 13))
-    share = style.clay_share(clay, x, y)
+    share = palette.clay_share(clay, x, y)
     assert share.min() >= 0.0 and share.max() == pytest.approx(1.0, abs=0.2 * bool(clay.smooth))
     some = np.vectorize(lambda x, y: bool(clay.here((x, y))))(x, y)
     if name != "groove":  # whose tool touches it from outside
@@ -159,7 +159,7 @@ def test_a_law_added_is_shown_everywhere(monkeypatch):
     assert record.regions("x")[0]["x"]["grip"] == 7.0
     assert record.expected_speed("x", np.arange(3)) is None
     assert not clay.viscous_at(INSIDE) and clay.viscous_at((0.0, 0.0)) and clay.hold(0).force == 7.0
-    assert style.cutting_force(clay) == 500.0 + 20.0 * style.SHADED[0]
+    assert palette.cutting_force(clay) == 500.0 + 20.0 * palette.SHADED[0]
     assert set(run_figures.figures(record)) == {"velocity", "force"}
 
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from hapticclay.views import style
+from hapticclay.views import palette, style
 from hapticclay.views.figure import FORMATS, csv_text, curves_drawn
 from hapticclay.views.style import figure_size, figure_style, points
 
@@ -127,10 +127,10 @@ def test_a_style_ends_with_its_context():
 def test_printed_colours_differ_in_grey():
     """Luminance of the curves, by the CIE: each of a figure's first four apart by 5 of 100, and
     where not, their dashes differ."""
-    rgb = np.array([style.rgb(color) for color, _ in style.CURVE_STYLES])
+    rgb = np.array([palette.rgb(color) for color, _ in palette.CURVE_STYLES])
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     light = 116.0 * np.cbrt(linear @ (0.2126, 0.7152, 0.0722)) - 16.0
-    dashes = [str(dash) for _, dash in style.CURVE_STYLES]
+    dashes = [str(dash) for _, dash in palette.CURVE_STYLES]
     for i in range(len(light)):
         for j in range(i):
             assert abs(light[i] - light[j]) > 5.0 or dashes[i] != dashes[j]

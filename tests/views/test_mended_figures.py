@@ -10,8 +10,10 @@ from hapticclay.studies.chart import Chart, curve
 from hapticclay.studies.identification import identify
 from hapticclay.views.chart_plots import chart_plot
 from hapticclay.views.identification_plots import identification_plot
+from hapticclay.views.motion import along_motion
+from hapticclay.views.panels import set_title
 from hapticclay.views.run_plots import maneuver_plot
-from hapticclay.views.style import along_motion, set_title, styled
+from hapticclay.views.style import styled
 
 
 @pytest.fixture(scope="module")

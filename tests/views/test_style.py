@@ -1,9 +1,8 @@
-"""The palette: stated once, converted exactly, and free of matplotlib."""
+"""The palette is converted exactly, what draws without matplotlib does not load it, and ticks."""
 
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import matplotlib.colors
 import numpy as np
@@ -11,16 +10,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hapticclay.views import style
+from hapticclay.views import palette, panels
 
-VIEWS = Path(style.__file__).parent
-PALETTE = {name: value for name, value in vars(style).items() if re.fullmatch("#.{6}", str(value))}
+PALETTE = {
+    name: value for name, value in vars(palette).items() if re.fullmatch("#.{6}", str(value))
+}
 
 
 @pytest.mark.parametrize("name", PALETTE)
 def test_conversions_are_those_of_matplotlib(name):
-    assert style.rgb(PALETTE[name]) == pytest.approx(matplotlib.colors.to_rgb(PALETTE[name]))
-    assert style.rgb_bytes(PALETTE[name]) == tuple(
+    assert palette.rgb(PALETTE[name]) == pytest.approx(matplotlib.colors.to_rgb(PALETTE[name]))
+    assert palette.rgb_bytes(PALETTE[name]) == tuple(
         round(255 * x) for x in matplotlib.colors.to_rgb(PALETTE[name])
     )
 
@@ -31,19 +31,16 @@ def test_a_logarithmic_axis_has_two_numbers(low, ratio):
 
     ax = Figure().add_subplot()
     ax.set(yscale="log", ylim=(low, low * ratio))
-    style.plain_ticks(ax.yaxis)
+    panels.plain_ticks(ax)
     ticks = [x for x in ax.get_yticks() if low <= x <= low * ratio]
     assert len({f"{x:g}" for x in ticks}) >= 2
 
 
-def test_colours_are_stated_in_style_alone():
-    for path in VIEWS.glob("*.py"):
-        found = re.findall(r"#[0-9A-Fa-f]{6}\b", path.read_text())
-        assert (path.name == "style.py") == bool(found), (path, found)
-
-
 def test_what_draws_without_matplotlib_does_not_load_it():
-    modules = "live.session", *(f"views.{x}" for x in "style stage page viewer window film".split())
+    modules = (
+        "live.session",
+        *(f"views.{x}" for x in "palette style stage page viewer window film".split()),
+    )
     code = (
         f"import importlib, sys\nfor name in {modules}:\n"
         "    importlib.import_module(f'hapticclay.{name}')\n"
@@ -54,8 +51,8 @@ def test_what_draws_without_matplotlib_does_not_load_it():
 
 
 def test_clay_is_darker_where_it_damps_more():
-    colors = style.clay_color(np.linspace(0.0, 1.0, 11))
+    colors = palette.clay_color(np.linspace(0.0, 1.0, 11))
     assert colors.shape == (11, 3) and (np.diff(colors, axis=0) < 0.0).all()
     np.testing.assert_allclose(
-        colors[[0, -1]], [style.rgb(c) for c in (style.CLAY_PALE, style.CLAY_DEEP)]
+        colors[[0, -1]], [palette.rgb(c) for c in (palette.CLAY_PALE, palette.CLAY_DEEP)]
     )

@@ -17,11 +17,11 @@ from hapticclay.theory import linear_loop
 from hapticclay.views import (
     captions,
     flow_plots,
+    palette,
     path_plots,
     run_figures,
     run_plots,
     running_plots,
-    style,
 )
 from hapticclay.views.stage import Stage, held_words
 from hapticclay.views.viewer import _law_point
@@ -75,7 +75,7 @@ def test_force_over_velocity_shows_measured_held_and_law(held):
     np.testing.assert_allclose(f[moving], 2.0 * np.sign(v[moving]) + 40.0 * v[moving], rtol=1e-14)
     assert f[~moving].tolist() == [-2.0, 2.0]  # the clay pushed back as well
     told = figure.legends[0].get_texts()
-    assert any("F$_y$ = 2 N, b = 40 N$\\cdot$s/m" in x.get_text() for x in told)
+    assert any("F$_y$ = 2 N, b = 40 N·s/m" in x.get_text() for x in told)
 
 
 def test_measured_forces_lie_on_the_laws_of_their_regions(layers):
@@ -205,10 +205,11 @@ def test_film_and_window_show_isotropic_clay_on_its_law():
     def frame(p, v, fe):
         return Frame(0.0, p, v, fe, FREE)
 
+    along, each = (hc.Clay(LAYERS, LAYERS, isotropic=x) for x in (True, False))
     points = [
-        _law_point(frame((0.0, 0.0), (0.1, 0.1), FREE), 0, True),
-        _law_point(frame((0.06, 0.0), (-0.03, 0.04), (-3.0, 4.0)), 0, True),
-        _law_point(frame((0.06, 0.0), (-0.03, 0.04), (-3.0, 4.0)), 1, False),
+        _law_point(frame((0.0, 0.0), (0.1, 0.1), FREE), 0, along),
+        _law_point(frame((0.06, 0.0), (-0.03, 0.04), (-3.0, 4.0)), 0, along),
+        _law_point(frame((0.06, 0.0), (-0.03, 0.04), (-3.0, 4.0)), 1, each),
     ]
     np.testing.assert_allclose(points, [(np.nan, np.nan), (-5.0, -5.0), (4.0, 4.0)])
 
@@ -236,12 +237,12 @@ def test_table_of_a_run_names_the_law_and_the_stops(held):
 def test_title_and_map_name_the_flow(layers):
     figure = run_plots.velocity_plot(layers)
     said = " ".join(figure.axes[0].get_title(loc="left").split())
-    for part in ("F$_y$ = 1, 3 N", "K$_c$ = 4 N/(m/s)$^n$", "n = 0.4", "b = 20 N"):
+    for part in ("F$_y$ = 1, 3 N", "K$_c$ = 4 N/(m/s)ⁿ", "n = 0.4", "b = 20 N"):
         assert part in said
     texts = [t.get_text() for t in path_plots.path_plot(layers).axes[0].texts]
     assert texts == [
-        "F$_y$ = 1 N\nb = 20 N$\\cdot$s/m",
-        "F$_y$ = 3 N\nK$_c$ = 4 N/(m/s)$^n$\nn = 0.4",
+        "F$_y$ = 1 N\nb = 20 N·s/m",
+        "F$_y$ = 3 N\nK$_c$ = 4 N/(m/s)ⁿ\nn = 0.4",
     ]
     only = dataclasses.replace(hc.constant_cut(), clay=hc.slab(hc.Flow(Fy=3.0), 0.05, 0.15))
     assert not any(x.startswith("b =") for x in captions.scenario_parts(only))
@@ -251,11 +252,11 @@ def test_clay_is_shaded_by_what_it_takes_to_cut_it(layers):
     """By b where no clay yields; else by the force at 1 cm/s."""
     viscous = hc.variable_cut().clay
     x = np.linspace(0.0, 0.2, 41)
-    share = style.clay_share(viscous, x, 0.03)
+    share = palette.clay_share(viscous, x, 0.03)
     np.testing.assert_array_equal(share, viscous.at(x, 0.03).max(axis=0) / viscous.largest)
     clay = hc.Clay(LAYERS, LAYERS)
     soft, hard = 1.0 + 20.0 * 0.01, 3.0 + 4.0 * 0.01**0.4
-    got = style.clay_share(clay, np.array([0.0, 0.07, 0.12, 0.2]), 0.0)
+    got = palette.clay_share(clay, np.array([0.0, 0.07, 0.12, 0.2]), 0.0)
     np.testing.assert_allclose(got, [0.0, soft / hard, 1.0, 0.0], rtol=1e-15)
     patches = run_plots.velocity_plot(layers).axes[0].patches
     shown = [p for p in patches if p.get_label() in ("clay", "_")]
@@ -275,10 +276,10 @@ def test_arrow_is_the_force_of_the_clay_on_the_handle():
     stage.pose((1.5, -1.5))
     stage.push((3.0, -4.0), True)
     begin, end, still = stage.arrow
-    assert still and stage.arrow.color == style.SKY_BLUE
+    assert still and stage.arrow.color == palette.SKY_BLUE
     np.testing.assert_allclose((end - begin) / 0.08, (-0.6, 0.8, 0.0), atol=1e-12)
     stage.push((1.0, 0.0), False)
-    assert stage.arrow.color == style.BLUE
+    assert stage.arrow.color == palette.BLUE
     stage.push((1e6, 0.0), False)  # at a border: no arrow across the room
     assert np.linalg.norm(stage.arrow.end - stage.arrow.begin) == pytest.approx(0.16)
     stage.push(FREE, False)

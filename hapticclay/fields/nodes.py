@@ -1,0 +1,371 @@
+"""Nodes for numbers, words and whatever has no fields of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import functools
+import math
+import os
+import pkgutil
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+from ..errors import (
+    Bound,
+    ParameterError,
+    choice,
+    integer,
+    is_series,
+    nearest,
+    number,
+    numbers_of,
+    quantity,
+    table_of,
+)
+from ..units import is_quantity
+
+AXES = ("x", "y")
+Axis = Literal["x", "y"]
+Seed = Annotated[int, Bound(0, 2**32 - 1)]
+JOINTS = ("shoulder", "elbow")  # also named x and y
+KIND = "kind"  # key of the class, for a field of several classes
+ENTIRE = None  # key of the value of a whole field, besides those of its entries
+UNSET = dataclasses.MISSING
+MOST_LISTED = 8  # names that an error lists besides the nearest one
+
+
+class Node:
+    """A type of values: this one takes anything.
+
+    Attributes:
+        hint: its type hint, without annotations.
+        bound: bounds and unit of its numbers.
+        none: whether it takes None, in text "none".
+        words: words that it takes.
+        takes_numbers: whether it takes a number, which may have a unit.
+        arity: words of a command line that make a value; infinite for any number of them.
+    """
+
+    hint: Any = Any
+    bound, none, takes_numbers = Bound(), False, False
+    words: tuple[str, ...] = ()
+    arity: float = 1
+    members: Sequence[Node] = ()  # whose parts are its parts
+
+    def wants(self) -> str:
+        """What it takes, in words that follow "must be"."""
+        return "a value"
+
+    def check(self, field: str, value: Any, owner: Any = None) -> Any:
+        """The value as the field keeps it; owner has the fields that bounds name."""
+        if not self.fits(value):
+            raise ParameterError(field, value, f"must be {self.wants()}")
+        return value
+
+    def fits(self, value: Any, old: Any = UNSET) -> bool:
+        """Whether this member of a union is the one to check, read or write a value."""
+        return True
+
+    def read(self, value: Any, path: str, old: Any = UNSET) -> Any:
+        """A value from plain data, not yet checked; old: the value before."""
+        if isinstance(value, Mapping) and ENTIRE in value:
+            old = self.read(value[ENTIRE], path, old)
+            value = {k: v for k, v in value.items() if k is not ENTIRE}
+        if self.none and isinstance(value, str) and value.lower() == "none":
+            return None
+        return self._read(value, path, old)
+
+    def _read(self, value: Any, path: str, old: Any) -> Any:
+        if isinstance(value, Mapping):
+            name, inner = next(iter(value.items()), ("", value))
+            bound = f"no such field: {path} has no parts"
+            raise ParameterError(join_names(path, name), inner, bound)
+        return value
+
+    def write(self, value: Any, old: Any, path: str, units: dict[str, str]) -> Any:
+        """Plain data of a value; old: what to differ from, UNSET writes all, None the defaults."""
+        if value is None or isinstance(value, bool | int | float | str):
+            return value
+        if hasattr(value, "tolist"):
+            return value.tolist()
+        if isinstance(value, tuple | list):
+            return [self.write(x, old, join_names(path, i), units) for i, x in enumerate(value)]
+        if self.hint is Any and callable(value) and (name := function_name(value)):
+            return name
+        raise ParameterError(path, value, "cannot be written to a file")
+
+    def classes(self) -> dict[str, type]:
+        """Classes of the parts that it takes, by lower-case name."""
+        return {name: kind for node in self.members for name, kind in node.classes().items()}
+
+    def bounds_at(self, names: Sequence[str]) -> list[Bound]:
+        """Bounds of the values at a dotted name below; none where there is no such name."""
+        if not names:
+            return [self.bound]
+        return [bound for node, rest in self.below(*names) for bound in node.bounds_at(rest)]
+
+    def below(self, name: str, *rest: str) -> Iterable[tuple[Node, Sequence[str]]]:
+        """Nodes of a name, and the names below each."""
+        return ()
+
+    def leaves(self, path: str, default: Any, about: str) -> Iterator[Field]:
+        """The fields below it that take numbers or words; itself if it has no parts."""
+        yield Field(path, self, default, about)
+
+
+class Field(NamedTuple):
+    """A field that takes numbers or words.
+
+    Attributes:
+        name: its dotted name.
+        node: its type.
+        default: its default value; UNSET if it must be given.
+        about: its description.
+    """
+
+    name: str
+    node: Node
+    default: Any
+    about: str
+
+    @property
+    def bound(self) -> Bound:
+        """Its bound and unit."""
+        return self.node.bound
+
+    @property
+    def kind(self) -> Any:
+        """Its type hint, without annotations."""
+        return self.node.hint
+
+    @property
+    def unit(self) -> str:
+        """Its unit; "" for none."""
+        return self.node.bound.unit
+
+
+def limits(bound: Bound, owner: Any) -> dict[str, Any]:
+    """Arguments of `number`; owner has the field that the bound names."""
+    low = getattr(owner, bound.low) if isinstance(bound.low, str) else bound.low
+    return {"low": low, "high": bound.high, "above": bound.above, "unit": bound.unit}
+
+
+class Number(Node):
+    """A finite float."""
+
+    takes_numbers = True
+
+    def __init__(self, bound: Bound):
+        self.bound, self.high = bound, bound.high
+        self.low = math.inf if isinstance(bound.low, str) else bound.low
+
+    def wants(self) -> str:
+        return self.bound.number_words()
+
+    def check(self, field: str, value: Any, owner: Any = None) -> Any:
+        if type(value) is float and self.low < value < self.high:
+            return value
+        return number(field, value, **limits(self.bound, owner))
+
+    def _read(self, value: Any, path: str, old: Any) -> Any:
+        if isinstance(value, str):
+            x = quantity(path, value, self.bound.unit)
+            return value if x is None else x
+        return super()._read(value, path, old)
+
+
+class Whole(Number):
+    """A whole number; a float stands for it in sweeps and words."""
+
+    def wants(self) -> str:
+        return self.bound.integer_words()
+
+    def check(self, field: str, value: Any, owner: Any = None) -> Any:
+        low = limits(self.bound, owner)["low"]
+        return integer(field, value, low, self.high)
+
+    def _read(self, value: Any, path: str, old: Any) -> Any:
+        x = super()._read(value, path, old)
+        return int(x) if isinstance(x, float) and x.is_integer() else x
+
+
+class Flag(Node):
+    """True or False; 1.0 and 0.0 stand for them in sweeps."""
+
+    arity = 0
+
+    def wants(self) -> str:
+        return "True or False"
+
+    def fits(self, value: Any, old: Any = UNSET) -> bool:
+        return isinstance(value, bool)
+
+    def _read(self, value: Any, path: str, old: Any) -> Any:
+        if isinstance(value, float) and value in (0.0, 1.0):
+            return bool(value)
+        return super()._read(value, path, old)
+
+
+class Word(Node):
+    """One of some words."""
+
+    def __init__(self, words: tuple[str, ...]):
+        self.words = words
+
+    def wants(self) -> str:
+        return f"one of {', '.join(self.words)}"
+
+    def check(self, field: str, value: Any, owner: Any = None) -> Any:
+        return choice(field, value, self.words)
+
+    def fits(self, value: Any, old: Any = UNSET) -> bool:
+        return isinstance(value, str) and not is_quantity(value)
+
+
+class Text(Node):
+    """A text, which may be empty where the default is."""
+
+    def __init__(self, empty: bool = False):
+        self.empty = empty
+
+    def wants(self) -> str:
+        return "a string" if self.empty else "a non-empty string"
+
+    def fits(self, value: Any, old: Any = UNSET) -> bool:
+        return isinstance(value, str) and (self.empty or value != "")
+
+
+@functools.lru_cache(maxsize=64)
+def place_names(n: int) -> tuple[str, ...]:
+    """Names of n numbers that have none."""
+    return tuple(map(str, range(n)))
+
+
+class Numbers(Node):
+    """A tuple of numbers, as many as have names; or of any length, or of rows of any length."""
+
+    takes_numbers = True
+
+    def __init__(self, bound: Bound, any_length: bool, item: Node | None = None):
+        self.bound, self.any_length = bound, any_length
+        self.item = item or Number(bound)
+        self.rows = item is not None
+        self.arity = math.inf if any_length else len(bound.names)
+
+    def wants(self) -> str:
+        if self.rows:
+            return "rows of numbers, all of one length"
+        names = self.bound.names
+        return (
+            "a sequence of numbers"
+            if self.any_length
+            else f"{len(names)} numbers ({', '.join(names)})"
+        )
+
+    def check(self, field: str, value: Any, owner: Any = None) -> Any:
+        bounds, names = limits(self.bound, owner), self.bound.names
+        if self.rows:
+            return table_of(field, value, **bounds)
+        if self.any_length:
+            if not is_series(value) or not hasattr(value, "__len__"):
+                raise ParameterError(field, value, f"must be {self.wants()}")
+            names = place_names(len(value))
+        return numbers_of(field, value, names, **bounds)
+
+    def fits(self, value: Any, old: Any = UNSET) -> bool:
+        return is_series(value)
+
+    def _read(self, value: Any, path: str, old: Any) -> Any:
+        if isinstance(value, Mapping):
+            return self._with_entries(value, path, old)
+        if isinstance(value, list | tuple):
+            return tuple(self.item.read(x, join_names(path, i)) for i, x in enumerate(value))
+        if self.any_length and isinstance(value, str) and value.lower() in ("", "none"):
+            return ()
+        x = Number(self.bound).read(value, path)
+        if self.rows or isinstance(x, bool) or not isinstance(x, int | float):
+            return x
+        return (x,) * (1 if self.any_length else len(self.bound.names))
+
+    def _with_entries(self, given: Mapping[Any, Any], path: str, old: Any) -> Any:
+        """The old numbers with some changed, by name or place."""
+        out = list(old) if isinstance(old, tuple | list) else []
+        known = self._places(len(out))
+        for name, x in given.items():
+            inner = join_names(path, name)
+            if name not in known and not (self.any_length and name.isdecimal()):
+                raise no_field(inner, x, [join_names(path, n) for n in known])
+            i = known.get(name, len(out))
+            if i >= len(out):
+                count = f"has {len(out)} entries" if out else "is not given"
+                raise ParameterError(inner, x, f"no such entry: {path} {count}")
+            out[i] = self.item.read(x, inner, out[i])
+        return tuple(out)
+
+    def _places(self, n: int) -> dict[str, int]:
+        """Places of its numbers, of which there are n if it is of any length, by name."""
+        names = self.bound.names
+        if self.any_length:
+            return {str(i): i for i in range(n)}
+        also = AXES if names == JOINTS else ()
+        return {x: i for row in (names, also, place_names(len(names))) for i, x in enumerate(row)}
+
+    def below(self, name: str, *rest: str) -> Iterable[tuple[Node, Sequence[str]]]:
+        found = name.isdecimal() if self.any_length else name in self._places(0)
+        return [(self.item, rest)] * found
+
+
+CLASS_WORDS: dict[Any, str] = {
+    Callable: "a function",
+    Iterable: "an iterable, as a list",
+    Mapping: "a dictionary",
+    dict: "a dictionary",
+    bool: "True or False",
+    os.PathLike: "a path",
+    str: "a path",  # where PathLike stands beside it
+    type(None): "None",
+}
+WIDER: dict[Any, Any] = {Sequence: Iterable, Path: os.PathLike}  # an array is not a Sequence
+
+
+def class_words(kind: Any) -> str:
+    """A class in words, with its article."""
+    article = "an" if kind.__name__[0] in "AEIOU" else "a"
+    return CLASS_WORDS.get(kind) or f"{article} {kind.__name__}"
+
+
+def join_names(path: str, name: object) -> str:
+    """A dotted name."""
+    return f"{path}.{name}" if path else str(name)
+
+
+def no_field(name: str, value: Any, known: Sequence[str]) -> ParameterError:
+    """The error for an unknown field; it suggests the nearest one."""
+    path, _, last = name.rpartition(".")
+    if not known:
+        bound = f"{path} is not given: give it as a whole, in a file as [[{path}]]"
+        return ParameterError(name, value, bound)
+    depth = name.count(".")
+    level = list(dict.fromkeys(".".join(k.split(".")[: depth + 1]) for k in known))
+    near = nearest(name, level)
+    if not near:  # another part may have this field
+        ends = {k.rpartition(".")[2]: k for k in reversed(known)}
+        near = [ends[n] for n in nearest(last, ends)]
+    bound = "no such field"
+    if not near or len(level) <= MOST_LISTED:
+        bound += f"; there are {', '.join(k.removeprefix(f'{path}.') for k in level)}"
+    while isinstance(value, Mapping) and len(value) == 1:  # what was given of it
+        inner, value = next(iter(value.items()))
+        name = name if inner is ENTIRE else join_names(name, inner)
+    return ParameterError(name, value, f"{bound}; did you mean {near[0]!r}?" if near else bound)
+
+
+def function_name(function: Any) -> str:
+    """The name "package.module:name" by which a function can be imported; "" for none."""
+    name = f"{getattr(function, '__module__', '')}:{getattr(function, '__qualname__', '')}"
+    with contextlib.suppress(ImportError, AttributeError, ValueError):
+        if not name.startswith("__main__") and pkgutil.resolve_name(name) is function:
+            return name
+    return ""
