@@ -73,7 +73,8 @@ def draw(rows: list[dict], problem: str, labels: dict[str, str]):
     import matplotlib
     from matplotlib.figure import Figure
 
-    from hapticclay.views.style import STYLE, unit_text
+    from hapticclay.views.captions import unit_text
+    from hapticclay.views.style import STYLE
 
     mine = [r for r in rows if r["problem"] == problem]
     kinds = [k for k in labels if any(r[k] is not None for r in mine)]

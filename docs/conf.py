@@ -71,6 +71,7 @@ nitpick_ignore_regex = [
     ("py:class", r".*\.Exchanged|Chart"),  # what logs and labs hold
     ("py:class", r".*\.(StabilityMap|YieldMap)"),  # made by the command line
     ("py:class", r"gymnasium\..*"),  # by their private modules
+    ("py:class", r"collections\.abc\.Callable\[\[\]"),  # beside a default that is a function
 ]
 linkcheck_timeout = 20
 
@@ -242,7 +243,8 @@ def plain_defaults(app, what, name, thing, options, signature, returned):
         signature: the text of its arguments.
         returned: the text of what it returns.
     """
-    spelled = (signature or "").replace("<factory>", "...").replace("np.ndarray", "numpy.ndarray")
+    spelled = (signature or "").replace("<factory>", "...")
+    spelled = re.sub(r"(?<![\w.])(?:np\.)?ndarray", "numpy.ndarray", spelled)
     return re.sub(r"(?<!=) \[[^\]]*\]", "", spelled) or None, returned
 
 
