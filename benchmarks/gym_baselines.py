@@ -11,14 +11,17 @@ import datetime
 import re
 import subprocess
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 
 from hapticclay import files
 from hapticclay.gym import baselines, scores
-from hapticclay.gym.quantities import table_of
+from hapticclay.gym.draws import Range
+from hapticclay.gym.quantities import Quantity
 
 from . import common
 
@@ -36,14 +39,14 @@ def page_of(id: str) -> Path:
     return DOCS / f"gym_{re.sub(r'(?<!^)(?=[A-Z])', '_', id.split('-')[0]).lower()}.md"
 
 
-def measured(id: str, seeds: int, engine: str) -> dict[str, Any]:
+def measure(id: str, seeds: int, engine: str) -> dict[str, Any]:
     """Return the rows of an environment."""
     rows = {}
     for name, maker in baselines.BASELINES[id].items():
         found = baselines.returns(id, maker, range(seeds), engine=engine)
         mean, half = baselines.mean_of(found.total)
-        told = {k: float(np.mean(found.info[k])) for k in SHOWN[id]}
-        rows[name] = {"return": mean, "half": half, "length": float(found.length.mean()), **told}
+        info = {k: float(np.mean(found.info[k])) for k in SHOWN[id]}
+        rows[name] = {"return": mean, "half": half, "length": float(found.length.mean()), **info}
         print(f"{id}, {name}: {mean:.2f} +- {half:.2f}", flush=True)
     means = {name: row["return"] for name, row in rows.items()}
     for name, score in scores.scores_of(id, means).items():
@@ -51,7 +54,7 @@ def measured(id: str, seeds: int, engine: str) -> dict[str, Any]:
     return rows
 
 
-def table(id: str, rows: dict[str, Any], seeds: int, told: str) -> str:
+def table(id: str, rows: dict[str, Any], seeds: int, measured: str) -> str:
     """Return the table of an environment."""
     columns = ["length", *SHOWN[id], *(["score"] if id in scores.ANCHORS else [])]
     lines = [
@@ -62,7 +65,9 @@ def table(id: str, rows: dict[str, Any], seeds: int, told: str) -> str:
         cells = " | ".join(f"{row[x]:.3g}" for x in columns)
         lines.append(f"| {name} | {row['return']:.2f} ± {row['half']:.2f} | {cells} |")
     lines.append("")
-    lines.append(f"Means over the seeds 0 to {seeds - 1}, with 95 % intervals. Measured {told}.")
+    lines.append(
+        f"Means over the seeds 0 to {seeds - 1}, with 95 % intervals. Measured {measured}."
+    )
     return "\n".join(lines)
 
 
@@ -83,18 +88,32 @@ def commit() -> str:
     return f"on {datetime.date.today()} at commit {found.stdout.strip() or 'unknown'}"
 
 
+def quantity_table(quantities: Sequence[Quantity]) -> str:
+    """Markdown table of quantities: number, name, bounds, unit."""
+    rows = ["| num | name | min | max | unit |", "|---|---|---|---|---|"]
+    for i, q in enumerate(quantities):
+        rows.append(f"| {i} | {q.name} | {q.low:g} | {q.high:g} | {q.unit or '-'} |")
+    return "\n".join(rows)
+
+
+def draw_table(ranges: Mapping[str, Range]) -> str:
+    """Markdown table of the numbers drawn."""
+    rows = ["| option | what | drawn from | law | allowed | unit |", "|---|---|---|---|---|---|"]
+    for name, r in ranges.items():
+        law = "log-uniform" if r.log else "uniform"
+        ends = f"{r.low:g} to {r.high:g} | {law} | {r.least:g} to {r.most:g}"
+        rows.append(f"| `{name}` | {r.what} | {ends} | {r.unit or '-'} |")
+    return "\n".join(rows)
+
+
 def spaces(id: str) -> dict[str, str]:
     """Return the tables of an environment's spaces and draws, by section."""
-    import gymnasium
-
-    from hapticclay.gym import draws
-
     env: Any = gymnasium.make(f"hapticclay/{id}", engine="python").unwrapped
     task = env.task
     return {
-        "actions": table_of(task.actions),
-        "observations": table_of(task.observations),
-        "draws": draws.table_of(task.ranges),
+        "actions": quantity_table(task.actions),
+        "observations": quantity_table(task.observations),
+        "draws": draw_table(task.ranges),
     }
 
 
@@ -106,11 +125,11 @@ def main(argv: list[str] | None = None) -> dict[str, Any]:
     parser.add_argument("--docs", action="store_true")
     parser.add_argument("--ids", nargs="*", default=list(baselines.BASELINES))
     a = parser.parse_args(argv)
-    told, found = commit(), {}
+    when, found = commit(), {}
     for id in a.ids:
-        found[id] = measured(id, a.seeds, a.engine)
+        found[id] = measure(id, a.seeds, a.engine)
         if a.docs:
-            put(page_of(id), "baselines", table(id, found[id], a.seeds, told))
+            put(page_of(id), "baselines", table(id, found[id], a.seeds, when))
             for section, text in spaces(id).items():
                 put(page_of(id), section, text)
     return common.write(a.out, "gym_baselines", {"seeds": a.seeds, "environments": found})

@@ -74,22 +74,23 @@ def page(rows: list[dict[str, Any]], steps: tuple[float, ...] = STEPS) -> str:
     head += ["the same at a quarter of the step"]
     cells, worst = [], [0.0, 0.0]
     for row in rows:
-        told, exact, (run, *finer) = row["predicted"], row["exact"], row["runs"]
+        theory, exact, (run, *finer) = row["predicted"], row["exact"], row["runs"]
         law = {k: v for k, v in row["flow"].items() if v and (k != "n" or row["flow"]["K"])}
         cell = [f"{row['K']:g}", ", ".join(f"{k} = {v:g}" for k, v in law.items())]
-        cell += [f"{1e3 * told['speed']:.4g}", f"{told['omega'] / math.tau:.4g}"]
-        cell += [f"{100.0 * told['third']:.2g} %", "yes" if told["trusted"] else "no"]
-        cell += [percent(exact[k], told[k]) for k in ("speed", "omega")] if exact else ["-", "-"]
+        cell += [f"{1e3 * theory['speed']:.4g}", f"{theory['omega'] / math.tau:.4g}"]
+        cell += [f"{100.0 * theory['third']:.2g} %", "yes" if theory["trusted"] else "no"]
+        cell += [percent(exact[k], theory[k]) for k in ("speed", "omega")] if exact else ["-", "-"]
         if run is None:
             cell += ["out of reach", "-", "-", "-", "-"]
         else:
-            ratios = run["fundamental"] / told["speed"] - 1.0, run["omega"] / told["omega"] - 1.0
-            if told["trusted"]:
+            pairs = ("fundamental", "speed"), ("omega", "omega")
+            ratios = [run[a] / theory[b] - 1.0 for a, b in pairs]
+            if theory["trusted"]:
                 worst = [max(w, abs(r)) for w, r in zip(worst, ratios, strict=True)]
             cell += [f"{100.0 * r:+.2g} %" for r in ratios]
             cell += [percent(run[k], exact[k]) for k in ("speed", "omega")] if exact else ["-", "-"]
-            fine = finer[0] if finer else None
-            cell.append(percent(fine["speed"], exact["speed"]) if exact and fine else "-")
+            quarter = finer[0] if finer else None
+            cell.append(percent(quarter["speed"], exact["speed"]) if exact and quarter else "-")
         cells.append(cell)
     return (
         "\n\n".join(

@@ -86,14 +86,9 @@ def leaders(rows: list[dict], kind: str = "crossing") -> list[dict[str, Any]]:
 
 def who_leads(found: list[dict[str, Any]], unit: str = "s") -> str:
     """One sentence on which package is fastest in which span of errors, and by what factor."""
-    spans: list[list[dict[str, Any]]] = []
-    for x in found:
-        if spans and spans[-1][0]["package"] == x["package"]:
-            spans[-1].append(x)
-        else:
-            spans.append([x])
     parts = []
-    for span in spans:
+    for _, run in itertools.groupby(found, lambda x: x["package"]):
+        span = list(run)
         asked = list(dict.fromkeys(error_text(x["asked"]) for x in (span[0], span[-1])))
         part = f"{span[0]['package']} at {' to '.join(asked)} {unit}"
         factors = [x["factor"] for x in span if x["factor"]]

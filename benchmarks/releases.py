@@ -7,8 +7,8 @@
 The first two ask whatever `hapticclay` this interpreter imports a fixed set of questions: scenes
 of every kind, analyses, identification, the paper's ledger, sweeps, the command line. Each answer
 is taken apart into named parts (numbers, texts, arrays); `digests.json` holds them with one SHA-256
-digest per question, and `arrays/` the arrays, thinned, so that the size of a difference can be
-told. `records/` holds records as this release saves them; with --load, the records of another
+digest per question, and `arrays/` the arrays, thinned, so that the size of a difference is
+known. `records/` holds records as this release saves them; with --load, the records of another
 release are read instead. Wall times and versions are left out.
 
 The third prints one line for each question whose answers differ: for an array or a number the
@@ -128,11 +128,11 @@ def hand_option(place: Place, words: tuple[str, ...], nominal: bool) -> list[str
     Raises:
         LookupError: its help knows no such option.
     """
-    told = command(place, (*words, "--help"))["stdout"]
+    text = command(place, (*words, "--help"))["stdout"]
     for name in ("impedance", "operator", "hand"):
-        if f"--no-{name}" in told:
+        if f"--no-{name}" in text:
             return [f"--{name}" if nominal else f"--no-{name}"]
-        if f"--{name} " in told:
+        if f"--{name} " in text:
             return [f"--{name}", "nominal" if nominal else "none"]
     raise LookupError(f"{' '.join(words)}: no option for the hand in its help; see hand_option")
 

@@ -140,7 +140,7 @@ def measure(problem: Problem, quick: bool, rounds: int) -> tuple[list[dict[str, 
         quick: two settings of each method alone.
         rounds: how often each setting is run.
     """
-    exact, told = problem.reference()
+    exact, notes = problem.reference()
     jobs = [(m, x) for m in problem.methods() for x in m.settings[: 2 if quick else None]]
     runs = [(f"{m.package} {m.name}", functools.partial(m.solve, x)) for m, x in jobs]
     first, walls = take_turns(runs, rounds)
@@ -156,7 +156,7 @@ def measure(problem: Problem, quick: bool, rounds: int) -> tuple[list[dict[str, 
         }
         for (m, x), r, wall in zip(jobs, first, walls, strict=True)
     ]
-    return rows, told
+    return rows, notes
 
 
 def figure_name(problem: str) -> str:

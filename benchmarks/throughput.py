@@ -98,8 +98,8 @@ def native(scenario: hc.Scenario, steps: int) -> tuple[float, float, float]:
     def bare() -> float:
         return steps * floor(scenario, steps, time.process_time)
 
-    s, pool = lasting(scenario, steps), batch.BatchPool(1)
-    first, short, then = bare(), timed(pool.brief, s)[0][1], bare()
+    s, pool = lasting(scenario, steps), batch.BatchPool()
+    first, short, then = bare(), timed(pool.summary, s)[0][1], bare()
     whole = timed(hc.simulate, s, engine="native")[0][1]
     between = bare()
     thin = timed(hc.simulate, s, engine="native", every=1_000_000)[0][1]
@@ -181,13 +181,13 @@ def beside(
                 aside.append(both() - begin)
             self.own.made = made + runs
 
-        def _go(self, *args: Any) -> Any:
+        def run(self, *args: Any) -> Any:
             self._turn(1)
-            return super()._go(*args)
+            return super().run(*args)
 
-        def many(self, scenarios: Any, keys: Any) -> Any:
-            self._turn(len(scenarios))
-            return super().many(scenarios, keys)
+        def together(self, jobs: Any) -> Any:
+            self._turn(len(jobs))
+            return super().together(jobs)
 
     usual, batch.BatchPool = batch.BatchPool, Turns
     try:

@@ -70,7 +70,7 @@ def reference(s: hc.Scenario, times: np.ndarray) -> tuple[np.ndarray, str]:
     """Positions [m], and what a second solution says of their error."""
     one, other = solved(s), solved(s, method=SECOND[0], rtol=SECOND[1])
     p, apart = one(times)[0], one(times)[0] - other(times)[0]
-    told = (
+    text = (
         "The reference is the arm in joint space under DOP853 at 1e-12, which stops where an axis "
         "comes to rest or is let go (`tests/oracles/yielding.py`); nothing of hapticclay steps it."
     )
@@ -81,7 +81,7 @@ def reference(s: hc.Scenario, times: np.ndarray) -> tuple[np.ndarray, str]:
     else:
         same = "stops otherwise"
     return p, (
-        f"{told} A second solution, {SECOND[0]} at {SECOND[1]:g}, {same}, and differs by at most "
+        f"{text} A second solution, {SECOND[0]} at {SECOND[1]:g}, {same}, and differs by at most "
         f"{np.abs(apart).max():.0e} m."
     )
 

@@ -71,8 +71,8 @@ def page(rows: Sequence[dict[str, Any]]) -> str:
     for r in rows:
         gap = "-" if r["gap"] is None else f"{100.0 * r['gap']:.2g} %"
         sizes = [f"{r[k]:.4g}" for k in ("K0", "K", "B", "area")]
-        told = "" if r["about"] == about else r["about"]
-        cells.append([told, r["region"], *sizes, r["verdict"], gap])
+        name = "" if r["about"] == about else r["about"]
+        cells.append([name, r["region"], *sizes, r["verdict"], gap])
         about = r["about"]
     gaps = [r["gap"] for r in rows if r["gap"] is not None]
     below = [x for r in rows for x in r["violations"]]

@@ -122,6 +122,7 @@ sphinx_gallery_conf = {
     "doc_module": ("hapticclay",),
     "abort_on_example_error": True,
     "capture_repr": (),
+    "remove_config_comments": True,
     "image_srcset": ["2x"],
     "write_computation_times": False,
     "download_all_examples": False,

@@ -1,9 +1,11 @@
-"""Makes the four pictures of the first page and of README.md: docs/home_*.png, all of one size.
+"""Makes the four pictures of the first page and of README.md, docs/home_*.png, all of one size;
+and those of the gallery that show clay, docs/thumbnails/*.png.
 
-python docs/home_pictures.py [cut wall map film]
+python docs/home_pictures.py [cut wall map film thumbnails]
 """
 
 import os
+import runpy
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,8 +20,11 @@ from PIL import Image
 
 import hapticclay as hc
 from hapticclay.views import film
+from hapticclay.views.stage import Stage
 
 DOCS = Path(__file__).parent
+CLAY = "dent groove layers marble rotated smooth sticking".split()  # of examples/clay
+THUMBNAIL = 800, 560  # [pixels]
 SIZE, DPI = (4.4, 3.3), 160  # [inch], [1/inch]: letters stay legible at half of a page's width
 
 
@@ -92,6 +97,21 @@ def frame() -> np.ndarray:
     return last
 
 
+def scene(record: hc.Record) -> np.ndarray:
+    """The arm and the clay after a run.
+
+    Args:
+        record: the run.
+    """
+    stage = Stage(record.scenario)
+    lens = film.Lens(stage, *THUMBNAIL, "close", smooth=True)
+    stage.carve(record.p)
+    stage.pose(record.q[-1])
+    image = lens.photograph().copy()
+    lens.close()
+    return image
+
+
 DRAWN: dict[str, Callable[[Axes], None]] = {"cut": cut, "wall": wall, "map": region}
 
 
@@ -110,6 +130,10 @@ def main(names: list[str]) -> None:
             plt.close(figure)
     if not names or "film" in names:
         Image.fromarray(frame()).save(DOCS / "home_film.png", optimize=True)
+    for name in CLAY if not names or "thumbnails" in names else ():
+        record = runpy.run_path(str(DOCS.parent / f"examples/clay/{name}.py"))["record"]
+        Image.fromarray(scene(record)).save(DOCS / f"thumbnails/{name}.png", optimize=True)
+        plt.close("all")
 
 
 if __name__ == "__main__":

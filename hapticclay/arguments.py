@@ -7,17 +7,13 @@ import dataclasses
 import functools
 import inspect
 import itertools
-import os
 import re
-import types
 from collections.abc import Callable, Collection, Mapping
 from typing import (
     Annotated,
     Any,
-    Literal,
     ParamSpec,
     TypeVar,
-    Union,
     dataclass_transform,
     get_args,
     get_origin,
@@ -25,7 +21,7 @@ from typing import (
 )
 
 from .errors import Bound, ParameterError, nearest
-from .fields import CLASS_WORDS, Node, check_fields, class_of, field_descriptions, node_of
+from .fields import Node, check_fields, field_descriptions, node_of
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -42,8 +38,8 @@ def known_names(name: str, given: Mapping[str, Any], known: Collection[str]) -> 
     for word, value in given.items():
         if word not in known:
             near = nearest(word, known)
-            told = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
-            raise UnknownArgument(word, value, f"unexpected argument of {name}; {told}") from None
+            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
+            raise UnknownArgument(word, value, f"unexpected argument of {name}; {hint}") from None
 
 
 def named(made: F) -> F:
@@ -156,29 +152,8 @@ def _parameters(made: Any) -> Mapping[str, inspect.Parameter]:
 def argument_nodes(made: Callable[..., Any]) -> dict[str, Node]:
     """Types of the arguments of a function that are enforced, by name."""
     hints = get_type_hints(made, include_extras=True)
-    return {
-        name: node_of(hints[name]) for name in _parameters(made) if is_enforced(hints.get(name))
-    }
-
-
-def is_enforced(hint: Any) -> bool:
-    """Whether an argument of this type is checked: whether bounds or classes say all of it."""
-    if get_origin(hint) is Annotated:
-        return any(isinstance(note, Bound) for note in get_args(hint)[1:])
-    if get_origin(hint) in (Union, types.UnionType):
-        members = get_args(hint)
-        paths = any(class_of(x) is os.PathLike for x in members)
-        plain = [x for x in members if not (paths and x is str)]
-        bounded = any(get_origin(x) is Annotated and is_enforced(x) for x in members)
-        return bounded or all(map(is_enforced, plain))
-    if get_origin(hint) is Literal:
-        return True
-    kind = class_of(hint)
-    return kind is not str and (kind in CLASS_WORDS or _is_own(kind))
-
-
-def _is_own(kind: Any) -> bool:
-    return getattr(kind, "__module__", "").partition(".")[0] == __name__.partition(".")[0]
+    nodes = {name: node_of(hints[name], None) for name in _parameters(made) if name in hints}
+    return {name: node for name, node in nodes.items() if type(node) is not Node}
 
 
 def function_of(
@@ -186,7 +161,7 @@ def function_of(
 ) -> Callable[P, R]:
     """Makes a function with the fields of a dataclass as arguments, and its description."""
     assert isinstance(kind, type)
-    signature, told = inspect.signature(kind), field_descriptions(kind)
+    signature, descriptions = inspect.signature(kind), field_descriptions(kind)
 
     def make(*args: P.args, **given: P.kwargs) -> R:
         known_names(name, given, signature.parameters)
@@ -199,6 +174,6 @@ def function_of(
     made.__signature__ = signature.replace(return_annotation=back)
     made.__annotations__ = {"return": back}
     summary = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0].rstrip()
-    about = "\n".join(f"    {name}: {told[name]}" for name in signature.parameters)
+    about = "\n".join(f"    {name}: {descriptions[name]}" for name in signature.parameters)
     made.__doc__ = f"{summary}\n\nArgs:\n{about}\n\nRaises:\n    ParameterError: {refused}"
     return made

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import html
+import math
 import numbers
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 TABLE_STYLE = "border-collapse:collapse;margin:0.3em 0;color:inherit;background:transparent"
 FEW = 4  # numbers of a tuple that are all shown
+MANY_DIGITS = 1e4, 1e7  # sizes of numbers that are shown to the last whole digit
+_NUMBER = r"[-+]?\d[\d.]*(e[-+]\d+)?"
+NUMERIC = re.compile(rf"(< )?{_NUMBER}( (to|-) {_NUMBER})?( \S+)?|-|any|")
+WIDEST = 80  # [characters] of a table whose headings stand on one line
 CELL_STYLE = (  # this grey is visible on white and on black
     "padding:0.15em 0.8em 0.15em 0;border:0;border-top:1px solid rgba(128,128,128,0.4);"
     "text-align:left;vertical-align:top;color:inherit;background:transparent"
@@ -36,6 +42,65 @@ def html_table(title: str, rows: Iterable[tuple[str, str]]) -> str:
     ]
     caption = f'<caption style="text-align:left;color:inherit">{html.escape(title)}</caption>'
     return f'<table style="{TABLE_STYLE}">{caption}{"".join(lines)}</table>'
+
+
+def fields_of(part: Any, *left_out: str) -> dict[str, Any]:
+    """Fields of a dataclass by name, without some."""
+    names = [f.name for f in dataclasses.fields(part) if f.name not in left_out]
+    return {name: getattr(part, name) for name in names}
+
+
+def table_of(head: Sequence[str], rows: Iterable[Any]) -> dict[str, list[Any]]:
+    """Columns by heading of rows: each is a sequence, or a dataclass whose fields are the cells."""
+    cells = [[*fields_of(x).values()] if dataclasses.is_dataclass(x) else x for x in rows]
+    return {name: [row[i] for row in cells] for i, name in enumerate(head)}
+
+
+def text_table(
+    columns: Mapping[str, Iterable[Any]], formats: Mapping[str, str] | None = None, form: str = ""
+) -> str:
+    """A table of columns by heading for a terminal: numbers to the right, all else to the left.
+
+    A format is that of a number, as ".3g", or of a share in percent, as "+.2f %"; without one, a
+    number has four significant digits. A form is one of tabulate, "pipe" for Markdown.
+    """
+    from tabulate import tabulate
+
+    formats = formats or {}
+    cells = {
+        name: [cell_text(x, formats.get(name, "")) for x in column]
+        for name, column in columns.items()
+    }
+    width = sum(2 + max(map(len, [name, *column])) for name, column in cells.items())
+    if width > WIDEST and not form:  # the unit stands below the name
+        cells = {name.replace(" [", "\n["): column for name, column in cells.items()}
+    sides = ["right" if _are_numbers(column) else "left" for column in cells.values()]
+    empty = not any(cells.values())
+    return tabulate(
+        cells, "keys", form or "simple", colalign=None if empty else sides, disable_numparse=True
+    )
+
+
+def _are_numbers(cells: Iterable[str]) -> bool:
+    """Whether all texts are numbers or ranges, with or without a unit."""
+    return any(cells) and all(NUMERIC.fullmatch(x) for x in cells)
+
+
+def cell_text(x: Any, form: str = "") -> str:
+    """A value of a table as text: nothing for None, "-" for NaN, "any" for infinity."""
+    if x is None or isinstance(x, str):
+        return x or ""
+    if isinstance(x, bool):
+        return "yes" if x else "no"
+    if math.isnan(x) or x == math.inf:
+        return "any" if x > 0.0 else "-"
+    if form.endswith(" %"):
+        return f"{100.0 * x:{form[:-2]}} %"
+    if isinstance(x, numbers.Integral) and not form:
+        return str(x)
+    if not form and MANY_DIGITS[0] <= abs(x) < MANY_DIGITS[1]:
+        return f"{x:.0f}"
+    return f"{x:{form or '.4g'}}"
 
 
 def brief(value: Any, /) -> str:

@@ -67,8 +67,8 @@ class _Bounded(reprlib.Repr):
         if x and level <= 0:
             return "{...}"
         items = itertools.islice(x.items(), self.maxdict)
-        told = [f"{self.repr1(k, level - 1)}: {self.repr1(v, level - 1)}" for k, v in items]
-        return "{" + ", ".join(told + ["..."] * (len(x) > self.maxdict)) + "}"
+        texts = [f"{self.repr1(k, level - 1)}: {self.repr1(v, level - 1)}" for k, v in items]
+        return "{" + ", ".join(texts + ["..."] * (len(x) > self.maxdict)) + "}"
 
     def repr_bytes(self, x: bytes, level: int) -> str:
         return repr(x[: self.maxstring])
@@ -109,7 +109,10 @@ def quantity(field: str, text: str, unit: str = "") -> float | None:
 
 
 def number_in(field: str, text: object, unit: str = "") -> float:
-    """The number that a text stands for, "5" or "5 cm", in the unit of a field."""
+    """The number that a text stands for, "5" or "5 cm", in the unit of a field.
+
+    Raises ValueError or TypeError if it is no number, ParameterError for another unit.
+    """
     given = quantity(field, text, unit) if isinstance(text, str) else None
     return float(text) if given is None else given  # type: ignore[arg-type]
 
@@ -123,7 +126,7 @@ def number(
     above: bool = False,
     unit: str = "",
 ) -> float:
-    """Returns value as a finite float within [low, high], or (low, high] if above."""
+    """Returns value, a number or "5 cm", as a finite float in [low, high], (low, high] if above."""
     if type(value) is float and _is_within(value, low, high, above):
         return value
     given = quantity(field, value, unit) if isinstance(value, str) else value
@@ -154,13 +157,6 @@ def integer(field: str, value: object, low: float, high: float) -> int:
     ):
         raise ParameterError(field, value, f"must be {Bound(low, high).integer_words()}")
     return int(value)
-
-
-def flag(field: str, value: object) -> bool:
-    """Returns value if it is a bool."""
-    if not isinstance(value, bool):
-        raise ParameterError(field, value, "must be True or False")
-    return value
 
 
 def is_series(value: object) -> bool:
@@ -200,15 +196,9 @@ def numbers_of(
 
 
 def table_of(
-    field: str,
-    value: object,
-    low: float = -math.inf,
-    high: float = math.inf,
-    *,
-    above: bool = False,
-    unit: str = "",
+    field: str, value: object, low: float, high: float, *, above: bool, unit: str
 ) -> tuple[tuple[float, ...], ...]:
-    """Returns value as rows of floats of equal length, each checked by `number`."""
+    """Returns value, shape (n, m) or empty, as rows of floats, each checked by `number`."""
     import numpy as np
 
     bound = "must be rows of numbers, all of one length"
@@ -236,7 +226,7 @@ def table_of(
 
 
 def array_of(field: str, value: object, bound: str = "must be numbers") -> np.ndarray:
-    """Returns a copy of value as an array of floats."""
+    """Returns a copy of value as an array of floats of any shape."""
     import numpy as np
 
     try:
@@ -245,27 +235,20 @@ def array_of(field: str, value: object, bound: str = "must be numbers") -> np.nd
         raise ParameterError(field, value, bound) from None
 
 
-def pair(
-    field: str,
-    value: object,
-    low: float = -math.inf,
-    high: float = math.inf,
-    *,
-    above: bool = False,
-    unit: str = "",
-) -> tuple[float, float]:
+def pair(field: str, value: object, *limits: float, **how: Any) -> tuple[float, float]:
     """Returns value as an (x, y) pair of floats, each checked by `number`."""
-    x, y = numbers_of(field, value, ("x", "y"), low, high, above=above, unit=unit)
+    x, y = numbers_of(field, value, ("x", "y"), *limits, **how)
     return x, y
 
 
-def choice(field: str, value: object, valid: Sequence[str]) -> str:
-    """Returns value if it is one of the valid names."""
+def choice(field: str, value: object, valid: Sequence[str], wants: str = "") -> str:
+    """Returns value if it is one of the valid names; wants: what else is valid, with them."""
     if isinstance(value, str) and value in valid:
         return value
     near = nearest(value, valid) if isinstance(value, str) else []
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise ParameterError(field, value, f"must be one of {', '.join(valid)}{hint}")
+    wants = wants or f"one of {', '.join(valid)}"
+    raise ParameterError(field, value, f"must be {wants}{hint}")
 
 
 @dataclass(frozen=True)
@@ -291,7 +274,8 @@ class Bound:
         low, high = self.low, self.high
         limits = [f"{'>' if self.above else '>='} {_spelled(low)}"] * (low != -math.inf)
         limits += [f"<= {high:g}"] * (high < math.inf)
-        words = ["a finite number", " and ".join(limits), self.unit]
+        unit = self.unit if limits or not self.unit else f"in {self.unit}"
+        words = ["a finite number", " and ".join(limits), unit]
         return " ".join(filter(None, words))
 
     def integer_words(self) -> str:

@@ -1,4 +1,4 @@
-"""Base of results of theory and studies: a line, a table, a frame, a figure, a file."""
+"""Base of results of theory and studies: a line, tables, a text, a frame, figures, files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from .arguments import checked
-from .display import html_table, one_line
+from .display import fields_of, html_table, one_line, text_table
 from .errors import ParameterError, choice, needing
 from .fields import function_name
 from .files import DAMAGED, atomic, parse_json, read_text, versions
@@ -50,9 +50,24 @@ class Result:
     Attributes:
         drawn_by: "module:function" of the function that draws the result, imported when a figure is
             requested.
+        written_as: name of the files that a command writes, and of their schema; by default that of
+            the class in lower case.
+        summary_units: units of the numbers in `summary` that are in no table.
+        printed: tables that `text` shows, with their columns, () for all; by default the first.
+        formats: formats of numbers by column, as ".3g", or "+.2f %" for a share; by default four
+            significant digits.
     """
 
     drawn_by: ClassVar[str]
+    written_as: ClassVar[str]
+    summary_units: ClassVar[Mapping[str, Any]] = {}
+    printed: ClassVar[Mapping[str, Sequence[str]]] = {}
+    formats: ClassVar[Mapping[str, str]] = {}
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        super().__init_subclass__(**given)
+        if not hasattr(cls, "written_as"):
+            cls.written_as = cls.__name__.lower()
 
     def headline(self) -> str:
         """The result in one line."""
@@ -87,9 +102,50 @@ class Result:
         out.attrs["title"] = f"{self.headline()}; {name}"
         return out
 
+    def text(self, form: str = "") -> str:
+        """The result for a terminal: the tables of `printed`, then `remarks`.
+
+        Args:
+            form: form of the tables, one of the package tabulate, such as "pipe" for Markdown.
+        """
+        tables = self.tables()
+        printed = self.printed or {next(iter(tables)): ()}
+        shown = {name: columns for name, columns in printed.items() if name in tables}
+        parts = []
+        for name, columns in shown.items():
+            table = tables[name]
+            kept = {x: table[x] for x in columns if x in table} if columns else table
+            shape = f"{name}:\n\n{{}}\n" if len(shown) > 1 else "{}"
+            parts.append(shape.format(text_table(kept, self.formats, form)))
+        return "\n".join([*parts, *self.remarks()])
+
+    def remarks(self) -> Sequence[str]:
+        """Lines below the tables of `text`."""
+        return [self.headline()]
+
     def plot(self) -> Figure:
         """Draws the result, as the command does."""
         return pkgutil.resolve_name(self.drawn_by)(self)
+
+    def figures(self) -> dict[str, Any]:
+        """The figures of the result by file name, each a `views.figure.Figure`, drawn on demand."""
+        return {self.written_as: figure_of(self)}
+
+    def contents(self) -> Mapping[str, Any]:
+        """Numbers and texts of the result by name, for `summary`; by default its tables."""
+        return {"tables": self.tables()}
+
+    def summary(self) -> dict[str, Any]:
+        """The result as a command writes it: numbers with schema, units and versions.
+
+        Null stands for NaN and infinity; `save` keeps exact values.
+        """
+        units = {"units": self.summary_units} if self.summary_units else {}
+        return with_schema(self.written_as, {**self.contents(), **units})
+
+    def write(self, folder: Path, asked: Mapping[str, Any] | None = None) -> None:
+        """Writes folder/NAME.json: the summary, and the question that a command was asked."""
+        write_json({**self.summary(), **(asked or {})}, folder / f"{self.written_as}.json")
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Writes the result with exact values, whole or not at all.
@@ -137,6 +193,40 @@ class Result:
             bound = f"must hold a {cls.__name__}, has a {type(found).__name__}"
             raise ParameterError("path", str(path), bound)
         return found
+
+
+def figure_of(found: Any, drawn_by: str = "", tables: Tables | None = None) -> Any:
+    """A `views.figure.Figure` of an object, drawn by the function that it names or another one.
+
+    Without other tables, the figure shows those of the object.
+    """
+    figure = pkgutil.resolve_name("hapticclay.views.figure:Figure")
+    by = drawn_by or found.drawn_by
+    return figure(lambda: pkgutil.resolve_name(by)(found), tables or found.tables)
+
+
+def with_schema(name: str, data: Mapping[str, Any]) -> dict[str, Any]:
+    """Data as it is written to a file of JSON: after its schema, before the versions."""
+    return {"schema": f"hapticclay-{name}-1", **json_ready(data), "versions": versions()}
+
+
+def write_json(data: Any, file: Path) -> None:
+    """Writes data as JSON, whole or not at all; null stands for NaN and infinity."""
+    with atomic(file) as f:
+        f.write((json.dumps(json_ready(data), indent=2, allow_nan=False) + "\n").encode())
+
+
+def json_ready(x: Any) -> Any:
+    """Numbers, texts, arrays and parts as JSON has them; null stands for NaN and infinity."""
+    if hasattr(x, "tolist"):  # an array or a number of NumPy
+        x = x.tolist()
+    if dataclasses.is_dataclass(x):
+        x = fields_of(x)
+    if isinstance(x, Mapping):
+        return {k: json_ready(v) for k, v in x.items()}
+    if isinstance(x, list | tuple):
+        return [json_ready(v) for v in x]
+    return None if isinstance(x, float) and not math.isfinite(x) else x
 
 
 def _shown(x: Any) -> str:

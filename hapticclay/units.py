@@ -72,12 +72,12 @@ def from_unit(text: str, unit: str) -> float | None:
         return None
     given = found[2].strip()
     given = f"1{given}" if given.startswith("/") else given
-    told = f"must be a number{f' in {unit}' if unit else ' without a unit'}"
+    bound = f"must be a number{f' in {unit}' if unit else ' without a unit'}"
     own, other = parse_unit(unit), parse_unit(given)
     if other is None:
-        raise ValueError(f"{told}; unknown unit {given!r}")
+        raise ValueError(f"{bound}; unknown unit {given!r}")
     if own is None or not unit or own[1] != other[1]:
-        raise ValueError(f"{told}, not in {given}")
+        raise ValueError(f"{bound}, not in {given}")
     try:
         return float(Decimal(found[1]) * (other[0] / own[0]))  # rounded once
     except ArithmeticError:

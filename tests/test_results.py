@@ -8,6 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import hapticclay as hc
+from hapticclay.cli import console
 from hapticclay.errors import ParameterError
 from hapticclay.results import Result, of_plain, plain
 from hapticclay.theory.client_loop import Handle
@@ -77,6 +78,48 @@ def test_every_result_has_a_line_a_table_a_frame_a_figure_and_a_file(name, tmp_p
     again = type(found).load(found.save(tmp_path / "found.json"))
     assert plain(again) == plain(found) and repr(again) == repr(found)
     assert Result.load(tmp_path / "found.json").headline() == found.headline()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_result_is_printed_and_written_with_schema_and_versions(name):
+    found = result(name)
+    text, tables = found.text(), found.tables()
+    assert "\n---" in text or name == "Lab" and "---" in text
+    for shown in found.printed:
+        assert shown in tables, shown
+        assert all(column in tables[shown] for column in found.printed[shown]), shown
+    columns = {column for table in tables.values() for column in table}
+    if name != "Lab":
+        assert set(found.formats) <= columns
+    data = json.loads(json.dumps(found.summary(), allow_nan=False))
+    assert data["schema"] == f"hapticclay-{found.written_as}-1"
+    assert data["versions"]["hapticclay"] == hc.__version__
+    for figure in found.figures().values():
+        assert figure.tables()
+
+
+def test_a_full_disk_does_not_hide_a_result(tmp_path, capsys, monkeypatch):
+    def full(*_, **__):
+        raise ParameterError("out", "o", "must be writable (No space left on device)")
+
+    found = result("ZWidth")
+    monkeypatch.setattr(type(found), "write", full)
+    with pytest.raises(ParameterError, match="No space left"):
+        console.deliver(found, tmp_path)
+    assert found.text() in capsys.readouterr().out and not list(tmp_path.iterdir())
+
+
+def test_a_result_is_delivered_with_the_question_figures_numbers_and_pages(tmp_path, capsys):
+    found = result("ZWidth")
+    options = console.FigureOptions(format=("svg",), data=True)
+    pages = {"page.md": lambda: found.text("pipe")}
+    console.deliver(found, tmp_path, options, pages=pages, asked={"B": (0.0, 5.0)})
+    names = ["page.md", "zwidth-lines.csv", "zwidth-regions.csv", "zwidth.csv", "zwidth.json"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == [*names, "zwidth.svg"]
+    data = json.loads((tmp_path / "zwidth.json").read_text())
+    assert data["asked"] == {"B": [0.0, 5.0]} and data["schema"] == "hapticclay-zwidth-1"
+    assert (tmp_path / "page.md").read_text().startswith("| region")
+    assert capsys.readouterr().out == f"{found.text()}\nwritten to {tmp_path}\n"
 
 
 def test_a_comparison_is_a_result_too(tmp_path):

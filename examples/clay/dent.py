@@ -10,6 +10,7 @@ import matplotlib.pyplot as plt
 
 import hapticclay as hc
 
+# sphinx_gallery_thumbnail_path = "thumbnails/dent.png"
 plt.style.use("hapticclay.views.figure")
 
 k, limit = 2e3, 4.0  # N/m, N

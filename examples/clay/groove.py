@@ -10,6 +10,7 @@ import matplotlib.pyplot as plt
 
 import hapticclay as hc
 
+# sphinx_gallery_thumbnail_path = "thumbnails/groove.png"
 plt.style.use("hapticclay.views.figure")
 
 pressure, tool = 20e3, hc.Tool(width=0.010, depth=0.005)  # Pa, m

@@ -10,6 +10,7 @@ import matplotlib.pyplot as plt
 
 import hapticclay as hc
 
+# sphinx_gallery_thumbnail_path = "thumbnails/layers.png"
 plt.style.use("hapticclay.views.figure")
 
 edges = (0.03, 0.06, 0.09, 0.12)  # m

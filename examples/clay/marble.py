@@ -12,6 +12,7 @@ import matplotlib.pyplot as plt
 
 import hapticclay as hc
 
+# sphinx_gallery_thumbnail_path = "thumbnails/marble.png"
 plt.style.use("hapticclay.views.figure")
 
 

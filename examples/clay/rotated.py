@@ -11,6 +11,7 @@ import numpy as np
 
 import hapticclay as hc
 
+# sphinx_gallery_thumbnail_path = "thumbnails/rotated.png"
 plt.style.use("hapticclay.views.figure")
 
 K = (0.6, 0.6)

@@ -14,6 +14,7 @@ import numpy as np
 
 import hapticclay as hc
 
+# sphinx_gallery_thumbnail_path = "thumbnails/smooth.png"
 plt.style.use("hapticclay.views.figure")
 
 y, x = np.mgrid[-1:1:31j, -1:1:41j]

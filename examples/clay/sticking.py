@@ -11,6 +11,7 @@ import matplotlib.pyplot as plt
 
 import hapticclay as hc
 
+# sphinx_gallery_thumbnail_path = "thumbnails/sticking.png"
 plt.style.use("hapticclay.views.figure")
 
 Fy = 5.0  # N

@@ -6,7 +6,8 @@ import importlib
 import pkgutil
 from pathlib import Path
 
-SHARED = ("app", "commands", "console", "device_options", "unused", "walls", "words")  # no commands
+SHARED = ("app", "commands", "console", "device_options", "manual", "options", "parser")
+SHARED += ("unused", "walls")  # modules that are no commands
 COMMANDS = {
     name: f"{__package__}.{name}"
     for _, name, _ in pkgutil.iter_modules([str(Path(__file__).parent)])

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
-
-import tyro
+from typing import Literal
 
 from ..errors import ParameterError
-from ..files import atomic, versions, writable
+from ..files import writable
 from ..model.constants import AXES
 from . import console
-
-COMPARE_SCHEMA = "hapticclay-compare-1"
+from .options import Loose
 
 
 @dataclass(frozen=True)
@@ -27,15 +24,14 @@ class CompareCommand:
         figures: Formats and style of the figure files; those on the page are for a screen.
     """
 
-    source: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
+    source: Loose[tuple[Path, ...]] = ()
     axis: Literal["x", "y"] | None = None
     out: Path = Path("out/compare")
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
-        from ..paper.comparison import comparison_page, number_rows
-        from ..studies.comparison import compare_files, differing_fields, is_wall_file
-        from ..views.compare_plots import compare_figures
+        from ..paper.comparison import comparison_page
+        from ..studies.comparison import compare_files, is_wall_file
 
         writable(self.out)
         if self.axis and all(is_wall_file(x) for x in self.source):
@@ -45,21 +41,7 @@ class CompareCommand:
             self.axis or AXES[0],
             lambda files: console.progress_bar(files, desc="files"),
         )
-        rows = [[name, *cells] for name, cells in number_rows(found).items()]
-        try:
-            with atomic(self.out / "compare.html") as f:
-                f.write(comparison_page(found).encode())
-            data = {
-                "schema": COMPARE_SCHEMA,
-                "files": {x.name: x.numbers for x in found},
-                "fields": differing_fields(found),
-                "versions": versions(),
-            }
-            console.save_json(data, self.out / "compare.json")
-            figures = {name: figure for name, (_, figure) in compare_figures(found).items()}
-            console.save_figures(figures, self.out, self.figures)
-        finally:  # a full disk must not hide the results
-            names = [x.name for x in found]
-            print(console.text_table(rows, ["", *names], "l" + "r" * len(names)))
+        pages = {"compare.html": lambda: comparison_page(found)}
+        console.deliver(found, self.out, self.figures, pages=pages)
         print(f"page: {(self.out / 'compare.html').resolve()}")
         return 0

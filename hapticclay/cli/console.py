@@ -3,80 +3,26 @@
 from __future__ import annotations
 
 import contextlib
-import inspect
-import json
-import math
 import re
+import shutil
 import signal
+import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import tyro
-
-from ..errors import number
+from ..errors import Bound
 from ..files import atomic
 
 if TYPE_CHECKING:
-    from ..scene.experiments import Experiment
+    from ..results import Result
     from ..scene.scenario import Scenario
     from ..views.figure import Figure
 
 
 ENDS = ("SIGTERM", "SIGHUP")  # signals that end a command as Ctrl-C does
-SET_HELP = (
-    "Any field of the scenario, part by part, as in --set arm.l1=0.3 servo.x.G.damping=50 "
-    "compensator.den=1,40,0 operator=true operator.mass=500g; hapticclay fields lists the names."
-)
-Changes = Annotated[  # words NAME=VALUE behind each --set
-    tuple[tuple[str, ...], ...],
-    tyro.conf.arg(name="set", metavar="NAME=VALUE", help=SET_HELP),
-    tyro.conf.UseAppendAction,
-]
-
-
-def experiment_words() -> Any:
-    """The experiments, and scenario files, as subcommands: the type of a command's `scenario`."""
-    from ..scene.experiments import EXPERIMENTS
-
-    file = Annotated[Any, tyro.conf.subcommand("file", constructor=load_scenario_words)]
-    return Union[  # noqa: UP007
-        (
-            *(
-                Annotated[Any, tyro.conf.subcommand(name, constructor=_scenario_parser(kind))]
-                for name, kind in EXPERIMENTS.items()
-            ),
-            file,
-        )
-    ]
-
-
-def load_scenario_words(path: tyro.conf.Positional[Path], changes: Changes = ()) -> Any:
-    """A scenario in a file, .toml or .json; the word "file" may be omitted.
-
-    Args:
-        path: the file.
-        changes: fields that differ from those of the file.
-    """
-    from ..scene.scenario import Scenario
-
-    return Scenario.load(path, named_changes(changes))
-
-
-def named_changes(words: Sequence[Sequence[str]]) -> dict[str, Any]:
-    """Values by dotted name that were given behind --set.
-
-    Args:
-        words: name=value, a sequence each --set.
-
-    Raises:
-        ParameterError: a word is not name=value, or a name stands twice.
-    """
-    from ..scene.changes import named_values
-
-    return named_values("--set", (word for some in words for word in some))
 
 
 def default_folder(command: str, scenario: Scenario) -> Path:
@@ -87,45 +33,6 @@ def default_folder(command: str, scenario: Scenario) -> Path:
         scenario: the scenario, whose name is that of the folder.
     """
     return Path("out", command, re.sub(r"[^\w.+-]+", "-", scenario.name).strip(".-") or "scenario")
-
-
-def scenario_words() -> Any:
-    """The experiments, scenario files and saved records as subcommands of a command."""
-    record = Annotated[Any, tyro.conf.subcommand("record", constructor=load_record)]
-    return Union[experiment_words(), record]  # noqa: UP007
-
-
-def load_record(path: tyro.conf.Positional[Path]) -> Any:  # tyro resolves the annotations
-    """A saved record.
-
-    Args:
-        path: its folder, or its record.npz.
-    """
-    from ..simulation.record import Record
-
-    return Record.load(path)
-
-
-def _scenario_parser(kind: type[Experiment]) -> Callable[..., Scenario]:
-    """A function whose signature tells tyro the parameters of an experiment."""
-    from ..scene.experiments import parameters
-
-    def scenario(changes: Sequence[Sequence[str]] = (), **words: Any) -> Scenario:
-        return kind.of(words, named_changes(changes))
-
-    scenario.__doc__ = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0]
-    scenario.__annotations__ = {
-        name: Annotated[p.kind, tyro.conf.arg(help=p.about[:1].upper() + p.about[1:])]
-        for name, p in parameters(kind).items()
-    } | {"changes": Changes}
-    scenario.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-        [
-            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=p.default)
-            for name, p in parameters(kind).items()
-        ]
-        + [inspect.Parameter("changes", inspect.Parameter.KEYWORD_ONLY, default=())]
-    )
-    return scenario
 
 
 def progress_bar(items: Any = None, **look: Any) -> Any:
@@ -158,40 +65,25 @@ def fraction_bar(title: str) -> Iterator[Callable[..., None]]:
         yield show
 
 
-def text_table(
-    rows: Sequence[Sequence[str]], head: Sequence[str], align: str, form: str = "simple"
-) -> str:
-    """A table for a terminal, or a page.
+def announce(runs: str, seconds: float, crew: int, size: float, folder: Path) -> None:
+    """Prints the time and the room on disk that runs will take, before they begin.
 
     Args:
-        rows: its cells.
-        head: its column titles.
-        align: a letter a column, "l" for left, "r" for right.
-        form: "simple", or "pipe" for Markdown.
+        runs: the runs, in words.
+        seconds: their time [s].
+        crew: number of processes.
+        size: room that they take [bytes].
+        folder: where they are stored.
     """
-    from tabulate import tabulate
+    from tqdm import tqdm
 
-    sides = [{"l": "left", "r": "right"}[a] for a in align]
-    return tabulate(rows, head, form, colalign=sides if rows else None, disable_numparse=True)
-
-
-def fixed(x: float | None, digits: int) -> str:
-    """x with a number of decimals, without a negative zero; "-" for None.
-
-    Args:
-        x: the number.
-        digits: decimals.
-    """
-    return "-" if x is None else f"{round(x, digits) + 0.0:.{digits}f}"
-
-
-def significant(x: float) -> str:
-    """x with four significant digits; "-" for NaN, "any" for infinity.
-
-    Args:
-        x: the number.
-    """
-    return "-" if math.isnan(x) else "any" if x == math.inf else f"{x:.4g}"
+    free = shutil.disk_usage(folder.parent).free
+    print(
+        f"hapticclay: {runs}: about {tqdm.format_interval(seconds)} on {crew} "
+        f"process{'es' if crew > 1 else ''}, {tqdm.format_sizeof(size, 'B')} in {folder} "
+        f"({'only ' if free < size else ''}{tqdm.format_sizeof(free, 'B')} free)",
+        file=sys.stderr,
+    )
 
 
 @contextlib.contextmanager
@@ -260,13 +152,9 @@ class FigureOptions:
     """
 
     format: tuple[Literal["png", "svg", "pdf"], ...] = ("png",)
-    dpi: float | None = None
+    dpi: Annotated[float | None, Bound(10.0, 2400.0)] = None
     style: Literal["screen", "print", "print-wide"] = "screen"
     data: bool = False
-
-    def __post_init__(self):
-        if self.dpi is not None:
-            number("dpi", self.dpi, 10.0, 2400.0)
 
 
 def save_figures(
@@ -293,25 +181,35 @@ def save_figures(
     return {name: files for name, files in written.items() if files}
 
 
-def save_json(data: Any, file: Path) -> None:
-    """Writes data as JSON, whole or not at all; null stands for NaN and infinity.
+def deliver(
+    found: Result,
+    out: Path,
+    figures: FigureOptions | None = None,
+    *,
+    text: str | None = None,
+    pages: Mapping[str, Callable[[], str]] | None = None,
+    **asked: Any,
+) -> None:
+    """Writes a result as NAME.json, its figures and pages, and prints it.
 
     Args:
-        data: dictionaries, sequences, arrays, numbers and texts.
-        file: where to.
+        found: the result.
+        out: where to.
+        figures: formats and style of the figures; None for no figures.
+        text: what to print in place of `found.text()`.
+        pages: texts of further files, by file name.
+        **asked: the question, as NAME.json repeats it.
 
     Raises:
-        ParameterError: the file cannot be written.
+        ParameterError: a file cannot be written; the result is printed nevertheless.
     """
-    with atomic(file) as f:
-        f.write((json.dumps(_json_ready(data), indent=2, allow_nan=False) + "\n").encode())
-
-
-def _json_ready(x: Any) -> Any:
-    if hasattr(x, "tolist"):  # an array or a number of NumPy, which is not imported here
-        x = x.tolist()
-    if isinstance(x, dict):
-        return {k: _json_ready(v) for k, v in x.items()}
-    if isinstance(x, list | tuple):
-        return [_json_ready(v) for v in x]
-    return None if isinstance(x, float) and not math.isfinite(x) else x
+    try:
+        found.write(out, asked)
+        for name, page in (pages or {}).items():
+            with atomic(out / name) as f:
+                f.write(page().encode())
+        if figures is not None:
+            save_figures(found.figures(), out, figures)
+    finally:  # a full disk must not hide the result
+        print(found.text() if text is None else text, end="\n" if text != "" else "")
+    print(f"written to {out}")

@@ -8,15 +8,15 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-import tyro
-
-from ..errors import ParameterError, number, number_in
+from ..errors import Bound, ParameterError, number, number_in
 from ..files import writable
 from . import console
 from .device_options import deliver_loops, write_report
+from .options import Loose
 from .run import deliver
+from .unused import Unused
 
 if TYPE_CHECKING:
     from ..ports.device import Trajectory
@@ -60,40 +60,41 @@ class DeviceCommand:
         grip_id: Identifier of the grip, hexadecimal.
         largest_force: Larger forces are limited to this [N].
         duration: End after this time on the computer's clock [s]; None runs until Ctrl-C.
-        out: Folder for the record, the exchanges and the report.
+        out: Folder for the record, the exchanges and the report; by default out/device, for a
+            report out/loop.
         plots: Draw the plots.
         figures: Formats and style of the plots.
     """
 
-    action: Annotated[Literal["serve", "report"], tyro.conf.Positional]
-    source: Annotated[Path | None, tyro.conf.Positional] = None
+    action: Loose[Literal["serve", "report"]]
+    source: Loose[Path | None] = None
     protocol: Literal["inverse", "rosbridge"] = "inverse"
     port: int | None = None
     host: str = "127.0.0.1"
     origin: tuple[str, ...] = ()
     clock: Literal["wall", "tick"] = "wall"
-    period: float | None = None
+    period: Annotated[float | None, Bound(unit="s")] = None
     hand: tuple[str, ...] = ()
     plane: Literal["xy", "xz"] = "xy"
     buttons: Path | None = None
     clay: bool = False
     device_id: str = "04EA"
     grip_id: str = "F00D"
-    largest_force: float = 10.0
-    duration: float | None = None
-    out: Annotated[
-        Path | None, tyro.conf.arg(help_behavior_hint="(default: out/device, out/loop)")
-    ] = None
+    largest_force: Annotated[float, Bound(unit="N")] = 10.0
+    duration: Annotated[float | None, Bound(0.0, LONGEST, "s")] = None
+    out: Path | None = None
     plots: bool = True
     figures: console.FigureOptions = console.FigureOptions()
+
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("period",), "is for --clock tick: give it too", (), ("clock=tick",)),
+    )
 
     def __call__(self) -> int:
         out = self.out or Path("out", "loop" if self.action == "report" else "device")
         if self.action == "report":
             return self._report(out)
-        duration = math.inf
-        if self.duration is not None:
-            duration = number("duration", self.duration, 0.0, LONGEST, unit="s")
+        duration = math.inf if self.duration is None else self.duration
         writable(out)
         with self._server() as server, console.ctrl_c() as stop:
             shown = "an Inverse3" if self.protocol == "inverse" else "a device of ROS"
@@ -113,9 +114,6 @@ class DeviceCommand:
         from ..ports.sessions import PORTS, Inverse3
 
         logging.basicConfig(format="hapticclay: %(message)s", level=logging.WARNING)
-        if self.period is not None and self.clock != "tick":
-            bound = "is for --clock tick: leave it out with --clock wall"
-            raise ParameterError("period", self.period, bound)
         shown = Inverse3(
             self.device_id,
             self.grip_id,

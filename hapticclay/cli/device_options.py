@@ -7,15 +7,15 @@ import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from ..errors import ParameterError
-from . import console
+from ..errors import Bound
+from . import console, walls
+from .unused import Unused
 
 if TYPE_CHECKING:
     from ..live.session import Session
     from ..ports.exchanges import Exchanges
-    from ..ports.report import LoopReport
     from ..scene.scenario import Scenario
     from ..studies.removal import Tool
 
@@ -42,14 +42,17 @@ class DeviceOptions:
     device_server: bool = False
     device_port: int = 10_001
     device_plane: Literal["xy", "xz"] = "xy"
-    device_force: float | None = None
-    device_rate: float = 1000.0
-    coupling: tuple[float, float] = (300.0, 5.0)
+    device_force: Annotated[float | None, Bound(unit="N")] = None
+    device_rate: Annotated[float, Bound(unit="Hz")] = 1000.0
+    coupling: tuple[walls.Spring, walls.Damper] = (300.0, 5.0)
 
-    def __post_init__(self):
-        if self.device and self.device_server:
-            bound = "is for one's own hand: the arm cannot be served beside it"
-            raise ParameterError("device", self.device, bound)
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(
+            ("device",),
+            "is for one's own hand: the arm cannot be served beside it",
+            ("device-server",),
+        ),
+    )
 
     @property
     def given(self) -> bool:
@@ -158,27 +161,4 @@ def write_report(
     """Writes and prints the report of a loop."""
     from ..ports.report import loop_report
 
-    found = loop_report(exchanges, scenario)
-    try:
-        found.save(folder / "loop.json")
-        if figures is not None and found.line_K:  # without a wall there is nothing to show
-            _draw(found, folder, figures)
-    finally:  # a full disk must not hide the result
-        print(report_table(found))
-        print(found.headline())
-
-
-def _draw(found: LoopReport, folder: Path, figures: console.FigureOptions) -> None:
-    from ..views.figure import Figure
-    from ..views.loop_plots import loop_plot
-
-    console.save_figures({"loop": Figure(lambda: loop_plot(found), found.tables)}, folder, figures)
-
-
-def report_table(found: LoopReport) -> str:
-    """The report for a terminal."""
-    rows = [
-        (name, value if isinstance(value, str) else console.significant(value))
-        for name, (value,) in found.tables()["report"].items()
-    ]
-    return console.text_table(rows, ("loop", ""), "lr")
+    console.deliver(loop_report(exchanges, scenario), folder, figures)

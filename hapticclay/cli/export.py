@@ -5,12 +5,10 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
-
-import tyro
+from typing import Literal
 
 from ..errors import ParameterError
-from . import console
+from .options import Loose
 
 
 @dataclass(frozen=True)
@@ -22,20 +20,20 @@ class ExportCommand:
         format: nc for xarray and MATLAB, parquet for data frames, csv for spreadsheets, mcap for
             Foxglove, rrd for Rerun, mat for MATLAB and Octave. By default the ending of --out
             decides.
-        out: The file; an older one is replaced.
+        out: The file, by default record.FORMAT beside the record; an older one is replaced.
     """
 
-    record: Annotated[Path, tyro.conf.Positional]
+    record: Loose[Path]
     format: Literal["nc", "parquet", "csv", "mcap", "rrd", "mat"] | None = None
-    out: Annotated[
-        Path | None, tyro.conf.arg(help_behavior_hint="(default: record.FORMAT beside the record)")
-    ] = None
+    out: Path | None = None
 
     def __call__(self) -> int:
+        from ..simulation.record import Record
+
         if self.format is None and (self.out is None or not self.out.suffix):
             bound = "must be given, as in --format csv or --out cut.csv"
             raise ParameterError("format", "", bound)
-        record = console.load_record(self.record)
+        record = Record.load(self.record)
         folder = self.record if os.path.isdir(self.record) else self.record.parent
         out = self.out or folder / f"record.{self.format}"
         print(f"written to {record.export(out, self.format)}")

@@ -6,12 +6,11 @@ import math
 import textwrap
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated, Any
-
-import tyro
+from typing import Any
 
 from ..errors import ParameterError
 from ..fields import UNSET, Field, Node, dotted_names, leaves, no_field
+from .options import Loose
 
 WIDTH = 96  # of the text
 
@@ -29,7 +28,7 @@ class FieldsCommand:
             an experiment, such as constant, prints its parameters.
     """
 
-    names: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
+    names: Loose[tuple[str, ...]] = ()
 
     def __call__(self) -> int:
         from ..scene.experiments import EXPERIMENTS, parameters
@@ -40,8 +39,8 @@ class FieldsCommand:
             own = parameters(EXPERIMENTS[name]).values() if name in EXPERIMENTS else ()
             found = list(own) or [f for f in known if name in f.name]
             if not found:
-                told = no_field(name, "", [*EXPERIMENTS, *dotted_names(Scenario)])
-                raise ParameterError("field", name, told.bound)
+                refusal = no_field(name, "", [*EXPERIMENTS, *dotted_names(Scenario)])
+                raise ParameterError("field", name, refusal.bound)
             shown += [f for f in found if f not in shown]
         print(field_list(shown if self.names else known))
         return 0

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
-
-from ..errors import ParameterError
+from ..errors import Bound, ParameterError
 from ..files import writable
 from . import console
 from .identify import column_names
+from .options import Loose
 
 if TYPE_CHECKING:
-    from ..studies.fitting import Fitted
     from ..studies.measurement import Measurement
 
 COLUMNS_EXAMPLE = "t=time p=pos f=force"
@@ -41,21 +38,19 @@ class FitCommand:
         figures: Format and style of the figure.
     """
 
-    source: Annotated[Path, tyro.conf.Positional]
+    source: Loose[Path]
     out: Path = Path("out/fit")
     axis: Literal["x", "y", "path"] | None = None
     columns: tuple[str, ...] = ()
     laws: tuple[str, ...] = ()
     level: float = 0.95
-    time: tuple[float, float] | None = None
-    place: tuple[float, float] | None = None
+    time: Annotated[tuple[float, float] | None, Bound(unit="s", names=("first", "last"))] = None
+    place: Annotated[tuple[float, float] | None, Bound(unit="m", names=("low", "high"))] = None
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
         from ..studies.fitting import fit_flow
         from ..studies.flow_models import FLOW_LAWS
-        from ..views.figure import Figure
-        from ..views.fit_plots import fit_plot
 
         writable(self.out)
         recorded = os.path.isdir(self.source) or self.source.suffix == ".npz"
@@ -74,15 +69,7 @@ class FitCommand:
             time=self.time,
             place=self.place,
         )
-        try:
-            console.save_json(fitted.summary(), self.out / "fit.json")
-            tables = fitted.tables()
-            shown = {name: tables[name] for name in ("samples", "parameters")}  # fit.csv: samples
-            figure = Figure(lambda: fit_plot(fitted), shown)
-            console.save_figures({"fit": figure}, self.out, self.figures)
-        finally:  # a full disk must not hide the result
-            print(law_table(fitted))
-        print(f"written to {self.out}")
+        console.deliver(fitted, self.out, self.figures)
         return 0
 
     def _measured(self) -> Measurement:
@@ -100,26 +87,3 @@ class FitCommand:
                     if name not in given:
                         bound += f"; give --columns {COLUMNS_EXAMPLE}"
             raise ParameterError(field, error.value, bound) from None
-
-
-def law_table(fitted: Fitted) -> str:
-    """The candidates, the chosen one's parameters with intervals, and warnings, for a terminal."""
-    rows = []
-    for c in sorted(fitted.candidates, key=lambda c: (c.law != fitted.law, c.aicc)):
-        of = fitted.parameters if c.law == fitted.law else c.parameters
-        for i, p in enumerate(of):
-            name = f"{p.name} [{p.unit}]" if p.unit else p.name
-            span = "" if math.isnan(p.low) else f"{p.low:.6g} to {p.high:.6g}"
-            first = [c.law, f"{c.aicc:.1f}", f"{c.weight:.3f}", f"{c.deviation:.3g}"]
-            rows.append([*(first if not i else [""] * 4), name, f"{p.value:.6g}", span])
-    interval = f"{100.0 * fitted.level:g} % interval"
-    head = ["law", "AICc", "weight", "left [N]", "parameter", "fitted", interval]
-    table = console.text_table(rows, head, "lrrrlrr")
-    low, high = (1e3 * x for x in fitted.summary()["speed"])
-    lines = [
-        table,
-        f"{fitted.law}: {len(fitted.v)} of {fitted.samples} samples slide, "
-        f"at {low:.3g} to {high:.3g} mm/s; noise {fitted.force_noise:.3g} N"
-        + (f", {1e6 * fitted.position_noise:.3g} um" if fitted.position_noise else ""),
-    ]
-    return "\n".join(lines + [f"warning: {x}" for x in fitted.warnings])

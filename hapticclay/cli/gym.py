@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
-import tyro
-
-from ..errors import integer
-from .console import progress_bar, text_table
+from ..display import text_table
+from ..errors import Bound
+from .console import progress_bar
+from .options import Loose
 from .unused import Unused
 
 SEEDS, EPISODES, NOISE = 100, 100, 0.1  # where none is given
@@ -32,12 +32,11 @@ class GymCommand:
         engine: auto, python or native.
     """
 
-    action: Annotated[Literal["baselines", "dataset"], tyro.conf.Positional]
-    env: Annotated[
-        Literal["CutLine-v0", "PareEdge-v0", "AdaptiveGain-v0", "ProbeClay-v0"],
-        tyro.conf.Positional,
-    ] = "CutLine-v0"
-    seeds: int | None = None
+    action: Loose[Literal["baselines", "dataset"]]
+    env: Loose[Literal["CutLine-v0", "PareEdge-v0", "AdaptiveGain-v0", "ProbeClay-v0"]] = (
+        "CutLine-v0"
+    )
+    seeds: Annotated[int | None, Bound(2, 100_000)] = None
     episodes: int | None = None
     noise: float | None = None
     name: str | None = None
@@ -58,17 +57,21 @@ class GymCommand:
     def _baselines(self) -> int:
         from ..gym import baselines, scores
 
-        seeds = integer("seeds", SEEDS if self.seeds is None else self.seeds, 2, 100_000)
-        rows, means = [], {}
-        for name, maker in baselines.BASELINES[self.env].items():
-            found = baselines.returns(self.env, maker, range(seeds), engine=self.engine)
-            means[name], half = baselines.mean_of(found.total)
-            rows.append([name, f"{means[name]:.2f}", f"{half:.2f}", f"{found.length.mean():.0f}"])
-        columns = ["policy", "return", "95 % interval +-", "periods"]
-        if score := scores.scores_of(self.env, means):
-            columns.append("score")
-            rows = [[*row, f"{score[row[0]]:.2f}"] for row in rows]
-        print(text_table(rows, columns, "lrrrr"[: len(columns)]))
+        seeds = SEEDS if self.seeds is None else self.seeds
+        found = {
+            name: baselines.returns(self.env, maker, range(seeds), engine=self.engine)
+            for name, maker in baselines.BASELINES[self.env].items()
+        }
+        means = {name: baselines.mean_of(x.total) for name, x in found.items()}
+        table: dict[str, list] = {
+            "policy": list(found),
+            "return": [mean for mean, _ in means.values()],
+            "95 % interval +-": [half for _, half in means.values()],
+            "periods": [x.length.mean() for x in found.values()],
+        }
+        if score := scores.scores_of(self.env, {name: mean for name, (mean, _) in means.items()}):
+            table["score"] = [score[name] for name in found]
+        print(text_table(table, dict.fromkeys(table, ".2f") | {"periods": ".0f"}))
         return 0
 
     def _dataset(self) -> int:

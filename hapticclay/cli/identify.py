@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from ..errors import ParameterError, choice
+from ..errors import Bound, ParameterError, choice
 from ..files import writable
 from ..model.constants import AXES
 from . import console
+from .unused import Unused
 
 if TYPE_CHECKING:
     from ..studies.identification import Identified
@@ -22,10 +22,7 @@ QUICK_SIGNALS: dict[str, dict[str, Any]] = {  # period [s], band [Hz]
     "S": {"periods": 1, "lines": 20, "period": 2.5, "band": (0.3, 20.0)},
     "Th": {"periods": 1, "lines": 20, "period": 5.0, "band": (0.15, 3.0)},
 }
-NUMBERS = ("printed", "fitted", "95 % interval", "error")  # columns of the table
 SPACING, QUICK_SPACING = 0.08, 0.2  # of the map's poses [m]
-SIMULATED_ONLY = ("noise", "map", "quick", "seed", "control")
-MEASURED_ONLY = ("what", "columns", "band", "held", "paper")
 
 
 @dataclass(frozen=True)
@@ -69,38 +66,39 @@ class IdentifyCommand:
     csv: Path | None = None
     what: Literal["G", "S", "Th"] | None = None
     columns: tuple[str, ...] = ()
-    band: tuple[float, float] | None = None
+    band: Annotated[tuple[float, float] | None, Bound(unit="Hz", names=("low", "high"))] = None
     held: bool = False
     paper: bool = False
     figures: console.FigureOptions = console.FigureOptions()
 
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(
+            ("noise", "map", "quick", "seed", "control"),
+            "is for the simulated arm: leave it out with --csv",
+            ("csv",),
+        ),
+        Unused(
+            ("what", "columns", "band", "held", "paper"),
+            "is for measured columns: give --csv FILE too",
+            (),
+            ("csv",),
+        ),
+    )
+
     def __call__(self) -> int:
-        self._check_words()
+        from ..studies.identified_blocks import IdentifiedBlocks
+
         if self.csv:
             return self._measured(self.csv)
         writable(self.out)
         with console.fraction_bar("identify") as show:
             results = self._blocks(show)
-            found = self._map(show) if self.map else None
-        try:
-            self._save(results, found)
-        finally:  # a full disk must not hide the results
-            print(coefficient_table(results))
-            if found:
-                print("\n" + drift_table(found))
-        print(f"written to {self.out}")
+            drift = self._map(show) if self.map else None
+        console.deliver(IdentifiedBlocks(results, drift), self.out, self.figures)
         return 0
 
-    def _check_words(self) -> None:
-        """Refuse options of the simulated arm with a file, and of a file without one."""
-        names, bound = SIMULATED_ONLY, "is for the simulated arm: leave it out with --csv"
-        if not self.csv:
-            names, bound = MEASURED_ONLY, "is for measured columns: give --csv FILE too"
-        for name in names:
-            if (value := getattr(self, name)) != getattr(type(self), name):
-                raise ParameterError(name, value, bound)
-
     def _measured(self, file: Path) -> int:
+        from ..studies.identified_blocks import IdentifiedBlocks
         from ..studies.measurement import COLUMNS, Measurement
         from ..studies.spectral_fit import identify_data
 
@@ -108,19 +106,15 @@ class IdentifyCommand:
         data = Measurement.load(file, column_names(self.columns, COLUMNS))
         axis = "x" if self.axis == "both" else self.axis
         result = identify_data(data, self.what or "G", axis, band=self.band, held=self.held)
-        try:
-            self._save([result], None)
-        finally:  # a full disk must not hide the result
-            print(coefficient_table([result], self.paper))
-        print(f"written to {self.out}")
+        console.deliver(IdentifiedBlocks((result,), paper=self.paper), self.out, self.figures)
         return 0
 
-    def _blocks(self, show: Callable[..., None]) -> list[Identified]:
+    def _blocks(self, show: Callable[..., None]) -> tuple[Identified, ...]:
         from ..studies.identification import BLOCK_KINDS, Noise, identify
 
         axes = AXES if self.axis == "both" else (self.axis,)
         jobs = [(what, axis) for what in BLOCK_KINDS for axis in axes]
-        return [
+        return tuple(
             identify(
                 axis,
                 what,
@@ -131,7 +125,7 @@ class IdentifyCommand:
                 **(QUICK_SIGNALS[what] if self.quick else {}),
             )
             for i, (what, axis) in enumerate(jobs)
-        ]
+        )
 
     def _map(self, show: Callable[..., None]) -> Drift:
         from ..studies.workspace import drift_map
@@ -141,30 +135,6 @@ class IdentifyCommand:
             seed=self.seed,
             progress=lambda done, total: show(done / total, "map"),
         )
-
-    def _save(self, results: Sequence[Identified], found: Drift | None) -> None:
-        from ..studies.identification import IDENTIFICATION_SCHEMA, response_tables
-        from ..views import identification_plots, workspace_plots
-        from ..views.figure import Figure
-
-        data = {
-            "schema": IDENTIFICATION_SCHEMA,
-            "results": [r.summary() for r in results],
-            "map": found and found.summary(),
-        }
-        console.save_json(data, self.out / "identify.json")
-        beside = self.paper or not self.csv
-        figures = {
-            "identify" if self.csv else block.figure: Figure(
-                partial(identification_plots.identification_plot, same, beside),
-                partial(response_tables, same, beside),
-            )
-            for what, block in identification_plots.BLOCKS.items()
-            if (same := [r for r in results if r.what == what])
-        }
-        if found:
-            figures["map"] = Figure(partial(workspace_plots.workspace_plot, found), found.tables)
-        console.save_figures(figures, self.out, self.figures)
 
 
 def column_names(
@@ -182,56 +152,3 @@ def column_names(
             raise ParameterError("columns", word, f"must give {key} once")
         out[key] = name
     return out
-
-
-def coefficient_table(results: Sequence[Identified], paper: bool = True) -> str:
-    """Fitted coefficients, and the printed ones beside them, for a terminal."""
-    rows = [
-        [
-            r.what,
-            r.axis,
-            f"{c.name} [{c.unit}]",
-            f"{c.printed:g}",
-            f"{c.value:.6g}",
-            f"{c.low:.6g} to {c.high:.6g}",
-            f"{100.0 * c.error:+.4f} %",
-        ]
-        for r in results
-        for c in r.coefficients
-    ]
-    head = ["", "axis", "coefficient", "printed", "fitted", "95 % interval", "error"]
-    if not paper:
-        kept = [i for i, name in enumerate(head) if name not in ("axis", "printed", "error")]
-        rows, head = [[row[i] for i in kept] for row in rows], [head[i] for i in kept]
-    low = min(float(r.coherence.min()) for r in results)
-    counts = ", ".join(f"{r.what}{r.axis if paper else ''} {len(r.frequency)}" for r in results)
-    table = console.text_table(rows, head, "".join("r" if x in NUMBERS else "l" for x in head))
-    way = "".join(f"; {r.source}: {r.estimate}" for r in results if r.scenario is None)
-    lines = [table, f"lines: {counts}; lowest coherence {low:.6f}{way}"]
-    for r in results:
-        if r.scenario is None and r.what == "S":
-            mass, damper, spring = r.device
-            lines.append(
-                f"as a device: mass {mass:.5g} kg, damper {damper:.5g} N.s/m, "
-                f"spring {spring:.5g} N/m"
-            )
-        lines += [f"warning: {x}" for x in r.warnings]
-    return "\n".join(lines)
-
-
-def drift_table(found: Drift) -> str:
-    """Range of each coefficient over the workspace, with and without shaping, for a terminal."""
-    ranges = found.ranges()
-    rows = [
-        [
-            a["what"],
-            a["axis"],
-            a["name"],
-            f"{a['printed']:g}",
-            *(f"{r['lowest']:.5g} to {r['highest']:.5g}" for r in (a, b)),
-        ]
-        for a, b in zip(ranges[::2], ranges[1::2], strict=True)
-    ]
-    head = ["", "axis", "coefficient", "printed", "without shaping", "with shaping"]
-    text = console.text_table(rows, head, "lllrrr")
-    return f"over {len(found.x)} poses of the workspace:\n{text}"

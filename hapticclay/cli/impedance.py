@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
-
-from ..errors import ParameterError, choice
+from ..errors import Bound, ParameterError, choice
 from ..files import writable
 from ..model.constants import AXES
 from . import console, walls
+from .options import Loose
 
 if TYPE_CHECKING:
-    from ..studies.impedance import MeasuredImpedance, Subject
+    from ..studies.impedance import Subject
 
 
 @dataclass(frozen=True)
@@ -44,13 +42,13 @@ class ImpedanceCommand:
         figures: Format and style of the figures.
     """
 
-    source: Annotated[str | None, tyro.conf.Positional] = None
+    source: Loose[str | None] = None
     axis: Literal["x", "y"] | None = None
-    b: float | None = None
-    k: float | None = None
-    band: tuple[float, float] = (0.5, 30.0)
+    b: Annotated[float | None, Bound(unit="N.s/m")] = None
+    k: Annotated[float | None, Bound(unit="N/m")] = None
+    band: Annotated[tuple[float, float], Bound(unit="Hz", names=("low", "high"))] = (0.5, 30.0)
     lines: int = 24
-    amplitude: float = 1e-5
+    amplitude: Annotated[float, Bound(unit="m")] = 1e-5
     seed: int = 0
     out: Path = Path("out/impedance")
     wall: walls.WallOptions = walls.WallOptions()
@@ -58,26 +56,13 @@ class ImpedanceCommand:
 
     def __call__(self) -> int:
         from ..studies.impedance import measure_impedance
-        from ..views import impedance_plots
-        from ..views.figure import Figure
 
         writable(self.out)
         subject = self._subject()
         found = measure_impedance(
             subject, band=self.band, lines=self.lines, amplitude=self.amplitude, seed=self.seed
         )
-        try:
-            console.save_json(found.summary(), self.out / "impedance.json")
-            figures = {
-                "impedance": Figure(lambda: impedance_plots.impedance_plot(found), found.tables),
-                "transparency": Figure(
-                    lambda: impedance_plots.transparency_bode_plot(found), found.tables
-                ),
-            }
-            console.save_figures(figures, self.out, self.figures)
-        finally:  # a full disk must not hide the result
-            print(impedance_table(found))
-        print(f"written to {self.out}")
+        console.deliver(found, self.out, self.figures)
         return 0
 
     def _subject(self) -> Subject:
@@ -87,9 +72,12 @@ class ImpedanceCommand:
         file = self.source if self.source and is_scenario_file(self.source) else None
         if file and is_wall_file(file):
             return self._wall(file)
-        if self.source is None and set(self.wall.given) - {"hand"}:
+        of_wall = {name: x for name, x in self.wall.given.items() if name != "hand"}
+        if self.source is None and of_wall:
             return self._wall(None)
-        self.wall.refuse("is for a wall: leave it out beside an experiment or scenario", ("hand",))
+        for name, value in of_wall.items():
+            bound = "is for a wall: leave it out beside an experiment or scenario"
+            raise ParameterError(name, value, bound)
         return self._loop(file)
 
     def _wall(self, file: str | None) -> Subject:
@@ -116,29 +104,3 @@ class ImpedanceCommand:
             loop = replace(loop, k=self.k)
         hand = walls.operator_of(self.wall.hand)
         return replace(loop, operator=hand) if hand else loop
-
-
-def impedance_table(found: MeasuredImpedance) -> str:
-    """Effective stiffness, damping and mass at each line, for a terminal."""
-    m, c = found.measured, found.computed
-    off = abs(m.Z / c.Z - 1.0)
-    columns = zip(
-        m.frequency, m.stiffness, m.damping, m.mass, off, abs(m.transparency), strict=True
-    )
-    rows = [
-        [
-            f"{f:.4g}",
-            *(console.significant(float(x)) for x in (stiffness, damping, mass)),
-            f"{100.0 * gap:.4f} %",
-            console.significant(float(transparency)),
-        ]
-        for f, stiffness, damping, mass, gap, transparency in columns
-    ]
-    head = ["Hz", "stiffness [N/m]", "damping [N.s/m]", "mass [kg]", "off theory", "|fe/fh|"]
-    lines = [
-        console.text_table(rows, head, "rrrrrr"),
-        f"measured against computed: Z within {100.0 * found.gap:.2g} %"
-        + ("" if math.isnan(found.felt_gap) else f", fe/fh within {100.0 * found.felt_gap:.2g} %"),
-        *found.notes,
-    ]
-    return "\n".join(lines)

@@ -5,13 +5,11 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import tyro
-
-from ..display import one_line, printable
+from ..display import one_line, printable, text_table
 from ..files import versions
-from . import console
+from .options import Loose
 
 if TYPE_CHECKING:
     from ..simulation.record import Record
@@ -25,10 +23,12 @@ class InfoCommand:
         record: The record: its folder, or its record.npz.
     """
 
-    record: Annotated[Path, tyro.conf.Positional]
+    record: Loose[Path]
 
     def __call__(self) -> int:
-        record = console.load_record(self.record)
+        from ..simulation.record import Record
+
+        record = Record.load(self.record)
         file = self.record / "record.npz" if os.path.isdir(self.record) else self.record
         print(record_text(record, file.stat().st_size))
         return 0
@@ -74,14 +74,16 @@ def array_table(record: Record) -> str:
     arrays = recorded_arrays(record)
     if record.ground is not None:
         arrays["ground"] = record.ground
-    rows = []
-    for name, x in arrays.items():
-        known = x[np.isfinite(x)]
-        ends = [f"{v():.6g}" for v in (known.min, known.max)] if known.size else ["-", "-"]
-        shape = " x ".join(map(str, x.shape))
-        rows.append([name, shape, ARRAY_UNITS.get(name, "m"), *ends, LONG_NAMES[name]])
-    head = ("array", "shape", "unit", "lowest", "highest", "what it is")
-    return console.text_table(rows, head, "lrlrrl")
+    known = [x[np.isfinite(x)] for x in arrays.values()]
+    table = {
+        "array": list(arrays),
+        "shape": [" x ".join(map(str, x.shape)) for x in arrays.values()],
+        "unit": [ARRAY_UNITS.get(name, "m") for name in arrays],
+        "lowest": [x.min() if x.size else np.nan for x in known],
+        "highest": [x.max() if x.size else np.nan for x in known],
+        "what it is": [LONG_NAMES[name] for name in arrays],
+    }
+    return text_table(table, {"lowest": ".6g", "highest": ".6g"})
 
 
 def _size_text(size: float) -> str:

@@ -3,19 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
 
-import tyro
-
-from ..files import versions, writable
+from ..files import writable
 from . import console
-
-if TYPE_CHECKING:
-    from ..studies.labs import Lab
-
-LAB_SCHEMA = "hapticclay-lab-1"
+from .options import Loose
 
 
 @dataclass(frozen=True)
@@ -25,14 +17,14 @@ class LabCommand:
     Attributes:
         source: The lab: a wall and its rate, Z-width, delay and passivity, or a just-noticeable
             difference.
-        out: Folder for lab.json and the figures.
+        out: Folder for lab.json and the figures; by default out/lab/NAME.
         quick: Make fewer runs.
         view: At the end, show a run of the lab in a window.
         figures: Formats and style of the figures.
     """
 
-    source: Annotated[str, tyro.conf.Positional]
-    out: Annotated[Path | None, tyro.conf.arg(help_behavior_hint="(default: out/lab/NAME)")] = None
+    source: Loose[str]
+    out: Path | None = None
     quick: bool = False
     view: bool = False
     figures: console.FigureOptions = console.FigureOptions()
@@ -46,11 +38,7 @@ class LabCommand:
         writable(out)
         with console.progress_bar(total=0, bar_format="{elapsed} {desc}") as bar:
             found = lab(name, self.quick, bar.set_description_str)
-        try:
-            self._save(found, out)
-        finally:  # a full disk must not hide the results
-            print(lab_text(found))
-        print(f"written to {out}")
+        console.deliver(found, out, self.figures)
         if self.view:
             from ..simulation.simulate import simulate
             from ..studies.removal import TOOL
@@ -58,27 +46,3 @@ class LabCommand:
 
             replay(simulate(found.scene), TOOL)
         return 0
-
-    def _save(self, found: Lab, out: Path) -> None:
-        from ..views.chart_plots import chart_plot
-        from ..views.figure import Figure
-
-        tables = {
-            name: {column: list(values) for column, values in table.items()}
-            for name, table in found.tables().items()
-        }
-        data = {"schema": LAB_SCHEMA, "lab": found.name, "questions": found.questions}
-        data |= {"tables": tables, "versions": versions()}
-        console.save_json(data, out / "lab.json")
-        figures = {c.name: Figure(partial(chart_plot, c), c.tables) for c in found.charts}
-        console.save_figures(figures, out, self.figures)
-
-
-def lab_text(found: Lab) -> str:
-    """Task, table and questions of a lab, for a terminal."""
-    columns = list(found.columns.values())
-    cells = [[x if isinstance(x, str) else f"{x:.5g}" for x in column] for column in columns]
-    align = "".join("l" if isinstance(column[0], str) else "r" for column in columns)
-    table = console.text_table(list(zip(*cells, strict=True)), list(found.columns), align)
-    asked = "\n".join(f"{i}. {q}" for i, q in enumerate(found.questions, 1))
-    return f"{found.title}. {found.task}\n\n{table}\n\n{found.found}\n\n{asked}"

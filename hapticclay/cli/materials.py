@@ -3,23 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from .console import significant, text_table
+from ..display import text_table
+from ..errors import Bound
 
 if TYPE_CHECKING:
     from ..model.tool import Tool
-
-COLUMNS_SHOWN = (
-    "material",
-    "Fy [N]",
-    "lowest",
-    "highest",
-    "K [N/(m/s)^n]",
-    "n",
-    "b [N.s/m]",
-    "source",
-)
 
 
 def _small_tool(name: str) -> float:
@@ -39,8 +29,12 @@ class MaterialsCommand:
         tool_depth: Depth of the cut [m].
     """
 
-    tool_width: float = field(default_factory=lambda: _small_tool("width"))
-    tool_depth: float = field(default_factory=lambda: _small_tool("depth"))
+    tool_width: Annotated[float, Bound(unit="m")] = field(
+        default_factory=lambda: _small_tool("width")
+    )
+    tool_depth: Annotated[float, Bound(unit="m")] = field(
+        default_factory=lambda: _small_tool("depth")
+    )
 
     def __call__(self) -> int:
         from ..model.tool import Tool
@@ -53,15 +47,19 @@ def material_table(tool: Tool) -> str:
     """The materials with the flow of a tool in each and its source, for a terminal."""
     from ..model.materials import MATERIALS
 
-    rows, sources = [], []
-    for name, m in MATERIALS.items():
-        if m.source not in sources:
-            sources.append(m.source)
-        flow, (low, high) = m.flow(tool), m.range(tool)
-        forces = (flow.Fy, low.Fy, high.Fy)
-        shown = [significant(f) if high.Fy else "" for f in forces]
-        shown += [significant(x) if flow.K else "" for x in (flow.K, flow.n)]
-        shown += [significant(flow.b) if flow.b else "", f"[{sources.index(m.source) + 1}]"]
-        rows.append([name, *shown])
-    told = [f"[{i}] {source}" for i, source in enumerate(sources, 1)]
-    return "\n".join([text_table(rows, COLUMNS_SHOWN, "lrrrrrrl"), "", *told])
+    known = dict.fromkeys(m.source for m in MATERIALS.values())
+    sources = {source: f"[{i}]" for i, source in enumerate(known, 1)}
+    flows = [m.flow(tool) for m in MATERIALS.values()]
+    ranges = [m.range(tool) for m in MATERIALS.values()]
+    table = {
+        "material": list(MATERIALS),
+        "Fy [N]": [f.Fy if high.Fy else None for f, (_, high) in zip(flows, ranges, strict=True)],
+        "lowest": [low.Fy if high.Fy else None for low, high in ranges],
+        "highest": [high.Fy or None for _, high in ranges],
+        "K [N/(m/s)^n]": [f.K or None for f in flows],
+        "n": [f.n if f.K else None for f in flows],
+        "b [N.s/m]": [f.b or None for f in flows],
+        "source": [sources[m.source] for m in MATERIALS.values()],
+    }
+    told = [f"{mark} {source}" for source, mark in sources.items()]
+    return "\n".join([text_table(table), "", *told])

@@ -7,12 +7,12 @@ import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import tyro
-
+from ..display import text_table
 from ..files import atomic, writable
-from .console import FigureOptions, progress_bar, save_figures, text_table
+from .console import FigureOptions, progress_bar, save_figures
+from .options import Loose
 
 if TYPE_CHECKING:
     from ..paper.ledger import Row
@@ -31,17 +31,16 @@ class ReproduceCommand:
 
     Attributes:
         source: The classic; none for the paper of 2002.
-        out: Folder for report.html (self-contained), report.md, ledger.json and figures/.
+        out: Folder for report.html (self-contained), report.md, ledger.json and figures/; by
+            default out/paper, or out/CLASSIC.
         quick: Omit the map of Sh over the workspace; for a classic, make fewer runs.
         page: Also write the table of numbers alone, as Markdown, to this file; of a classic, with
             its figures beside it.
         figures: Formats and style of figures/; the report itself has SVG figures for a screen.
     """
 
-    source: Annotated[str | None, tyro.conf.Positional] = None
-    out: Annotated[
-        Path | None, tyro.conf.arg(help_behavior_hint="(default: out/paper, or out/CLASSIC)")
-    ] = None
+    source: Loose[str | None] = None
+    out: Path | None = None
     quick: bool = False
     page: Path | None = None
     figures: FigureOptions = QUIET_FIGURES
@@ -95,14 +94,14 @@ def claims_table(rows: Sequence[Row]) -> str:
     """The claims of a classic, for a terminal."""
     from ..paper import report
 
-    cells = [
-        [
-            textwrap.fill(r.what, WIDE),
-            report.format_number(r.expected, r.unit, report.expected_digits(r)),
-            report.format_number(r.ours, r.unit, report.digits(r)),
-            report.format_error(r),
-            report.format_verdict(r),
-        ]
-        for r in rows
-    ]
-    return text_table(cells, ["claim", "expected", "ours", "error", "agrees"], "lrrrl")
+    return text_table(
+        {
+            "claim": [textwrap.fill(r.what, WIDE) for r in rows],
+            "expected": [
+                report.format_number(r.expected, r.unit, report.expected_digits(r)) for r in rows
+            ],
+            "ours": [report.format_number(r.ours, r.unit, report.digits(r)) for r in rows],
+            "error": [report.format_error(r) for r in rows],
+            "agrees": [report.format_verdict(r) for r in rows],
+        }
+    )

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import sys
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from ..errors import ParameterError, integer
-from ..files import versions, writable
+from ..display import table_of, text_table
+from ..errors import Bound, ParameterError
+from ..files import writable
 from . import console
 
 if TYPE_CHECKING:
     from ..studies.boundary import PushedLoop
-    from ..studies.population import Band
-    from ..studies.robustness import Cost, Instability
+    from ..studies.population import Hands
+    from ..studies.robustness import Cost
     from ..studies.trials import Trials
 
-ROBUSTNESS_SCHEMA = "hapticclay-robustness-1"
 GRIDS = {"x": "K=1:8:15 b=10:1000:11log", "y": "K=0.2:2:15 b=10:1000:11log"}
 BAND_CLAYS = (1.0, 3000.0, 25)  # [N.s/m] from, to, and number of clays of the band
-HANDS_HEAD = ["hands", "mass [kg]", "damper [N.s/m]", "spring [N/m]", "subjects", "spread"]
+HANDS_HEAD = ("hands", "mass [kg]", "damper [N.s/m]", "spring [N/m]", "subjects", "spread")
 
 
 @dataclass(frozen=True)
@@ -55,10 +55,10 @@ class RobustnessCommand:
     """
 
     axis: Literal["x", "y"] = "x"
-    b: float | None = None
-    gain: float | None = None
-    Ts: float | None = None
-    delay: float = 0.0
+    b: Annotated[float | None, Bound(unit="N.s/m")] = None
+    gain: Annotated[float | None, Bound(unit="1/kg")] = None
+    Ts: Annotated[float | None, Bound(unit="s")] = None
+    delay: Annotated[float, Bound(unit="s")] = 0.0
     inertia_shaping: bool = True
     hands: str = "published range"
     variation: float | None = None
@@ -68,7 +68,7 @@ class RobustnessCommand:
     seed: int = 0
     chunk: int = 1000
     out: Path = Path("out/robustness")
-    workers: int | None = None
+    workers: Annotated[int | None, Bound(1, 1024)] = None
     band: int = 200
     list: bool = False
     figures: console.FigureOptions = console.FigureOptions()
@@ -76,21 +76,20 @@ class RobustnessCommand:
     def __call__(self) -> int:
         from ..simulation.batch import cores
         from ..studies.population import POPULATIONS, Draw, gain_band, hands_of
-        from ..studies.robustness import monte_carlo
+        from ..studies.robustness import Robustness, monte_carlo
 
         if self.list:
-            rows = [hands.row(name) for name, hands in POPULATIONS.items()]
-            print(console.text_table([r[:-1] for r in rows], HANDS_HEAD, "lrrrrl"))
-            for row in rows:
-                print(f"{row[0]}: {row[-1]}")
+            print(hands_table(POPULATIONS))
+            for name, hands in POPULATIONS.items():
+                print(f"{name}: {hands.source}")
             return 0
         writable(self.out)
         trials = self._trials()
         draw = Draw(self.band, self.seed) if self.band else None
-        workers = integer("workers", cores() if self.workers is None else self.workers, 1, 1024)
+        workers = cores() if self.workers is None else self.workers
         hands = trials.hands or hands_of(self.hands)
         assert not isinstance(hands, str)
-        print(console.text_table([hands.row(self.hands)[:-1]], HANDS_HEAD, "lrrrrl"))
+        print(hands_table({self.hands: hands}))
         try:
             with console.progress_bar(total=len(trials), unit="run", desc="runs") as bar:
                 result = monte_carlo(
@@ -116,7 +115,7 @@ class RobustnessCommand:
                 draw,
                 lambda b: console.progress_bar(b, desc="band"),
             )
-        self._show(result, band)
+        console.deliver(Robustness(result, band), self.out, self.figures)
         return 0
 
     def _trials(self) -> Trials:
@@ -162,46 +161,14 @@ class RobustnessCommand:
             chunk=self.chunk,
         )
 
-    def _show(self, result: Instability, band: Band | None) -> None:
-        from ..views import robustness_plots
-        from ..views.figure import Figure
 
-        total = result.total
-        print(f"unstable: {total.events} of {total.runs} runs, {total}")
-        if result.trials.grid:
-            print("over a grid this is the mean of its cells")
-        print(f"{100.0 * result.longer.mean():.1f} % of the runs needed a longer run")
-        if result.refused:
-            print(f"{result.refused} draws cannot be run (out of reach or bounds): not counted")
-        drawn = {
-            "instability": Figure(lambda: robustness_plots.instability_plot(result), result.tables)
-        }
-        if band is not None:
-            drawn["gain_band"] = Figure(lambda: robustness_plots.band_plot(band), band.tables)
-        console.save_figures(drawn, self.out, self.figures)
-        found: dict[str, Any] = {
-            "schema": ROBUSTNESS_SCHEMA,
-            "trials": result.trials.described(),
-            "total": asdict(total),
-            "repeated": int(result.longer.sum()),
-            "refused": result.refused,
-            "tables": result.tables(),
-            "band": band.tables()["band"] if band is not None else None,
-            "versions": versions(),
-        }
-        console.save_json(found, self.out / "robustness.json")
-        print(f"written to {self.out}")
+def hands_table(populations: Mapping[str, Hands]) -> str:
+    """Populations of hands, for a terminal."""
+    rows = [hands.row(name) for name, hands in populations.items()]
+    return text_table(table_of(HANDS_HEAD, rows))
 
 
 def _announce(cost: Cost, workers: int, out: Path, bar: Any) -> None:
-    """Prints the time and room on disk that the runs left will take."""
-    from tqdm import tqdm
-
+    """Shows the runs that are stored already, and prints what the others will take."""
     bar.update(bar.total - cost.runs - bar.n)
-    free = f"{tqdm.format_sizeof(cost.free, 'B')} free"
-    print(
-        f"hapticclay: {cost.runs} runs: about {tqdm.format_interval(cost.seconds)} on {workers} "
-        f"process{'es' if workers > 1 else ''}, {tqdm.format_sizeof(cost.size, 'B')} in "
-        f"{out / 'data'} ({free})",
-        file=sys.stderr,
-    )
+    console.announce(f"{cost.runs} runs", cost.seconds, workers, cost.size, out / "data")

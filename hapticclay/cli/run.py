@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
-import tyro
-
+from ..display import text_table
 from ..files import writable
 from ..model.constants import AXES
 from . import console
+from .options import ScenarioWord
 from .unused import Unused, undrawn
 
 if TYPE_CHECKING:
@@ -21,6 +22,14 @@ if TYPE_CHECKING:
     from ..simulation.record import Record
 
 MOST_ROWS = 6  # of a kind that the table shows
+FORMATS = {
+    "steady fe [N]": ".5g",
+    "held [% of time]": ".1f",
+    "fe/v [N.s/m]": ".5g",
+    "fh/v [N.s/m]": ".5g",
+    "steady v [m/s]": "z.6f",
+    "expected v [m/s]": "z.6f",
+}
 CHOSEN = "is chosen by --error: leave it out"
 
 
@@ -33,7 +42,8 @@ class RunCommand:
 
     Attributes:
         scenario: The experiment, or a scenario file.
-        out: Folder for record.npz, scenario.toml, summary.json and the plots.
+        out: Folder for record.npz, scenario.toml, summary.json and the plots; by default
+            out/run/EXPERIMENT.
         every: Keep every n-th sample in the record.
         error: Largest allowed error, as in 1e-6 (seconds, of the border-crossing times) or 1e-7m
             (of positions). dt and integrator are then chosen, and verified by runs at other steps.
@@ -41,10 +51,8 @@ class RunCommand:
         figures: Formats and style of the plots.
     """
 
-    scenario: Annotated[Any, tyro.conf.arg(constructor_factory=console.experiment_words)]
-    out: Annotated[
-        Path | None, tyro.conf.arg(help_behavior_hint="(default: out/run/EXPERIMENT)")
-    ] = None
+    scenario: ScenarioWord
+    out: Path | None = None
     every: int = 1
     error: str | None = None
     plots: bool = True
@@ -135,9 +143,7 @@ def run_table(record: Record, paced: bool = False) -> str:
     if not s.clay and abs(s.force[1]) > abs(s.force[0]):
         ways = "y"
     pieces = [(way, piece[way]) for way in ways for piece in record.regions(way)]
-    shown = _columns(s.clay)
-    rows = [[text(way, r) for text in shown.values()] for way, r in pieces[:MOST_ROWS]]
-    lines = [console.text_table(rows, list(shown), "r" * len(shown)), ""]
+    lines = [_stretch_table(s.clay, pieces[:MOST_ROWS]), ""]
     if len(pieces) > MOST_ROWS:
         lines.insert(1, f"... and {len(pieces) - MOST_ROWS} more stretches")
     lines += _crossing_lines(record) + _stop_lines(record)
@@ -173,7 +179,7 @@ def _crossing_lines(record: Record) -> list[str]:
     lines = []
     for c in record.crossings[:MOST_ROWS]:
         at = f"border {c.axis} = {100 * c.border + 0.0:g} cm"
-        lines.append(f"{at} crossed at {c.time:.6f} s with {console.fixed(c.speed, 6)} m/s")
+        lines.append(f"{at} crossed at {c.time:.6f} s with {c.speed:z.6f} m/s")
     if len(record.crossings) > MOST_ROWS:
         lines.append(f"... and {len(record.crossings) - MOST_ROWS} more crossings")
     return lines
@@ -206,41 +212,39 @@ def _chatters(s: Scenario, stretches: list[dict[str, Any]]) -> bool:
     return any(r.get("Fy") and r["expected_speed"] == 0.0 for r in stretches)
 
 
-def _columns(clay: Clay | None) -> dict[str, Callable[[str, dict[str, Any]], str]]:
-    """Head of each column of the table, and its text for an axis and a stretch."""
-
-    def value(name: str) -> Callable[[str, dict[str, Any]], str]:
-        return lambda _, r: f"{r[name]:.4g}"
-
-    def mean(name: str) -> Callable[[str, dict[str, Any]], str]:
-        return lambda _, r: f"{r[name]['mean']:.5g}" if r[name] else "-"
-
-    own = clay.columns if clay else []
-    out = {"path\n[cm]": _stretch}
-    out |= {f"{c.name}\n[{c.unit}]" if c.unit else c.name: value(c.name) for c in own}
-    out["b\n[N.s/m]"] = _damping
+def _stretch_table(clay: Clay | None, pieces: list[tuple[str, dict[str, Any]]]) -> str:
+    """Clay, forces and speeds on each stretch of an axis."""
+    rows = [r for _, r in pieces]
+    table: dict[str, list[Any]] = {"path [cm]": [_ends(way, r) for way, r in pieces]}
+    for c in clay.columns if clay else []:
+        table[f"{c.name} [{c.unit}]" if c.unit else c.name] = [r[c.name] for r in rows]
+    table["b [N.s/m]"] = [_damping(r) for r in rows]
     if clay and clay.holding:
-        out["steady fe\n[N]"] = lambda _, r: (
-            "-" if r["steady_fe"] is None else f"{r['steady_fe']:.5g}"
-        )
-        out["held\n[% of time]"] = lambda _, r: f"{100 * r['held']:.1f}"
+        table["steady fe [N]"] = [_known(r["steady_fe"]) for r in rows]
+        table["held [% of time]"] = [100.0 * r["held"] for r in rows]
     else:
-        out["fe/v\n[N.s/m]"] = lambda way, r: "-" if _grows(r) else mean("fe_over_v")(way, r)
-        out["fh/v\n[N.s/m]"] = mean("steady_fh_over_v")
-    for name in ("steady", "expected"):
-        out[f"{name} v\n[m/s]"] = lambda _, r, name=name: console.fixed(r[f"{name}_speed"], 6)
-    return out
+        ratios = [None if _grows(r) else r["fe_over_v"] for r in rows]
+        felt = [r["steady_fh_over_v"] for r in rows]
+        table["fe/v [N.s/m]"] = [x["mean"] if x else math.nan for x in ratios]
+        table["fh/v [N.s/m]"] = [x["mean"] if x else math.nan for x in felt]
+    table["steady v [m/s]"] = [_known(r["steady_speed"]) for r in rows]
+    table["expected v [m/s]"] = [_known(r["expected_speed"]) for r in rows]
+    return text_table(table, FORMATS)
 
 
-def _stretch(way: str, r: dict[str, Any]) -> str:
-    return f"{way}: {console.fixed(100 * r['from_m'], 2)} - {console.fixed(100 * r['to_m'], 2)}"
+def _known(x: float | None) -> float:
+    return math.nan if x is None else x
+
+
+def _ends(way: str, r: dict[str, Any]) -> str:
+    return f"{way}: {100 * r['from_m']:z.2f} - {100 * r['to_m']:z.2f}"
 
 
 def _grows(r: dict[str, Any]) -> bool:
     return r["b"] != r["b_end"]
 
 
-def _damping(_: str, r: dict[str, Any]) -> str:
+def _damping(r: dict[str, Any]) -> str:
     return f"{r['b']:.4g} - {r['b_end']:.4g}" if _grows(r) else f"{r['b']:g}"
 
 

@@ -12,10 +12,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-import tyro
-
-from ..errors import ParameterError, integer
+from ..errors import Bound, ParameterError
 from . import console
+from .options import Loose
 from .unused import Unused, undrawn
 
 if TYPE_CHECKING:
@@ -58,7 +57,7 @@ class SweepCommand:
         figures: Formats and style of the maps.
     """
 
-    spec: Annotated[Path | None, tyro.conf.Positional] = None
+    spec: Loose[Path | None] = None
     grid: str | None = None
     fixed: str | None = None
     experiment: str = "constant"
@@ -67,7 +66,7 @@ class SweepCommand:
     seed: int = 0
     chunk: int | None = None
     out: Path = Path("out/sweep")
-    workers: int | None = None
+    workers: Annotated[int | None, Bound(1, 1024)] = None
     scheduler: str | None = None
     maps: bool = True
     figures: console.FigureOptions = console.FigureOptions()
@@ -87,8 +86,6 @@ class SweepCommand:
         from ..studies import store
 
         asked = self._plan()
-        if self.workers is not None:
-            integer("workers", self.workers, 1, 1024)
         with store.claimed(asked, self.out) as (plan, todo):
             try:
                 self._make(plan, todo)
@@ -142,23 +139,12 @@ class SweepCommand:
 
     def _estimate(self, plan: Sweep, left: int, todo: list[range]) -> None:
         """Prints the time and room on disk that the runs left will take."""
-        import shutil
-
-        from tqdm import tqdm
-
         from ..studies import store_runs, sweep
 
-        seconds, size = sweep.estimate_time(plan)
+        each, size = sweep.estimate_time(plan)
         crew = 1 if self.scheduler else store_runs.processes(plan, todo, self.workers)
-        span = tqdm.format_interval(seconds * left / crew)
-        free, room = shutil.disk_usage(self.out).free, size * left
-        print(
-            f"hapticclay: {left} runs, {1e3 * seconds:.3g} ms each: about {span} on {crew} "
-            f"process{'es' if crew > 1 else ''}, {tqdm.format_sizeof(room, 'B')} in "
-            f"{self.out / 'data'} ({'only ' if free < room else ''}"
-            f"{tqdm.format_sizeof(free, 'B')} free)",
-            file=sys.stderr,
-        )
+        runs, data = f"{left} runs, {1e3 * each:.3g} ms each", self.out / "data"
+        console.announce(runs, each * left / crew, crew, size * left, data)
 
     def _draw(self, table: Any) -> None:
         from ..views import sweep_plots

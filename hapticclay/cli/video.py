@@ -7,12 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import tyro
-
+from ..errors import Bound
 from ..files import writable
 from . import console
+from .options import RecordWord
 from .run import simulate_with_progress
 from .view import tool_size
+
+Pixels = Annotated[int, Bound(1, 100_000)]
 
 
 @dataclass(frozen=True)
@@ -31,15 +33,15 @@ class VideoCommand:
         tool_depth: Depth of the cut [m].
     """
 
-    scenario: Annotated[Any, tyro.conf.arg(constructor_factory=console.scenario_words)]
+    scenario: RecordWord
     out: Path = Path("out/film.mp4")
     camera: Literal["room", "top", "close"] = "room"
     speed: float = 1.0
-    size: tuple[int, int] = (960, 480)
+    size: tuple[Pixels, Pixels] = (960, 480)
     plots: bool = True
     smooth: bool = False
-    tool_width: float = field(default_factory=tool_size("width"))
-    tool_depth: float = field(default_factory=tool_size("depth"))
+    tool_width: Annotated[float, Bound(unit="m")] = field(default_factory=tool_size("width"))
+    tool_depth: Annotated[float, Bound(unit="m")] = field(default_factory=tool_size("depth"))
 
     def __call__(self) -> int:
         from ..simulation.record import Record

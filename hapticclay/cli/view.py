@@ -7,14 +7,13 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
-import tyro
-
-from ..errors import ParameterError
+from ..errors import Bound, ParameterError
 from ..files import writable
 from . import console
 from .device_options import DeviceOptions
+from .options import RecordWord
 from .run import deliver
 from .unused import FIGURE_WORDS, Unused, undrawn
 
@@ -52,7 +51,7 @@ class ViewCommand:
             paper's arm at rest.
         tool_width: Width of the tool [m].
         tool_depth: Depth of the cut [m].
-        out: Folder for record.npz, summary.json and the plots.
+        out: Folder for record.npz, summary.json and the plots; by default out/view/EXPERIMENT.
         every: Keep every n-th sample in the record.
         plots: Draw the plots.
         web: Show the session in a browser; no display is needed on this machine.
@@ -64,13 +63,11 @@ class ViewCommand:
             localhost:9870, for PlotJuggler.
     """
 
-    scenario: Annotated[Any, tyro.conf.arg(constructor_factory=console.scenario_words)]
+    scenario: RecordWord
     stiffness: float = 10.0
-    tool_width: float = field(default_factory=tool_size("width"))
-    tool_depth: float = field(default_factory=tool_size("depth"))
-    out: Annotated[
-        Path | None, tyro.conf.arg(help_behavior_hint="(default: out/view/EXPERIMENT)")
-    ] = None
+    tool_width: Annotated[float, Bound(unit="m")] = field(default_factory=tool_size("width"))
+    tool_depth: Annotated[float, Bound(unit="m")] = field(default_factory=tool_size("depth"))
+    out: Path | None = None
     every: int = 10
     plots: bool = True
     web: bool = False
@@ -83,8 +80,14 @@ class ViewCommand:
     unused: ClassVar[tuple[Unused, ...]] = (
         Unused(("force", "muscle", "length", "t-max"), "does not apply to a session: leave it out"),
         Unused(
-            ("stiffness", "every", "out", "plots", "no-plots", "host", "port", *FIGURE_WORDS),
+            ("stiffness", "every", "out", "plots", "no-plots", "host", "port")
+            + ("device", "device-server", *FIGURE_WORDS),
             "is for sessions: leave it out with a record",
+            ("scenario=record",),
+        ),
+        Unused(
+            ("web",),
+            "shows sessions only: make a film of a record with hapticclay video",
             ("scenario=record",),
         ),
         Unused(("host", "port"), "is of the page: give --web too", (), ("web",)),
@@ -101,7 +104,6 @@ class ViewCommand:
 
         tool = Tool(self.tool_width, self.tool_depth)
         if isinstance(self.scenario, Record):
-            self._refuse_sessions_options()
             replay(self.scenario, tool, self.stream)
             return 0
         writable(self.out or Path("out/view"))
@@ -116,14 +118,6 @@ class ViewCommand:
         deliver(record, out, figures, paced=True)
         self.devices.deliver(session, out, figures)
         return 0
-
-    def _refuse_sessions_options(self) -> None:
-        """Refuses options that are not for a record."""
-        if self.web:
-            bound = "shows sessions only: make a film of a record with hapticclay video"
-            raise ParameterError("web", True, bound)
-        if self.devices.given:
-            raise ParameterError("device", True, "is for sessions: leave it out with a record")
 
     def _play(self, session: Session) -> None:
         """Plays a session until its window or page is closed."""

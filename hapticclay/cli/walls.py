@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from ..errors import ParameterError
+from ..errors import Bound
+from .unused import Unused
 
 if TYPE_CHECKING:
     from ..scene.virtual_wall import VirtualWall
     from ..theory.hand_boxes import Box
 
-Quantity = str | None  # a number in SI, or with a unit: "0.1", "1ms"
-Hand = tuple[float, float, float]
-HandEnds = tuple[float, float, float, float, float, float]
+Mass = Annotated[float, Bound(unit="kg")]
+Damper = Annotated[float, Bound(unit="N.s/m")]
+Spring = Annotated[float, Bound(unit="N/m")]
+Hand = tuple[Mass, Damper, Spring]
+HandEnds = tuple[Mass, Mass, Damper, Damper, Spring, Spring]
+OrNone = float | Literal["none"] | None  # None where it is not given
 WALL_FIELDS = {  # dotted names of options, where the two differ
     "mass": "device.mass",
     "damper": "device.damper",
@@ -22,6 +26,8 @@ WALL_FIELDS = {  # dotted names of options, where the two differ
     "quantum": "device.quantum",
     "filter": "velocity_filter",
 }
+OF_DEVICE = ("mass", "damper", "friction", "quantum", "velocity", "velocity-window", "filter")
+OF_DEVICE += ("unilateral",)  # options for a bare device alone, by their words
 
 
 @dataclass(frozen=True)
@@ -34,6 +40,7 @@ class DeviceOptions:
         friction: Coulomb friction fc of the device [N], by default 0.
         quantum: Distance per count of the encoder [m], by default 0.
         Ts: Control sample [s], by default 1 ms, and 0.36 ms on the arm.
+        rate: Control rate [Hz], in the place of Ts = 1/rate.
         delay: Latency from a sample to the force computed from it [s].
         velocity: How velocity is measured, by default as the difference of positions.
         velocity_window: Samples that the difference spans, by default 1.
@@ -42,22 +49,38 @@ class DeviceOptions:
         unilateral: The wall has a surface and never pulls.
     """
 
-    mass: Quantity = None
-    damper: Quantity = None
-    friction: Quantity = None
-    quantum: Quantity = None
-    Ts: Quantity = None
-    delay: Quantity = None
+    mass: Annotated[float | None, Bound(unit="kg")] = None
+    damper: Annotated[float | None, Bound(unit="N.s/m")] = None
+    friction: Annotated[float | None, Bound(unit="N")] = None
+    quantum: Annotated[float | None, Bound(unit="m")] = None
+    Ts: Annotated[OrNone, Bound(unit="s")] = None
+    rate: Annotated[float | None, Bound(0.0, unit="Hz", above=True)] = None
+    delay: Annotated[float | None, Bound(unit="s")] = None
     velocity: Literal["difference", "exact"] | None = None
-    velocity_window: Quantity = None
-    filter: Quantity = None
+    velocity_window: int | None = None
+    filter: Annotated[OrNone, Bound(unit="Hz")] = None
     hand: Hand | None = None
     unilateral: bool = False
 
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("rate",), "is 1/Ts: give one of the two", ("Ts",)),
+    )
+
     @property
-    def given(self) -> tuple[str, ...]:
-        """Names of the options that were given."""
-        return tuple(f.name for f in fields(self) if getattr(self, f.name) != f.default)
+    def given(self) -> dict[str, Any]:
+        """The options that were given."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {
+            name: value
+            for name, value in values.items()
+            if value is not None and value is not False
+        }
+
+    @property
+    def timing(self) -> dict[str, Any]:
+        """What was given of Ts and delay."""
+        found = {name: x for name, x in self.given.items() if name in ("Ts", "delay")}
+        return found | ({"Ts": 1.0 / self.rate} if self.rate else {})
 
     def wall(self, source: Path | str | None = None, **base: Any) -> VirtualWall:
         """The wall of a file, or one of defaults, with what was given."""
@@ -65,18 +88,11 @@ class DeviceOptions:
         from ..scene.virtual_wall import VirtualWall
 
         wall = VirtualWall.load(source) if source else with_fields(VirtualWall(), base)
-        names = [n for n in self.given if n not in ("hand", "unilateral")]
-        changes = quantities({n: getattr(self, n) for n in names})
-        wall = with_fields(wall, {WALL_FIELDS.get(n, n): x for n, x in changes.items()})
-        if self.hand:
-            wall = replace(wall, operator=operator_of(self.hand))
-        return replace(wall, unilateral=True) if self.unilateral else wall
-
-    def refuse(self, bound: str, but: tuple[str, ...] = ()) -> None:
-        """Refuses what was given."""
-        for name in self.given:
-            if name not in but:
-                raise ParameterError(name, str(getattr(self, name)), bound)
+        changes = self.given | self.timing
+        operator = operator_of(changes.pop("hand", None)) or wall.operator
+        changes.pop("rate", None)
+        changes = {WALL_FIELDS.get(name, name): x for name, x in changes.items()}
+        return replace(with_fields(wall, changes), operator=operator)
 
 
 @dataclass(frozen=True)
@@ -89,20 +105,9 @@ class WallOptions(DeviceOptions):
         M: Virtual mass [kg].
     """
 
-    K: Quantity = None
-    B: Quantity = None
-    M: Quantity = None
-
-
-def quantities(given: dict[str, str | None]) -> dict[str, Any]:
-    """Numbers with their units read, of the options that were given."""
-    from ..scene.changes import named_values
-
-    out: dict[str, Any] = {}
-    for name, text in given.items():
-        if text is not None:
-            out |= named_values(f"--{name}", [f"{name}={text}"])
-    return out
+    K: Annotated[float | None, Bound(unit="N/m")] = None
+    B: Annotated[float | None, Bound(unit="N.s/m")] = None
+    M: Annotated[float | None, Bound(unit="kg")] = None
 
 
 def operator_of(hand: Hand | None) -> Any:

@@ -1,4 +1,4 @@
-"""Nodes for numbers, words and whatever has no fields of its own."""
+"""Nodes of numbers, words, rows, pairs and unions, and the names of what lies below them."""
 
 from __future__ import annotations
 
@@ -6,24 +6,15 @@ import contextlib
 import dataclasses
 import functools
 import math
+import operator
 import os
 import pkgutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
-from ..errors import (
-    Bound,
-    ParameterError,
-    choice,
-    integer,
-    is_series,
-    nearest,
-    number,
-    numbers_of,
-    quantity,
-    table_of,
-)
+from .. import errors
+from ..errors import Bound, ParameterError
 from ..units import is_quantity
 
 AXES = ("x", "y")
@@ -46,13 +37,14 @@ class Node:
         words: words that it takes.
         takes_numbers: whether it takes a number, which may have a unit.
         arity: words of a command line that make a value; infinite for any number of them.
+        members: nodes within it, whose parts are its parts.
     """
 
     hint: Any = Any
     bound, none, takes_numbers = Bound(), False, False
     words: tuple[str, ...] = ()
     arity: float = 1
-    members: Sequence[Node] = ()  # whose parts are its parts
+    members: Sequence[Node] = ()
 
     def wants(self) -> str:
         """What it takes, in words that follow "must be"."""
@@ -73,6 +65,8 @@ class Node:
         if isinstance(value, Mapping) and ENTIRE in value:
             old = self.read(value[ENTIRE], path, old)
             value = {k: v for k, v in value.items() if k is not ENTIRE}
+            if not value:
+                return old
         if self.none and isinstance(value, str) and value.lower() == "none":
             return None
         return self._read(value, path, old)
@@ -131,16 +125,6 @@ class Field(NamedTuple):
     about: str
 
     @property
-    def bound(self) -> Bound:
-        """Its bound and unit."""
-        return self.node.bound
-
-    @property
-    def kind(self) -> Any:
-        """Its type hint, without annotations."""
-        return self.node.hint
-
-    @property
     def unit(self) -> str:
         """Its unit; "" for none."""
         return self.node.bound.unit
@@ -148,7 +132,7 @@ class Field(NamedTuple):
 
 def limits(bound: Bound, owner: Any) -> dict[str, Any]:
     """Arguments of `number`; owner has the field that the bound names."""
-    low = getattr(owner, bound.low) if isinstance(bound.low, str) else bound.low
+    low = getattr(owner, bound.low, -math.inf) if isinstance(bound.low, str) else bound.low
     return {"low": low, "high": bound.high, "above": bound.above, "unit": bound.unit}
 
 
@@ -167,11 +151,11 @@ class Number(Node):
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
         if type(value) is float and self.low < value < self.high:
             return value
-        return number(field, value, **limits(self.bound, owner))
+        return errors.number(field, value, **limits(self.bound, owner))
 
     def _read(self, value: Any, path: str, old: Any) -> Any:
         if isinstance(value, str):
-            x = quantity(path, value, self.bound.unit)
+            x = errors.quantity(path, value, self.bound.unit)
             return value if x is None else x
         return super()._read(value, path, old)
 
@@ -184,7 +168,7 @@ class Whole(Number):
 
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
         low = limits(self.bound, owner)["low"]
-        return integer(field, value, low, self.high)
+        return errors.integer(field, value, low, self.high)
 
     def _read(self, value: Any, path: str, old: Any) -> Any:
         x = super()._read(value, path, old)
@@ -218,7 +202,7 @@ class Word(Node):
         return f"one of {', '.join(self.words)}"
 
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
-        return choice(field, value, self.words)
+        return errors.choice(field, value, self.words)
 
     def fits(self, value: Any, old: Any = UNSET) -> bool:
         return isinstance(value, str) and not is_quantity(value)
@@ -239,63 +223,66 @@ class Text(Node):
 
 @functools.lru_cache(maxsize=64)
 def place_names(n: int) -> tuple[str, ...]:
-    """Names of n numbers that have none."""
+    """Names of n values that have none."""
     return tuple(map(str, range(n)))
 
 
-class Numbers(Node):
-    """A tuple of numbers, as many as have names; or of any length, or of rows of any length."""
+class Row(Node):
+    """A tuple of numbers, as many as have names or any number; or of rows of them, or of parts."""
 
-    takes_numbers = True
-
-    def __init__(self, bound: Bound, any_length: bool, item: Node | None = None):
-        self.bound, self.any_length = bound, any_length
-        self.item = item or Number(bound)
-        self.rows = item is not None
-        self.arity = math.inf if any_length else len(bound.names)
+    def __init__(self, item: Node, any_length: bool):
+        self.item, self.members, self.any_length = item, (item,), any_length
+        self.bound, self.takes_numbers = item.bound, item.takes_numbers
+        self.arity = math.inf if any_length else len(self.bound.names)
 
     def wants(self) -> str:
-        if self.rows:
-            return "rows of numbers, all of one length"
         names = self.bound.names
-        return (
-            "a sequence of numbers"
-            if self.any_length
-            else f"{len(names)} numbers ({', '.join(names)})"
-        )
+        if isinstance(self.item, Row):
+            return "rows of numbers, all of one length"
+        if not self.takes_numbers:
+            return f"a sequence, each {self.item.wants()}"
+        named = f"{len(names)} numbers ({', '.join(names)})"
+        return "a sequence of numbers" if self.any_length else named
 
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
         bounds, names = limits(self.bound, owner), self.bound.names
-        if self.rows:
-            return table_of(field, value, **bounds)
+        if isinstance(self.item, Row):
+            return errors.table_of(field, value, **bounds)
         if self.any_length:
-            if not is_series(value) or not hasattr(value, "__len__"):
+            if not errors.is_series(value) or not hasattr(value, "__len__"):
                 raise ParameterError(field, value, f"must be {self.wants()}")
             names = place_names(len(value))
-        return numbers_of(field, value, names, **bounds)
+        if self.takes_numbers:
+            return errors.numbers_of(field, value, names, **bounds)
+        items = (self.item.check(f"{field}[{i}]", x, owner) for i, x in enumerate(value))
+        return _as_tuple(value, items)
 
     def fits(self, value: Any, old: Any = UNSET) -> bool:
-        return is_series(value)
+        return isinstance(old, tuple) if isinstance(value, Mapping) else errors.is_series(value)
 
     def _read(self, value: Any, path: str, old: Any) -> Any:
         if isinstance(value, Mapping):
             return self._with_entries(value, path, old)
         if isinstance(value, list | tuple):
-            return tuple(self.item.read(x, join_names(path, i)) for i, x in enumerate(value))
+            alike = isinstance(old, tuple) and len(old) == len(value)
+            before = old if alike else (UNSET,) * len(value)
+            rows = enumerate(zip(value, before, strict=True))
+            return tuple(self.item.read(x, join_names(path, i), part) for i, (x, part) in rows)
         if self.any_length and isinstance(value, str) and value.lower() in ("", "none"):
             return ()
-        x = Number(self.bound).read(value, path)
-        if self.rows or isinstance(x, bool) or not isinstance(x, int | float):
-            return x
-        return (x,) * (1 if self.any_length else len(self.bound.names))
+        one = self.item.read(value, path) if isinstance(self.item, Number) else None
+        if isinstance(one, bool) or not isinstance(one, int | float):
+            return value
+        return (one,) * (1 if self.any_length else len(self.bound.names))
 
     def _with_entries(self, given: Mapping[Any, Any], path: str, old: Any) -> Any:
-        """The old numbers with some changed, by name or place."""
+        """The old values with some changed, by name or place."""
         out = list(old) if isinstance(old, tuple | list) else []
         known = self._places(len(out))
         for name, x in given.items():
             inner = join_names(path, name)
-            if name not in known and not (self.any_length and name.isdecimal()):
+            beyond = self.takes_numbers and self.any_length and name.isdecimal()
+            if name not in known and not beyond:
                 raise no_field(inner, x, [join_names(path, n) for n in known])
             i = known.get(name, len(out))
             if i >= len(out):
@@ -305,16 +292,139 @@ class Numbers(Node):
         return tuple(out)
 
     def _places(self, n: int) -> dict[str, int]:
-        """Places of its numbers, of which there are n if it is of any length, by name."""
+        """Places of its values by name; of n, if it is of any length."""
         names = self.bound.names
-        if self.any_length:
-            return {str(i): i for i in range(n)}
         also = AXES if names == JOINTS else ()
-        return {x: i for row in (names, also, place_names(len(names))) for i, x in enumerate(row)}
+        rows = (place_names(n),) if self.any_length else (names, also, place_names(len(names)))
+        return {name: i for row in rows for i, name in enumerate(row)}
+
+    def write(self, value: Any, old: Any, path: str, units: dict[str, str]) -> Any:
+        if not isinstance(value, tuple | list):
+            return super().write(value, old, path, units)
+        old = UNSET if old is UNSET else None
+        return [self.item.write(x, old, join_names(path, i), units) for i, x in enumerate(value)]
 
     def below(self, name: str, *rest: str) -> Iterable[tuple[Node, Sequence[str]]]:
         found = name.isdecimal() if self.any_length else name in self._places(0)
         return [(self.item, rest)] * found
+
+    def leaves(self, path: str, default: Any, about: str) -> Iterator[Field]:
+        if not self.classes():
+            return super().leaves(path, default, about)
+        parts = enumerate(default if isinstance(default, tuple) else ())
+        return (x for i, p in parts for x in self.item.leaves(join_names(path, i), p, about))
+
+
+class Pair(Node):
+    """A pair (x, y) of parts; in plain data also one for both axes."""
+
+    def __init__(self, items: tuple[Node, Node], alone: bool):
+        self.members, self.alone = items, alone  # alone: in no union with one part for both axes
+
+    def wants(self) -> str:
+        return f"a pair (x, y) of {' or '.join(k.__name__ for k in self.classes().values())}"
+
+    def check(self, field: str, value: Any, owner: Any = None) -> Any:
+        if not isinstance(value, tuple | list) or len(value) != 2:
+            raise ParameterError(field, value, f"must be {self.wants()}")
+        pairs = zip(AXES, self.members, value, strict=True)
+        return _as_tuple(value, (n.check(f"{field}.{axis}", x, owner) for axis, n, x in pairs))
+
+    def fits(self, value: Any, old: Any = UNSET) -> bool:
+        if isinstance(value, Mapping):
+            return isinstance(old, tuple) or any(axis in value for axis in AXES)
+        return isinstance(value, tuple | list)
+
+    def _read(self, value: Any, path: str, old: Any) -> Any:
+        if isinstance(value, Mapping):
+            shared = {k: v for k, v in value.items() if k not in AXES}
+            given = [
+                laid_over(shared, value[axis]) if axis in value else shared or UNSET
+                for axis in AXES
+            ]
+            before = _each_axis(old)
+        elif isinstance(value, list | tuple):
+            if len(value) != 2:
+                raise ParameterError(path, value, f"must be {self.wants()}")
+            given, before = value, (UNSET, UNSET)
+        else:
+            return (value, value) if self.alone and dataclasses.is_dataclass(value) else value
+        out = []
+        for axis, node, x, part in zip(AXES, self.members, given, before, strict=True):
+            inner = join_names(path, axis)
+            if x is UNSET and part is UNSET:
+                raise ParameterError(path, value, f"lacks {inner}")
+            out.append(part if x is UNSET else node.read(x, inner, part))
+        return tuple(out)
+
+    def write(self, value: Any, old: Any, path: str, units: dict[str, str]) -> Any:
+        rows = zip(AXES, self.members, value, _each_axis(old), strict=True)
+        axes = {a: node.write(x, o, join_names(path, a), units) for a, node, x, o in rows}
+        return {a: x for a, x in axes.items() if x != {}} if isinstance(old, tuple) else axes
+
+    def below(self, name: str, *rest: str) -> Iterable[tuple[Node, Sequence[str]]]:
+        return [(self.members[0], rest if name in AXES else (name, *rest))]
+
+    def leaves(self, path: str, default: Any, about: str) -> Iterator[Field]:
+        for axis, node, part in zip(AXES, self.members, _each_axis(default), strict=True):
+            yield from node.leaves(join_names(path, axis), part, about)
+
+
+class Either(Node):
+    """A value of one of several types; the last one takes what fits none."""
+
+    def __init__(self, members: Sequence[Node], none: bool, bound: Bound):
+        self.members, self.none, self.bound = members, none, bound
+        self.words = tuple(word for node in members for word in node.words)
+        self.takes_numbers = any(node.takes_numbers for node in members)
+        self.arity = max(node.arity for node in members)
+
+    def wants(self) -> str:
+        also = self.none and not self.members[-1].none
+        return " or ".join([*(node.wants() for node in self.members[::-1]), *["None"] * also])
+
+    def member(self, value: Any, old: Any = UNSET) -> Node:
+        """The type that a value is meant to be of."""
+        return next((m for m in self.members if m.fits(value, old)), self.members[-1])
+
+    def check(self, field: str, value: Any, owner: Any = None) -> Any:
+        if value is None and self.none:
+            return None
+        member = self.member(value)
+        if isinstance(member, Word) and self.takes_numbers:
+            return errors.choice(field, value, self.words, self.wants())
+        return member.check(field, value, owner)
+
+    def _read(self, value: Any, path: str, old: Any) -> Any:
+        return self.member(value, old).read(value, path, old)
+
+    def write(self, value: Any, old: Any, path: str, units: dict[str, str]) -> Any:
+        return self.member(value).write(value, old, path, units)
+
+    def below(self, name: str, *rest: str) -> Iterable[tuple[Node, Sequence[str]]]:
+        return [found for node in self.members for found in node.below(name, *rest)]
+
+    def leaves(self, path: str, default: Any, about: str) -> Iterator[Field]:
+        parts = [node for node in self.members if node.classes()]
+        return (parts[-1] if parts else super()).leaves(path, default, about)
+
+
+def _as_tuple(value: Any, items: Iterable[Any]) -> tuple[Any, ...]:
+    """The items of a sequence as a tuple; the sequence itself if it is that tuple."""
+    made = tuple(items)
+    same = isinstance(value, tuple) and all(map(operator.is_, made, value))
+    return value if same else made
+
+
+def _each_axis(value: Any) -> tuple[Any, Any]:
+    return value if isinstance(value, tuple) else (value, value)
+
+
+def laid_over(below: Any, above: Any) -> Any:
+    """Overrides plain data by other plain data."""
+    if not isinstance(above, Mapping) or not isinstance(below, Mapping):
+        return above
+    return {**below, **{k: laid_over(below.get(k), v) for k, v in above.items()}}
 
 
 CLASS_WORDS: dict[Any, str] = {
@@ -349,10 +459,10 @@ def no_field(name: str, value: Any, known: Sequence[str]) -> ParameterError:
         return ParameterError(name, value, bound)
     depth = name.count(".")
     level = list(dict.fromkeys(".".join(k.split(".")[: depth + 1]) for k in known))
-    near = nearest(name, level)
+    near = errors.nearest(name, level)
     if not near:  # another part may have this field
         ends = {k.rpartition(".")[2]: k for k in reversed(known)}
-        near = [ends[n] for n in nearest(last, ends)]
+        near = [ends[n] for n in errors.nearest(last, ends)]
     bound = "no such field"
     if not near or len(level) <= MOST_LISTED:
         bound += f"; there are {', '.join(k.removeprefix(f'{path}.') for k in level)}"

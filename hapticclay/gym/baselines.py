@@ -22,7 +22,7 @@ from .registry import ENTRIES, NAMESPACE
 from .task import FORCE, Task
 
 MARGIN = 0.9  # theoretical gains are this share of the gain limit
-# Shares with the largest mean return, as `scores.search` found them; see docs/gym_scores.json.
+# Shares with the largest mean return, found by benchmarks/gym_scores.py: docs/gym_scores.json.
 FIXED_SHARE, ORACLE_SHARE = 1.08, 0.84
 PD, PD_IN_GROOVE = (1.0, 0.1), (0.5, 0.3)  # [N/mm], [N/(cm/s)]
 PROBED = 150  # control periods after which the hand is identified
@@ -72,8 +72,8 @@ def pd_along_line(task: Any, truths: list[Truth], seed: int) -> Policy:
 # ---- the gain --------------------------------------------------------------------------------
 
 
-def _towards(gains: np.ndarray) -> Policy:
-    """Moves the gain to a value and keeps it there."""
+def _set_gain(gains: np.ndarray) -> Policy:
+    """Moves the gains to values and keeps them there."""
 
     def act(x: np.ndarray) -> np.ndarray:
         octaves = (np.log10(gains) - x[:, -2]) / math.log10(2.0)
@@ -100,11 +100,7 @@ def robust_gain(b: float, share: float = MARGIN) -> float:
 
 
 class Oracle(NamedTuple):
-    """Policy: a share of the gain limit of the hand of the episode, which an agent does not see.
-
-    Attributes:
-        share: the share.
-    """
+    """Policy: a share of the gain limit of the hand of the episode, which an agent does not see."""
 
     share: float = MARGIN
 
@@ -112,21 +108,17 @@ class Oracle(NamedTuple):
         """The policy of these episodes."""
         hands = (Operator(t["mass"], t["damper"], t["spring"]) for t in truths)
         drawn = zip(truths, hands, strict=True)
-        return _towards(np.array([oracle_gain(t["b"], hand, self.share) for t, hand in drawn]))
+        return _set_gain(np.array([oracle_gain(t["b"], hand, self.share) for t, hand in drawn]))
 
 
 class Fixed(NamedTuple):
-    """Policy: a fixed gain, the same for all hands: a share of the limit of the worst one.
-
-    Attributes:
-        share: the share.
-    """
+    """Policy: a fixed gain, the same for all hands: a share of the limit of the worst one."""
 
     share: float = MARGIN
 
     def __call__(self, task: Task, truths: list[Truth], seed: int) -> Policy:
         """The policy of these episodes."""
-        return _towards(np.array([robust_gain(t["b"], self.share) for t in truths]))
+        return _set_gain(np.array([robust_gain(t["b"], self.share) for t in truths]))
 
 
 def passivity_observer(task: Task, truths: list[Truth], seed: int) -> Policy:
@@ -152,17 +144,17 @@ def identify_then_set(task: Task, truths: list[Truth], seed: int) -> Policy:
     equation is integrated once, so that no velocity is differentiated.
     """
     gains = np.array([robust_gain(t["b"]) for t in truths])
-    seen: list[np.ndarray] = []
+    samples: list[np.ndarray] = []
 
     def act(x: np.ndarray) -> np.ndarray:
         n = adaptive_gain.SAMPLES
-        seen.append(np.stack((0.01 * x[:, 0], x[:, n]), axis=1).astype(float))
-        if len(seen) == PROBED:
-            told = np.stack(seen)
+        samples.append(np.stack((0.01 * x[:, 0], x[:, n]), axis=1).astype(float))
+        if len(samples) == PROBED:
+            v, fh = np.stack(samples).T  # shape (copies, samples) each
             for i, t in enumerate(truths):
-                hand = hand_from(told[:, i, 0], told[:, i, 1], task.period)
+                hand = hand_from(v[i], fh[i], task.period)
                 gains[i] = max(gains[i], oracle_gain(t["b"], hand))
-        return _towards(gains)(x)
+        return _set_gain(gains)(x)
 
     return act
 
@@ -177,8 +169,8 @@ def hand_from(v: np.ndarray, fh: np.ndarray, dt: float) -> Operator:
     t = np.arange(len(v)) * dt
     waves = [g(2.0 * math.pi * f * t) for f in adaptive_gain.TONES for g in (np.sin, np.cos)]
     columns = np.stack((-v, -x, -integral(x), np.ones_like(t), *waves), axis=1)
-    on = slice(adaptive_gain.RAMP + 1, None)
-    found = np.linalg.lstsq(columns[on], integral(fh)[on], rcond=None)[0][:3]
+    after = slice(adaptive_gain.RAMP + 1, None)
+    found = np.linalg.lstsq(columns[after], integral(fh)[after], rcond=None)[0][:3]
     ends = (HAND[name] for name in ("mass", "damper", "spring"))
     mass, damper, spring = (
         min(max(value, r.low), r.high) for value, r in zip(found.tolist(), ends, strict=True)
@@ -197,30 +189,28 @@ def least_squares(task: Task, truths: list[Truth], seed: int) -> Policy:
 
     That force is the hand's force less the inertial and damping force of the device, (a + 10 v)/K.
     """
-    seen: list[np.ndarray] = []
+    samples: list[np.ndarray] = []
 
     def act(x: np.ndarray) -> np.ndarray:
-        seen.append(np.stack((0.01 * x[:, 2], x[:, 4]), axis=1).astype(float))
-        i = min(len(seen) - 1, task.limit - 1) * len(SPEEDS) // task.limit
+        samples.append(np.stack((0.01 * x[:, 2], x[:, 4]), axis=1).astype(float))
+        i = min(len(samples) - 1, task.limit - 1) * len(SPEEDS) // task.limit
         action = np.zeros((len(x), 4))
         action[:, 0] = np.clip(x[:, 6] + 0.2 * (SPEEDS[i] - x[:, 2]) / FORCE, -1.0, 1.0)
-        if len(seen) == task.limit:
-            told = np.stack(seen)
-            for k in range(len(x)):
-                action[k, 2:] = probe_clay.answer_of(*_clay_from(told[:, k], task.period))
+        if len(samples) == task.limit:
+            for k, (v, f) in enumerate(zip(*np.stack(samples).T, strict=True)):
+                action[k, 2:] = probe_clay.answer_of(*_clay_from(v, f, task.period))
         return action
 
     return act
 
 
-def _clay_from(told: np.ndarray, dt: float) -> tuple[float, float]:
-    """b [N.s/m] and Fy [N] of velocities and forces, shape (n, 2)."""
-    v, f = told.T
+def _clay_from(v: np.ndarray, f: np.ndarray, dt: float) -> tuple[float, float]:
+    """Identifies b [N.s/m] and Fy [N] from velocities and forces."""
     a = np.gradient(v, dt)
-    calm = (np.abs(a) < 0.2) & (np.abs(v) > 1e-3)
-    if calm.sum() < 3:
+    steady = (np.abs(a) < 0.2) & (np.abs(v) > 1e-3)
+    if steady.sum() < 3:
         return probe_clay.MIDDLE
-    v, f, a = v[calm], f[calm], a[calm]
+    v, f, a = v[steady], f[steady], a[steady]
     clay = np.sign(v) * (f - (a + C_POLE * v) / GAIN[0])
     columns = np.stack((np.abs(v), np.ones_like(v)), axis=1)
     b, Fy = np.linalg.lstsq(columns, clay, rcond=None)[0].tolist()

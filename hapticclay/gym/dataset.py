@@ -38,12 +38,12 @@ SEEDS = 2**63 - 1  # the largest seed that Minari's files hold
 NAME = re.compile(r"(?:(?=..+/)(?:[-\w]+/)+)?[-\w]*\w-v\d+")  # of those Minari takes, with version
 FOLDER = "MINARI_DATASETS_PATH"  # Minari's variable for the folder of data sets
 SCHEMA = "hapticclay-recording-1"
-COLUMNS: dict[str, Any] = {  # of an episode, and the types of their numbers
-    "observations": np.float32,
-    "actions": np.float32,
-    "rewards": float,
-    "terminations": bool,
-    "truncations": bool,
+COLUMNS: dict[str, tuple[Any, str]] = {  # of an episode: type and description
+    "observations": (np.float32, "observations, one after another"),
+    "actions": (np.float32, "actions, one after another"),
+    "rewards": (float, "reward of each control period"),
+    "terminations": (bool, "whether the episode ended, after each control period"),
+    "truncations": (bool, "whether it was cut off, likewise"),
 }
 WRITTEN = 50  # episodes that Minari's writer is given at once
 
@@ -65,14 +65,11 @@ class Recording(store.Plan):
     seed: int
     episodes: int
     engine: str
-    chunk: ClassVar[int | None] = 1
+    chunk: int | None = 1
+
     notes: ClassVar[Notes] = {
         "run": ("", "number of the episode"),
-        "observations": ("", "observations, one after another"),
-        "actions": ("", "actions, one after another"),
-        "rewards": ("", "reward of each control period"),
-        "terminations": ("", "whether the episode ended, after each control period"),
-        "truncations": ("", "whether it was cut off, likewise"),
+        **{name: ("", description) for name, (_, description) in COLUMNS.items()},
     }
     noun: ClassVar[str] = "recording"
     remedy: ClassVar[str] = "take another name, or remove that folder"
@@ -86,7 +83,7 @@ class Recording(store.Plan):
 
     def blank_row(self) -> dict[str, Any]:
         """An episode, for the types of its columns."""
-        return {"run": 0, **{name: np.zeros(1, kind) for name, kind in COLUMNS.items()}}
+        return {"run": 0, **{name: np.zeros(1, kind) for name, (kind, _) in COLUMNS.items()}}
 
     def rows(self, runs: range, late: Callable[[], bool]) -> list[dict[str, Any]]:
         """Records episodes, with their observations and actions one after another."""
@@ -186,7 +183,7 @@ def _buffers(plan: Recording, kept: Path, which: range) -> list[Any]:
         if table is None:
             raise OSError(f"episode {i} in {kept} was damaged while the data set was written")
         [row] = table.to_pylist()
-        columns = {name: np.array(row[name], kind) for name, kind in COLUMNS.items()}
+        columns = {name: np.array(row[name], kind) for name, (kind, _) in COLUMNS.items()}
         n = len(columns["rewards"])
         columns["observations"] = columns["observations"].reshape(n + 1, -1)
         columns["actions"] = columns["actions"].reshape(n, -1)
@@ -222,8 +219,8 @@ def _written(plan: Recording, kept: Path, name: str, n: int) -> Any:
         )
         for i in range(WRITTEN, n, WRITTEN):
             made.update_dataset_from_buffer(_buffers(plan, kept, range(i, min(i + WRITTEN, n))))
-        sums = made.storage.apply(minari.EpisodeMetadataCallback())
-        made.storage.update_episode_metadata(sums)
+        metadata = made.storage.apply(minari.EpisodeMetadataCallback())
+        made.storage.update_episode_metadata(metadata)
         _move(Path(beside), folder, name)
     shutil.rmtree(kept)
     return minari.load_dataset(name)

@@ -83,13 +83,3 @@ def _sample(r: Range, u: float) -> float:
     if r.log and r.low > 0.0:
         return min(max(r.low * math.exp(u * math.log(r.high / r.low)), r.low), r.high)
     return r.low + u * (r.high - r.low)
-
-
-def table_of(ranges: Mapping[str, Range]) -> str:
-    """Markdown table of the numbers drawn."""
-    rows = ["| option | what | drawn from | law | allowed | unit |", "|---|---|---|---|---|---|"]
-    for name, r in ranges.items():
-        law = "log-uniform" if r.log else "uniform"
-        ends = f"{r.low:g} to {r.high:g} | {law} | {r.least:g} to {r.most:g}"
-        rows.append(f"| `{name}` | {r.what} | {ends} | {r.unit or '-'} |")
-    return "\n".join(rows)

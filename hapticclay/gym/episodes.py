@@ -121,7 +121,7 @@ class Episodes:
 
     def __init__(self, task: Task, kind: type[One | Many], engine: str):
         self.task, self.kind, self.engine = task, kind, engine
-        self.truth: Truth | Memory = {}
+        self.truth: Memory = {}
         self.memory: Memory = {}
         self.handle: Handle
         self._ends = [(q.low, q.high) for q in task.observations]

@@ -10,16 +10,12 @@ from gymnasium.spaces import Box
 
 
 class Quantity(NamedTuple):
-    """One number of an action or an observation.
-
-    Attributes:
-        unit: its unit; "" for none.
-    """
+    """One number of an action or an observation, and its bounds."""
 
     name: str
     low: float
     high: float
-    unit: str = ""
+    unit: str = ""  # "" for none
 
 
 def symmetric(name: str, most: float, unit: str = "") -> Quantity:
@@ -32,11 +28,3 @@ def box_of(quantities: Sequence[Quantity]) -> Box:
     low = np.array([q.low for q in quantities], np.float32)
     high = np.array([q.high for q in quantities], np.float32)
     return Box(low, high, dtype=np.float32)
-
-
-def table_of(quantities: Sequence[Quantity]) -> str:
-    """Markdown table of quantities: number, name, bounds, unit."""
-    rows = ["| num | name | min | max | unit |", "|---|---|---|---|---|"]
-    for i, q in enumerate(quantities):
-        rows.append(f"| {i} | {q.name} | {q.low:g} | {q.high:g} | {q.unit or '-'} |")
-    return "\n".join(rows)

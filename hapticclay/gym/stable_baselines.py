@@ -72,7 +72,7 @@ class StableBaselinesVecEnv(VecEnv):
         """Advances by one control period."""
         observations, rewards, ended, cut_off, infos = self.env.step(self._actions)
         over = ended | cut_off
-        told = []
+        copies = []
         for i in range(self.num_envs):
             if over[i]:
                 info = _of_copy(infos["final_info"], i)
@@ -81,8 +81,8 @@ class StableBaselinesVecEnv(VecEnv):
             else:
                 info = _of_copy(infos, i)
             info["TimeLimit.truncated"] = bool(cut_off[i] and not ended[i])
-            told.append(info)
-        return observations, rewards.astype(np.float32), over, told
+            copies.append(info)
+        return observations, rewards.astype(np.float32), over, copies
 
     def close(self) -> None:
         """Ends the runs."""

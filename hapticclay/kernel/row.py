@@ -292,6 +292,9 @@ class NativeRow(Row):
         bytes_of(self.states)[:] = bytes_of(state)
 
 
+ROWS: dict[str, type[Row]] = {"python": Row, "native": NativeRow}
+
+
 def one(record: Any) -> np.ndarray:
     """An array of one record."""
     return np.zeros(1, layout.dtype_of(record))

@@ -15,19 +15,15 @@ RECENT = 1.0  # [s] over which the real-time factor is averaged
 class Clock:
     """Schedules simulated time in real time, and slows down on a machine that is too slow.
 
-    Attributes:
-        frames: number of slices scheduled.
-        late: histogram of their lateness, with edges LATE_EDGES.
-        slow: whether the machine is currently too slow.
-        real: elapsed real time [s].
-        simulated: scheduled simulated time [s].
+    `late` is a histogram of the lateness of the `frames` slices, with edges LATE_EDGES; `slow` says
+    whether the machine is too slow now.
     """
 
     def __init__(self, span: float = FRAME_TIME):
         """Begins with the first slice."""
         self._span = span
         self.frames, self.late, self.slow = 0, np.zeros(len(LATE_EDGES) - 1, dtype=int), False
-        self.real = self.simulated = 0.0  # [s] in all
+        self.real = self.simulated = 0.0  # elapsed and scheduled [s]
         self._recent: deque[tuple[float, float]] = deque(maxlen=round(RECENT / span))
         self._then: float | None = None
         self._owed = 0.0

@@ -20,26 +20,23 @@ from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from ..studies.removal import TOOL, Tool
 from .clock import FRAME_TIME
+from .frame import Partner
 from .run import played
 from .session import Session, refuse_other
 from .verdict import LiveVerdict
 
 SERVED_SPAN = 0.002  # [s] between two slices of an arm that programs drive
-WATCHED = 1.0  # [s] over which their rate is averaged
+RATE_SPAN = 1.0  # [s] over which their rate is averaged
 
 
 class ServedSession(Session):
     """A session with a simulated device: programs drive the motors, a person is the hand.
 
     The clay of the scenario acts in addition to their forces; compensator and servo are off.
-
-    Attributes:
-        arm: the motors.
-        service: service for the programs; None before it exists.
     """
 
     frame_time = FRAME_TIME
-    service: Service | None = None
+    service: Service | None = None  # for the programs; None before it exists
 
     def __init__(
         self,
@@ -51,8 +48,8 @@ class ServedSession(Session):
     ):
         """Begins at the start of a scenario."""
         self._largest_force = largest_force
-        self._seen: deque[tuple[float, int]] = deque()
-        self.partner = _Pace()
+        self._counts: deque[tuple[float, int]] = deque()
+        self.partner = Partner(SERVED_SPAN)
         super().__init__(scenario, stiffness, tool, every)
 
     def prepared(self, scenario: Scenario) -> Scenario:
@@ -76,30 +73,15 @@ class ServedSession(Session):
         """Recent rate of messages [Hz]."""
         assert self.service is not None
         now, count = time.monotonic(), sum(log.count for log in self.service.logs)
-        self._seen.append((now, count))
-        while len(self._seen) > 2 and self._seen[1][0] < now - WATCHED:
-            self._seen.popleft()
-        before, fewer = self._seen[0]
+        self._counts.append((now, count))
+        while len(self._counts) > 2 and self._counts[1][0] < now - RATE_SPAN:
+            self._counts.popleft()
+        before, fewer = self._counts[0]
         return (count - fewer) / (now - before) if now > before else 0.0
 
     def record(self) -> Record:
         """Ends the run and returns its record, without the control law of the programs."""
         return replace(super().record(), scenario=self.undriven)
-
-
-class _Pace:
-    """Slices short enough for a program's loop."""
-
-    span = SERVED_SPAN
-
-    def exchange(self) -> None:
-        pass
-
-    def lead(self, play: Session) -> None:
-        pass
-
-    def follow(self, play: Session) -> None:
-        pass
 
 
 class LiveDevice:
@@ -150,11 +132,7 @@ class LiveDevice:
 
 
 class DeviceSession(Session):
-    """A session whose hand is a device, real or simulated.
-
-    Attributes:
-        hand: the device.
-    """
+    """A session whose hand is a device, real or simulated."""
 
     frame_time = FRAME_TIME
 
@@ -173,7 +151,7 @@ class DeviceSession(Session):
         return replace(record, notes={**record.notes, "device": self.hand.notes()})
 
 
-class DevicePartner:
+class DevicePartner(Partner):
     """Exchanges force and position with a device, one slice per sample.
 
     While the session is paused, the device receives no force.
@@ -181,7 +159,8 @@ class DevicePartner:
 
     def __init__(self, hand: DeviceHand):
         """Connects a device to a session."""
-        self.hand, self.span = hand, hand.client.limits.Ts
+        super().__init__(hand.client.limits.Ts)
+        self.hand = hand
         self._handle: Any = None  # position and velocity of the simulated handle; None at rest
 
     def exchange(self) -> None:
@@ -192,13 +171,13 @@ class DevicePartner:
         else:
             self.hand.exchange(*handle)
 
-    def lead(self, play: Session) -> None:
+    def before_slice(self, play: Session) -> None:
         """Pulls the handle to the device's position; releases it while that is unknown."""
         hand, held = self.hand, self.hand.held
         play.pull(hand.place if held else None)
         B = hand.coupling.B
         play.run.pull.carried = (B * hand.rate[0], B * hand.rate[1]) if held else (0.0, 0.0)
 
-    def follow(self, play: Session) -> None:
+    def after_slice(self, play: Session) -> None:
         """Stores the new position of the handle."""
         self._handle = play.handle()

@@ -1,8 +1,10 @@
-"""The state of a session in a frame, and its listeners."""
+"""The state of a session in a frame, who listens to it, and what sets its pace."""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple, Protocol
+
+from .clock import FRAME_TIME
 
 
 class Listener(Protocol):
@@ -12,40 +14,29 @@ class Listener(Protocol):
         """Receives a slice."""
 
 
-class Partner(Protocol):
-    """A device coupled to a session, whose slices follow its samples.
+class Partner:
+    """Sets the pace of slices; a device coupled to a session exchanges its samples here."""
 
-    Attributes:
-        span: real time between two slices [s].
-    """
-
-    span: float
+    def __init__(self, span: float = FRAME_TIME):
+        """Takes the real time between two slices [s]."""
+        self.span = span
 
     def exchange(self) -> None:
         """Talks to the device, may wait for it; other threads may use the session meanwhile."""
 
-    def lead(self, play: Any) -> None:
-        """Passes the state of the device to the session before a slice."""
+    def before_slice(self, play: Any) -> None:
+        """Passes the state of the device to the session."""
 
-    def follow(self, play: Any) -> None:
-        """Stores the state for the device after a slice."""
+    def after_slice(self, play: Any) -> None:
+        """Stores the state of the session for the device."""
 
 
 class Frame(NamedTuple):
-    """State at the end of a slice, for live plots.
+    """State at the end of a slice, for live plots: x and y of each quantity."""
 
-    Attributes:
-        t: time [s].
-        p: position of the handle [m], (2,).
-        v: velocity of the handle [m/s], (2,).
-        fe: force of the clay [N], (2,).
-        fh: force of the hand [N], (2,).
-        held: whether yielding clay holds the handle, along x and along y.
-    """
-
-    t: float
-    p: tuple[float, float]
-    v: tuple[float, float]
-    fe: tuple[float, float]
-    fh: tuple[float, float]
-    held: tuple[bool, bool] = (False, False)
+    t: float  # [s]
+    p: tuple[float, float]  # position of the handle [m]
+    v: tuple[float, float]  # velocity of the handle [m/s]
+    fe: tuple[float, float]  # force of the clay [N]
+    fh: tuple[float, float]  # force of the hand [N]
+    held: tuple[bool, bool] = (False, False)  # whether yielding clay holds the handle

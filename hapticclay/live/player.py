@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import time
 
-from .clock import FRAME_TIME
 from .frame import Partner
 from .replay import Replay
 from .session import Session
@@ -14,10 +13,8 @@ from .session import Session
 class Player(threading.Thread):
     """A thread that advances a session or a replay in real time.
 
-    Attributes:
-        play: what is played.
-        lock: lock for other threads that read or change the session.
-        error: error that ended the thread; None for none.
+    Other threads hold `lock` while they read or change the session; `error` is what ended the
+    thread, or None.
     """
 
     def __init__(self, play: Session | Replay):
@@ -34,27 +31,23 @@ class Player(threading.Thread):
         try:
             while not self._stop_now.is_set():
                 partner = self.play.partner
-                if partner is not None:
-                    partner.exchange()
+                partner.exchange()
                 with self.lock:
                     self._slice(partner)
-                span = FRAME_TIME if partner is None else partner.span
-                at = max(at + span, time.perf_counter())
+                at = max(at + partner.span, time.perf_counter())
                 self._stop_now.wait(max(at - time.perf_counter(), 0.0005))
         except Exception as error:  # raised again by stop()
             self.error = error
 
-    def _slice(self, partner: Partner | None) -> None:
+    def _slice(self, partner: Partner) -> None:
         """Advances to the time that is due."""
         play = self.play
         if play.paused or play.ended:
             play.clock.rest()
             return
-        if partner is not None:
-            partner.lead(play)
+        partner.before_slice(play)
         play.advance(play.clock.due(time.perf_counter()))
-        if partner is not None:
-            partner.follow(play)
+        partner.after_slice(play)
         if play.stream is not None:
             play.stream.send(play)
 

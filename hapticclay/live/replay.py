@@ -9,27 +9,15 @@ from ..studies.removal import TOOL, Tool
 from ..theory.pose_limits import PoseLimits
 from .clock import Clock
 from .frame import Frame, Listener, Partner
-from .verdict import LiveVerdict, is_viscous, live_gain_limits, live_verdict
+from .verdict import LiveVerdict, live_gain_limits, live_verdict
 
 
 class Replay:
-    """A record played like a session.
-
-    Attributes:
-        source: the record.
-        scenario: of the record.
-        tool: at the handle, as in the session that was recorded.
-        paused: whether it is paused.
-        clock: of real time.
-        t: current time [s].
-        n: current sample.
-        frames: states shown so far.
-        stream: as of a session.
-        partner: as of a session: None.
-    """
+    """A record played like a session, with the tool that its session had; `n` is the sample."""
 
     stream: Listener | None = None
-    partner: Partner | None = None
+    partner = Partner()
+    point = None  # no hand pulls
 
     def __init__(self, record: Record, tool: Tool = TOOL):
         """Begins at the first sample."""
@@ -45,6 +33,11 @@ class Replay:
         self._limits = PoseLimits(self.scenario)
 
     @property
+    def angles(self) -> list[float]:
+        """Angles of the arm [rad]."""
+        return self.source.q[self.n].tolist()
+
+    @property
     def ended(self) -> str:
         """The status of the record once its end is reached; empty before."""
         return self.source.status if self.n >= len(self.source.t) - 1 else ""
@@ -55,9 +48,7 @@ class Replay:
             return np.empty((0, 2))
         self.t += seconds
         before = self.n
-        self.n = (
-            int(np.searchsorted(self.source.t, self.t, "right").clip(1, len(self.source.t))) - 1
-        )
+        self.n = max(int(np.searchsorted(self.source.t, self.t, "right")), 1) - 1
         self.frames.append(self._frame(self.n))
         return self.source.p[before : self.n + 1]
 
@@ -79,10 +70,9 @@ class Replay:
 
     def verdict(self) -> LiveVerdict:
         """As for a session; the outcome of the record replaces the monitor's finding."""
-        r, n, s = self.source, self.n, self.scenario
-        found = r.outcome.code in ("diverged", "limit cycle") and r.t[n] >= r.outcome.time
-        known = s.control == "continuous" and is_viscous(s, self.frames[-1].p)
-        limit = live_gain_limits(self._limits, self.frames[-1].p, self.b) if known else None
+        r = self.source
+        found = r.outcome.code in ("diverged", "limit cycle") and r.t[self.n] >= r.outcome.time
+        limit = live_gain_limits(self._limits, self.frames[-1].p, self.b)
         return live_verdict(self.gain, limit, r.outcome if found else None, True)
 
     def _frame(self, n: int) -> Frame:

@@ -25,13 +25,8 @@ class Pull:
     """The muscle force of a hand that pulls to a point with the spring of its impedance.
 
     The force is k times the position of the point. The loop applies the impedance of the hand to p,
-    so the sum is fh = -Th applied to p - point.
-
-    Attributes:
-        spring: k of x and y [N/m], (2,).
-        force: additional steady force [N], (2,).
-        carried: force of the damper of a moving hand on the handle [N], (2,).
-        knots: (t [s], x, y [m]) of the point's path so far.
+    so the sum is fh = -Th applied to p - point. `force` is added [N], and `carried`, the force of
+    the damper of a moving hand [N]; `knots` is the point's path so far, (t [s], x, y [m]).
     """
 
     def __init__(self, spring: tuple[float, float], p: tuple[float, float]):
@@ -41,7 +36,7 @@ class Pull:
         self.knots = [(0.0, *p)]
         self._from, self._rate, self._since = np.array(p), np.zeros(2), 0.0
 
-    def lead(self, t: float, to: tuple[float, float], span: float) -> None:
+    def glide(self, t: float, to: tuple[float, float], span: float) -> None:
         """Moves the point to a place at constant speed."""
         now = self.at(t)
         self._from, self._rate, self._since = now, (np.array(to) - now) / span, t
@@ -68,16 +63,9 @@ class Pull:
 
 
 class LiveRun(Run):
-    """A run in slices, whose muscle force, gain and clay may change between slices.
+    """A run in slices, whose muscle force `pull`, gain and clay may change between slices.
 
-    Args:
-        scenario: scenario to run.
-        every: keep each every-th sample.
-
-    Attributes:
-        pull: the muscle.
-        keeping: whether samples are kept.
-        gains: (index of the first sample with it, gain), one after the other.
+    Samples are kept while `keeping`; `gains` is (index of the first sample with it, gain) in turn.
     """
 
     def __init__(self, scenario: Scenario, every: int):

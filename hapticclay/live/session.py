@@ -10,52 +10,51 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 
-from ..errors import ParameterError, integer, number
+from ..arguments import checked
+from ..errors import Bound, ParameterError
 from ..model.operator import NO_HAND
 from ..scene.scenario import Scenario
 from ..simulation import monitor
 from ..simulation.record import Record
+from ..simulation.run import COLUMNS
 from ..studies.removal import TOOL, Tool, removed
 from ..theory.pose_limits import PoseLimits
-from .clock import FRAME_TIME, LATE_EDGES, Clock
+from .clock import LATE_EDGES, Clock
 from .frame import Frame, Listener, Partner
 from .run import PULL_MARGIN, LiveRun, played
-from .verdict import CALM_TIME, LiveVerdict, is_viscous, live_gain_limits, live_verdict
+from .verdict import CALM_TIME, LiveVerdict, live_gain_limits, live_verdict
 
 
 class Session:
     """A person, the arm and the clay.
 
-    Attributes:
-        tool: at the handle.
-        stiffness: stiffness of the hand's spring, as a multiple of Th's.
-        every: samples per sample kept.
-        given: scenario as it was given.
-        scenario: running scenario, with the present gain and damping.
-        run: the run that steps it.
-        paused: whether simulated time is paused.
-        recording: whether samples are kept.
-        clock: clock of real time.
-        point: target point of the hand [m]; None if it does not pull.
-        frames: end of each slice so far.
-        stream: listener that receives each slice; None for none.
-        partner: device whose samples the slices follow; None for none.
-        frame_time: least simulated time between two frames [s].
+    `given` is the scenario as given, `scenario` the running one with the present gain and damping,
+    `run` steps it. `point` is where the hand pulls to [m], None if it does not pull. `frames` holds
+    the state at the end of each slice, `frame_time` apart at least.
     """
 
     stream: Listener | None = None
-    partner: Partner | None = None
+    partner = Partner()
     frame_time = 0.0
 
+    @checked
     def __init__(
-        self, scenario: Scenario, stiffness: float = 1.0, tool: Tool = TOOL, every: int = 1
+        self,
+        scenario: Scenario,
+        stiffness: float = 1.0,
+        tool: Tool = TOOL,
+        every: Annotated[int, Bound(1, 1_000_000)] = 1,
     ):
-        """Begins at the start of a scenario; its force, length and t_max are ignored."""
+        """Begins at the start of a scenario; its force, length and t_max are ignored.
+
+        The hand's spring is stiffness times that of Th; every every-th sample is kept.
+        """
         self.tool, self.stiffness = tool, stiffness
-        self.every = integer("every", every, 1, 1_000_000)
+        self.every = every
         self.start(scenario)
 
     def start(self, scenario: Scenario) -> None:
@@ -64,14 +63,14 @@ class Session:
         self.given = scenario
         self.run = LiveRun(self.scenario, self.every)
         self.paused, self.recording = False, True
-        self.clock = Clock(FRAME_TIME if self.partner is None else self.partner.span)
+        self.clock = Clock(self.partner.span)
         self.point: tuple[float, float] | None = None
-        self._damping = 1.0
+        self.damping = 1.0  # factor on damping, yield force and consistency of all clay
         self.frames: list[Frame] = []
         self._limits = PoseLimits(self.scenario)
         self._carry = 0.0
         self._swung = -math.inf  # time of the last growing oscillation [s]
-        self._look()
+        self._observe()
 
     def prepared(self, scenario: Scenario) -> Scenario:
         """The scenario as it is run."""
@@ -80,7 +79,7 @@ class Session:
 
     def restart(self) -> None:
         """Restarts the same scenario with the present gain, damping and recording switch."""
-        gain, b, recording = self.scenario.gain, self._damping, self.recording
+        gain, b, recording = self.scenario.gain, self.damping, self.recording
         self.start(self.given)
         self.change(gain=gain, b=b)
         self.recording = recording
@@ -89,6 +88,11 @@ class Session:
     def t(self) -> float:
         """Simulated time [s]."""
         return self.run.t
+
+    @property
+    def angles(self) -> list[float]:
+        """Angles of the arm [rad]."""
+        return list(self.run.q)
 
     @property
     def ended(self) -> str:
@@ -115,34 +119,34 @@ class Session:
         s, onset = self.scenario, self.run.watch.onset
         if self._limits.scenario is not s:
             self._limits = PoseLimits(s)
-        p = self.frames[-1].p
-        limit = live_gain_limits(self._limits, p, self.b) if is_viscous(s, p) else None
+        limit = live_gain_limits(self._limits, self.frames[-1].p, self.b)
         return live_verdict(self.gain, limit, onset, self.t - self._swung < CALM_TIME)
 
     def pull(self, point: tuple[float, float] | None) -> None:
         """Makes the hand pull to a point, within reach of the arm."""
         self.point = None if point is None else self._within_reach(point)
 
-    def push(self, force: tuple[float, float]) -> None:
+    @checked
+    def push(self, force: Annotated[tuple[float, float], Bound(-1e3, 1e3, "N")]) -> None:
         """Makes the hand press with a constant force, in addition to any pull."""
-        self.run.pull.force = tuple(number("force", f, -1e3, 1e3, unit="N") for f in force)
+        self.run.pull.force = force
 
-    def change(self, gain: tuple[float, float] | None = None, b: float | None = None) -> None:
+    @checked
+    def change(
+        self,
+        gain: tuple[float, float] | None = None,
+        b: Annotated[float | None, Bound(0.0, 1e6)] = None,
+    ) -> None:
         """Changes the gain or the damping."""
         scenario = self.scenario
         if gain is not None:
             scenario = replace(scenario, gain=gain)
         if b is not None:
-            self._damping = number("b", b, 0.0, 1e6)
+            self.damping = b
             clay = self.given.clay
-            scenario = replace(scenario, clay=clay and clay.scaled(self._damping))
+            scenario = replace(scenario, clay=clay and clay.scaled(self.damping))
         self.scenario = scenario
         self.run.change(scenario)
-
-    @property
-    def damping(self) -> float:
-        """Factor on the given damping, yield force and consistency of all clay."""
-        return self._damping
 
     def advance(self, seconds: float) -> np.ndarray:
         """Advances by a slice of simulated time, unless paused."""
@@ -156,11 +160,11 @@ class Session:
         if self.point is None:
             run.pull.jump(run.t, *self.handle())
         else:
-            run.pull.lead(run.t, self.point, steps * dt)
+            run.pull.glide(run.t, self.point, steps * dt)
         run.keeping = self.recording
         before = run.position()
         run.slice(steps)
-        self._look()
+        self._observe()
         return np.array([before, run.position()])
 
     def record(self) -> Record:
@@ -172,16 +176,14 @@ class Session:
             raise ParameterError("record", self.scenario.name, "nothing was recorded")
         out = Record.of(run, max(self.clock.real, 1e-9))
         volume, rate = self._removed(out)
-        knots = np.array(run.pull.knots)
-        index = np.rint(out.t / self.scenario.dt)
-        which = np.searchsorted([i for i, _ in run.gains], index, "right") - 1
+        t, *point = np.array(run.pull.knots).T
+        first, gains = zip(*run.gains, strict=True)
+        which = np.searchsorted(first, np.rint(out.t / self.scenario.dt), "right") - 1
         extra = {
             "removed": volume,
             "removal_rate": rate,
-            "target": np.column_stack(
-                [np.interp(out.t, knots[:, 0], knots[:, 1 + i]) for i in (0, 1)]
-            ),
-            "gain": np.array([gain for _, gain in run.gains])[which],
+            "target": np.column_stack([np.interp(out.t, t, x) for x in point]),
+            "gain": np.array(gains)[which],
         }
         clock = self.clock
         notes = {
@@ -217,7 +219,7 @@ class Session:
         vx, vy = ((a - b) / self.scenario.dt for a, b in zip(p, behind, strict=True))
         return p, (vx, vy)
 
-    def _look(self) -> None:
+    def _observe(self) -> None:
         watch = self.run.watch
         if watch.onset and max(map(len, watch.swings)) >= monitor.SWINGS:
             self._swung = self.t
@@ -229,8 +231,8 @@ class Session:
         spring, damper = np.array([(th.spring, th.damper) for th in hands]).T
         hand = self.run.pull.mean(self.t, 0.0) - spring * np.array(p) - damper * np.array(v)
         fe = b[0] * v[0], b[1] * v[1]
-        if self.run.last_rendered:  # of yielding clay, at the last sample
-            fe = tuple(self.run.last_rendered)
+        if self.run.records_force and self.run.last is not None:  # at the last sample
+            fe = tuple(self.run.last[COLUMNS["fe"] :].tolist())
         self.frames.append(Frame(self.t, p, v, fe, tuple(hand.tolist()), self.run.held))
 
     def _within_reach(self, point: tuple[float, float]) -> tuple[float, float]:

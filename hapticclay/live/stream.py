@@ -42,8 +42,8 @@ class UdpStream:
         try:  # once, because a name server may be slow
             found = socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_DGRAM)
         except (OSError, UnicodeError) as error:
-            told = getattr(error, "strerror", None) or error
-            raise ParameterError("stream", address, f"must name a host ({told})") from None
+            reason = getattr(error, "strerror", None) or error
+            raise ParameterError("stream", address, f"must name a host ({reason})") from None
         family, kind, protocol, _, self._to = found[0]
         self._socket = socket.socket(family, kind, protocol)
         self._socket.setblocking(False)
@@ -63,8 +63,8 @@ class UdpStream:
             values[name] = _by_axis(getattr(frame, name))
         values |= {"b": _by_axis(play.b), "gain": _by_axis(play.gain)}
         values["held"] = dict(zip(AXES, map(int, frame.held), strict=True))
-        if (target := getattr(play, "point", None)) is not None:
-            values["target"] = _by_axis(target)
+        if play.point is not None:
+            values["target"] = _by_axis(play.point)
         with contextlib.suppress(OSError):  # a full buffer, a network that is down
             self._socket.sendto(json.dumps(values).encode(), self._to)
 

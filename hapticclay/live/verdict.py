@@ -3,35 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from ..model.constants import AXES
-from ..scene.scenario import Scenario
 from ..simulation.monitor import Outcome
 from ..theory.pose_limits import PoseLimits
 
 CALM_TIME = 1.0  # [s] without growing oscillation after which an unstable arm counts as calm
 
 
-def is_viscous(scenario: Scenario, p: tuple[float, float]) -> bool:
-    """Whether the clay at a place is viscous; otherwise the linear gain limit does not apply."""
-    return scenario.clay is None or scenario.clay.viscous_at(p)
-
-
-def clay_here(scenario: Scenario, p: tuple[float, float], b: tuple[float, float]) -> str:
-    """Text of the clay's resistance at a place, for the window."""
-    told = scenario.clay.here(p, b) if scenario.clay else ()
-    return f"{', '.join(x.text() for x in told) or 'none'} here"
-
-
-@dataclass(frozen=True)
-class LiveVerdict:
-    """The current verdict on the loop.
-
-    Attributes:
-        text: one line.
-        unstable: whether the arm oscillates with growing amplitude.
-    """
+class LiveVerdict(NamedTuple):
+    """The current verdict on the loop, in one line, and whether its oscillation grows."""
 
     text: str
     unstable: bool
@@ -60,11 +42,11 @@ def live_verdict(
     if above:
         text += f"; here {', '.join(above)}"
     elif limit:
-        text += _limits_told(limit, text == "stable")
+        text += _limit_words(limit, text == "stable")
     return LiveVerdict(text, bool(onset and swings))
 
 
-def _limits_told(limit: tuple[float, float], stable: bool) -> str:
+def _limit_words(limit: tuple[float, float], stable: bool) -> str:
     """The limits of K that there are, for the end of a verdict."""
     known = {axis: most for axis, most in zip(AXES, limit, strict=True) if most < math.inf}
     if not known:  # beside an oscillation it would be no comfort
@@ -75,9 +57,12 @@ def _limits_told(limit: tuple[float, float], stable: bool) -> str:
 
 def live_gain_limits(
     limits: PoseLimits, p: tuple[float, float], b: tuple[float, float]
-) -> tuple[float, float]:
-    """Returns the gain limit of the linear loop on each axis [1/kg], inf for none.
+) -> tuple[float, float] | None:
+    """Gain limit of the linear loop on each axis with the handle where it is [1/kg], inf for none.
 
-    It applies to continuous time with the handle where it is.
+    None where it does not apply: under sampled control, and in clay that is not viscous.
     """
+    s = limits.scenario
+    if s.control != "continuous" or not (s.clay is None or s.clay.viscous_at(p)):
+        return None
     return limits.at(0, p, b), limits.at(1, p, b)

@@ -36,7 +36,7 @@ class Groove:
 
     Attributes:
         x: where the block begins and ends along x [m], ascending.
-        y: the same along y.
+        y: the same along y [m].
         pressure: force per cross-section of the cut, at the surface [Pa], 0 to 1e8.
         gradient: by which it grows with the depth below the surface [Pa/m], 0 to 1e10.
         damping: force per cross-section and speed, that is per volume rate [N.s/m^3], 0 to 1e12.

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import re
 from typing import Any
 
+from ..display import cell_text
 from ..files import versions
 from ..studies.comparison import COMPARED_HANDS, PUSHED, Comparison, differing_fields
 from ..views.compare_plots import compare_figures
@@ -43,11 +43,12 @@ def comparison_page(found: Comparison) -> str:
     walls = found[0].loop is None
     (m0, m1), (d0, d1), (k0, k1) = COMPARED_HANDS.mass, COMPARED_HANDS.damper, COMPARED_HANDS.spring
     hands = f"Worst hand of {m0:g} to {m1:g} kg, {d0:g} to {d1:g} N.s/m, {k0:g} to {k1:g} N/m."
+    rows = zip(*found.tables()["side by side"].values(), strict=True)
     context = {
         "names": [x.name for x in found],
         "about": ABOUT[walls],
         "notes": NOTES[walls] + hands,
-        "numbers": number_rows(found),
+        "numbers": {name: list(map(cell_text, row)) for name, *row in rows},
         "pictures": [
             {"name": name, "title": title, "svg": inline_svg(figure.svg(), name)}
             for name, (title, figure) in compare_figures(found).items()
@@ -60,13 +61,6 @@ def comparison_page(found: Comparison) -> str:
     return template_environment().get_template("compare.html").render(context)
 
 
-def number_rows(found: Comparison) -> dict[str, list[str]]:
-    """Key numbers as text, a row per number, a cell per file; omits numbers that no file has."""
-    names = [n for n in found[0].numbers if not all(math.isnan(x.numbers[n]) for x in found)]
-    rows = {name: [_number_text(x.numbers[name]) for x in found] for name in names}
-    return rows | {"outcome of its run": [x.record.status for x in found]}
-
-
 def inline_svg(text: str, name: str) -> str:
     """Prepares an SVG file for embedding in a page: no header, unique ids, colours of the page."""
     text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.S)
@@ -74,11 +68,6 @@ def inline_svg(text: str, name: str) -> str:
     for color, variable in SVG_COLORS.items():
         text = re.sub(f"{color}\\b", f"var({variable})", text, flags=re.I)
     return text
-
-
-def _number_text(x: float) -> str:
-    text = "-" if math.isnan(x) else "any" if x == math.inf else f"{x:.4g}"
-    return f"{x:.0f}" if "e+" in text else text
 
 
 def _field_text(value: Any) -> str:

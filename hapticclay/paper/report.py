@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import base64
 import functools
-import json
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from .. import views
+from ..display import fields_of
 from ..files import atomic, versions
 from ..model.constants import B_CONSTANT, B_STABILITY, GAINS_FIG11
 from ..model.operator import Operator
+from ..results import with_schema, write_json
 from ..studies import workspace
 from ..studies.chart import Chart
 from ..views.chart_plots import chart_plot
@@ -24,7 +25,6 @@ from . import claims
 from .classics.classic import CLASSIC_STATUSES, Classic, Found
 from .ledger import STATUSES, Row, Runs
 
-LEDGER_SCHEMA = "hapticclay-ledger-1"
 TEMPLATES = Path(__file__).parent / "templates"
 THE_PAPER = {
     "heading": "The paper, reproduced",
@@ -380,7 +380,5 @@ def _write(
     for name in ("report.html", "report.md"):
         with atomic(out / name) as f:
             f.write(env.get_template(name).render(found | about).encode())
-    table = [{**asdict(r), "error": r.error, "agrees": r.agrees} for r in rows]
-    ledger = {"schema": LEDGER_SCHEMA, "versions": versions(), "rows": table}
-    with atomic(out / "ledger.json") as f:
-        f.write((json.dumps(ledger, indent=1) + "\n").encode())
+    table = [{**fields_of(r), "error": r.error, "agrees": r.agrees} for r in rows]
+    write_json(with_schema("ledger", {"rows": table}), out / "ledger.json")

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from typing import Any, NamedTuple
 
-from ..arguments import named
+from ..arguments import checked, named
 from ..errors import ParameterError, needing
 from . import inverse
 from .client_log import ClientLog, Exchanged
@@ -200,7 +200,7 @@ def _bound_sending(connected: socket.socket) -> None:
         connected.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, timeout)
 
 
-@named
+@checked
 @contextmanager
 def connect(url: str, limits: Limits = PLAIN) -> Iterator[DeviceClient]:
     """Connects to a device, real or simulated, while the `with` block runs.

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arguments import checked, named
+from ..display import text_table
 from ..errors import ParameterError
 from ..results import Result, Tables
 from ..scene.scenario import Scenario
@@ -104,6 +107,7 @@ class LoopReport(Result):
     """
 
     drawn_by = "hapticclay.views.loop_plots:loop_plot"
+    written_as = "loop"
 
     messages: int
     rate: float
@@ -177,6 +181,20 @@ class LoopReport(Result):
         if self.rate_needed == 0.0:
             return "; so it would at any rate"
         return f"; {self.rate_needed:.4g} Hz would do"
+
+    def text(self, form: str = "") -> str:
+        """The report, a quantity a line, and the headline."""
+        report = self.tables()["report"]
+        values = [value for (value,) in report.values()]
+        return f"{text_table({'loop': list(report), '': values}, form=form)}\n{self.headline()}"
+
+    def figures(self) -> dict[str, Any]:
+        """The limit line; without a wall there is nothing to show."""
+        return super().figures() if self.line_K else {}
+
+    def write(self, folder: Path, asked: Mapping[str, Any] | None = None) -> None:
+        """Writes folder/loop.json with exact values, as `save` does."""
+        self.save(folder / "loop.json")
 
     def tables(self) -> Tables:
         """The report, and the theoretical limit line."""

@@ -50,7 +50,7 @@ def _check_hand(given: Any, old: Any, path: str) -> None:
     if not isinstance(given, Mapping):
         return
     if ENTIRE in given:
-        old = given[ENTIRE]
+        old = None if str(given[ENTIRE]).lower() == "none" else given[ENTIRE]
     both = {n: given[n] for n in HAND if n in given}
     for i, axis in enumerate(AXES):
         if isinstance(given.get(axis), Mapping):
@@ -68,7 +68,7 @@ def nested(changes: Mapping[str, Any]) -> dict[Any, Any]:
     out: dict[Any, Any] = {}
     for name, value in changes.items():
         try:
-            _plant(out, str(name).split("."), value)
+            _insert(out, str(name).split("."), value)
         except KeyError as twice:
             bound = f"must be given once, and {twice.args[0]!r} is given twice"
             raise ParameterError(str(name), value, bound) from None
@@ -77,17 +77,17 @@ def nested(changes: Mapping[str, Any]) -> dict[Any, Any]:
     return out
 
 
-def _plant(tree: dict[Any, Any], names: Sequence[Any], value: Any) -> None:
+def _insert(tree: dict[Any, Any], names: Sequence[Any], value: Any) -> None:
     name, rest = names[0], names[1:]
     if rest or isinstance(value, Mapping):
         below = tree.get(name)
         if not isinstance(below, dict):
             below = tree[name] = {ENTIRE: below} if name in tree else {}
         if rest:
-            _plant(below, rest, value)
+            _insert(below, rest, value)
         elif isinstance(value, Mapping):
             for key, inner in value.items():
-                _plant(below, [key] if key is ENTIRE else str(key).split("."), inner)
+                _insert(below, [key] if key is ENTIRE else str(key).split("."), inner)
     elif isinstance(tree.get(name), dict):
         tree[name][ENTIRE] = value
     elif name in tree:

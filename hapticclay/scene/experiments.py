@@ -36,27 +36,9 @@ from ..fields import (
     values_of,
 )
 from ..formulas.constants import B_MAX
+from ..model import constants
 from ..model.cells import Profile
 from ..model.clay import Clay, slab
-from ..model.constants import (
-    AXES,
-    B_CONSTANT,
-    B_STABILITY,
-    B_VARIABLE,
-    BORDER,
-    CLAY_X,
-    COUNTERWEIGHT,
-    GAIN,
-    GAINS_FIG11,
-    GROWTH,
-    GROWTH_EQ25,
-    NOMINAL,
-    ORIGIN,
-    ORIGIN_VARIABLE,
-    PATH_LENGTH,
-    TORQUE_LIMIT,
-    TS,
-)
 from ..model.flow import Flow
 from ..model.operator import Operator
 from ..model.signals import Multisine
@@ -78,12 +60,14 @@ from .scenario import (
 )
 
 GROWTHS = {  # readings of the growth [N.s/m per s]
-    "30/s": GROWTH,
-    "0.15/s": GROWTH_EQ25,
-    "0.15/sample": GROWTH_EQ25 / TS,
+    "30/s": constants.GROWTH,
+    "0.15/s": constants.GROWTH_EQ25,
+    "0.15/sample": constants.GROWTH_EQ25 / constants.TS,
     "none": 0.0,
 }
-UNIT_FORCE = COUNTERWEIGHT[0] * cos(radians(COUNTERWEIGHT[1]))  # on each axis [N]
+UNIT_FORCE = constants.COUNTERWEIGHT[0] * cos(
+    radians(constants.COUNTERWEIGHT[1])
+)  # on each axis [N]
 
 Gains = Annotated[tuple[float, float], Bound(0.0, 1e6, "1/kg", above=True)]
 Damping = Annotated[float, Bound(0.0, B_MAX, "N.s/m")]
@@ -110,10 +94,10 @@ class Experiment:
 
     operator: Operator | None = None
     inertia_shaping: bool = False
-    dt: StepLength = TS
+    dt: StepLength = constants.TS
     t_max: Duration = 60.0
-    origin: Position = ORIGIN
-    torque_limit: TorqueLimit = TORQUE_LIMIT
+    origin: Position = constants.ORIGIN
+    torque_limit: TorqueLimit = constants.TORQUE_LIMIT
     control: Control = "continuous"
     Ts: SamplePeriod = None
     render: Render = "held"
@@ -145,7 +129,7 @@ class Experiment:
         """
         values, others = dict(words), []
         if "operator" in values:
-            values["operator"] = _operator(values["operator"])
+            values["operator"] = _hand_of_flag(values["operator"])
         split = [_split_names(cls, nested(given)) for given in changes]
         before = values.get("operator", parameters(cls)["operator"].default or None)
         check_added_hand(before, *(own for own, _ in split))
@@ -199,7 +183,7 @@ class PathExperiment(Experiment):
         integrator: "fast" (second order, any stiffness) or "accurate" (fourth order, slower).
     """
 
-    length: Length = PATH_LENGTH
+    length: Length = constants.PATH_LENGTH
     start: Position = (0.0, 0.0)
     integrator: Integrator = "fast"
 
@@ -223,23 +207,23 @@ class ConstantCut(PathExperiment):
             flow is that of a tool of 10 by 5 mm.
     """
 
-    b: Damping = B_CONSTANT
-    gain: Gains = GAIN
+    b: Damping = constants.B_CONSTANT
+    gain: Gains = constants.GAIN
     force: Force = (1.0, 0.0)
     _: dataclasses.KW_ONLY
-    clay: Annotated[tuple[float, float], Bound(unit="m", names=("begin", "end"))] = CLAY_X
+    clay: Annotated[tuple[float, float], Bound(unit="m", names=("begin", "end"))] = constants.CLAY_X
     material: str | None = None
 
     def scenario(self) -> Scenario:
         begin, end = self.clay
         if end <= begin:
             raise ParameterError("clay", self.clay, "must end beyond where it begins")
-        return self.build_scenario("constant", clay=slab(self._resists(), begin, end))
+        return self.build_scenario("constant", clay=slab(self._resistance(), begin, end))
 
-    def _resists(self) -> float | Flow:
+    def _resistance(self) -> float | Flow:
         if self.material is None:
             return self.b
-        if self.b != B_CONSTANT:
+        if self.b != constants.B_CONSTANT:
             raise ParameterError("material", self.material, "sets b: give one of the two")
         from ..model.materials import material
 
@@ -268,18 +252,18 @@ class VariableCut(PathExperiment):
 
     growth: Annotated[
         float | Literal["30/s", "0.15/s", "0.15/sample", "none"], Bound(0.0, B_MAX, "N.s/m per s")
-    ] = GROWTH
-    gain: Gains = GAIN
+    ] = constants.GROWTH
+    gain: Gains = constants.GAIN
     force: Force = (UNIT_FORCE, UNIT_FORCE)
     _: dataclasses.KW_ONLY
     as_printed: bool = False
-    b: Annotated[tuple[float, float], Bound(0.0, B_MAX, "N.s/m")] = B_VARIABLE
-    border: Annotated[float, Bound(unit="m")] = BORDER
+    b: Annotated[tuple[float, float], Bound(0.0, B_MAX, "N.s/m")] = constants.B_VARIABLE
+    border: Annotated[float, Bound(unit="m")] = constants.BORDER
     length: Length = 0.10
-    origin: Position = ORIGIN_VARIABLE
+    origin: Position = constants.ORIGIN_VARIABLE
 
     def scenario(self) -> Scenario:
-        if self.as_printed and self.gain != GAIN:
+        if self.as_printed and self.gain != constants.GAIN:
             raise ParameterError("as_printed", True, "sets gain to (1, 1): give one of the two")
         growth = GROWTHS[self.growth] if isinstance(self.growth, str) else self.growth
         x = Profile((self.border,), self.b, "x", (0.0, growth))
@@ -308,23 +292,23 @@ class StabilityTest(Experiment):
         origin: as in Experiment [m]; the nominal pose by default.
     """
 
-    gain: Annotated[float, Bound(0.0, 1e6, "1/kg", above=True)] = GAINS_FIG11[1]
-    b: Damping = B_STABILITY
+    gain: Annotated[float, Bound(0.0, 1e6, "1/kg", above=True)] = constants.GAINS_FIG11[1]
+    b: Damping = constants.B_STABILITY
     axis: Axis = "x"
     rms: Annotated[float, Bound(0.0, 1e6, "N")] = 1.0
     seed: Seed = 0
     _: dataclasses.KW_ONLY
     operator: Operator | None = Operator()
     t_max: Duration = 20.0
-    origin: Position = NOMINAL
+    origin: Position = constants.NOMINAL
 
     def scenario(self) -> Scenario:
-        i = AXES.index(self.axis)
+        i = constants.AXES.index(self.axis)
         everywhere = Profile((), (self.b,))
         return self.build_scenario(
             "stability",
             clay=Clay(everywhere, everywhere),
-            gain=(self.gain, GAIN[1]) if i == 0 else (GAIN[0], self.gain),
+            gain=(self.gain, constants.GAIN[1]) if i == 0 else (constants.GAIN[0], self.gain),
             force=(0.0, 0.0),
             muscle=Multisine((self.rms, 0.0) if i == 0 else (0.0, self.rms), seed=self.seed),
             length=None,
@@ -342,7 +326,7 @@ class Free(PathExperiment):
         force: muscle force uh of the operator [N].
     """
 
-    gain: Gains = GAIN
+    gain: Gains = constants.GAIN
     force: Force = (1.0, 0.0)
 
     def scenario(self) -> Scenario:
@@ -369,7 +353,7 @@ def parameters(kind: type[Experiment]) -> dict[str, Field]:
     return out
 
 
-def _operator(given: Any) -> Any:
+def _hand_of_flag(given: Any) -> Any:
     """The arm of the paper, or none, where a flag stands for it; a sweep gives flags as floats."""
     if isinstance(given, bool) or (isinstance(given, float) and given in (0.0, 1.0)):
         return Operator() if given else None
@@ -385,7 +369,7 @@ def _split_names(
     if "operator" in data:
         given = data["operator"]
         hand = given if isinstance(given, Mapping) else {ENTIRE: given}
-        data["operator"] = {k: _operator(v) if k is ENTIRE else v for k, v in hand.items()}
+        data["operator"] = {k: _hand_of_flag(v) if k is ENTIRE else v for k, v in hand.items()}
     for name, value in data.items():
         if name in nodes and (name not in known or _reaches(nodes[name], value)):
             own[name] = value
@@ -407,7 +391,7 @@ def _reaches(node: Node, value: Any, *names: str) -> bool:
 
 
 def parameter_names(kind: type[Experiment] | None) -> list[str]:
-    """Names of all that can be set of an experiment: its parameters, and fields of the scenario."""
+    """Names of what can be set: parameters of an experiment, if any, and fields of the scenario."""
     own = parameters(kind) if kind else {}
     return list(dict.fromkeys([*own, *dotted_names(Scenario)]))
 
@@ -425,11 +409,7 @@ def scenario_factory(kind: Callable[P, Experiment]) -> Callable[P, Scenario]:
     assert isinstance(kind, type)
     name = re.sub(r"(?<=.)(?=[A-Z])", "_", kind.__name__).lower()
     refused = "a value is out of its bounds, or the path out of reach."
-    return function_of(kind, name, _scenario_of, refused)
-
-
-def _scenario_of(experiment: Experiment) -> Scenario:
-    return experiment.scenario()
+    return function_of(kind, name, kind.scenario, refused)
 
 
 constant_cut = scenario_factory(ConstantCut)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +23,22 @@ def is_scenario_file(word: str) -> bool:
     return Path(word).suffix.lower() in SCENARIO_FILES
 
 
-def read_settings(path: str | os.PathLike[str]) -> dict[str, Any]:
+@contextlib.contextmanager
+def naming_file(path: str | os.PathLike[str], name: str = "scenario") -> Iterator[None]:
+    """Adds the file to an error about one of its fields."""
+    try:
+        yield
+    except ParameterError as error:
+        if error.field == name:  # the file itself
+            raise
+        bound = f"{error.bound} (in {Path(path)})"
+        raise ParameterError(error.field, error.value, bound) from None
+
+
+def read_settings(path: str | os.PathLike[str], name: str = "scenario") -> dict[str, Any]:
     """Reads a scenario file as plain data; a scenario without a name gets that of the file."""
     file = Path(path)
-    kind = _file_kind(file)
+    kind = _file_kind(file, name)
     try:
         text = read_text(file, MOST_SETTINGS)
         data = parse_toml(text) if kind == "TOML" else parse_json(text, _table)
@@ -33,13 +46,13 @@ def read_settings(path: str | os.PathLike[str]) -> dict[str, Any]:
             raise ValueError("it holds no table")
     except OSError as error:
         bound = f"must be a file that can be read ({error.strerror})"
-        raise ParameterError("scenario", str(path), bound) from None
+        raise ParameterError(name, str(path), bound) from None
     except ValueError as error:
         fault = " ".join(str(error).split())
         if isinstance(error, UnicodeDecodeError):
             fault = f"byte {error.start} is not UTF-8"
         bound = f"must be {kind}: {fault}"
-        raise ParameterError("scenario", str(path), bound) from None
+        raise ParameterError(name, str(path), bound) from None
     return {"name": file.stem, **with_present_names(data)}
 
 
@@ -52,7 +65,7 @@ def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return out
 
 
-def _file_kind(file: Path, name: str = "scenario") -> str:
+def _file_kind(file: Path, name: str) -> str:
     if not is_scenario_file(file.name):
         raise ParameterError(name, str(file), "must be a .toml or a .json file")
     return file.suffix[1:].upper()

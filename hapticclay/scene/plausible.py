@@ -21,13 +21,13 @@ from .scenario import Scenario
 HAND_MOST = {"mass": (30.0, "kg"), "damper": (500.0, "N.s/m"), "spring": (1e4, "N/m")}
 
 
-def warn_of(scenario: Scenario) -> None:
+def warn_implausible(scenario: Scenario) -> None:
     """Issues a `Warning` for each implausible value of a scenario, at the user's line."""
     for text in implausible(scenario):
-        warnings.warn(text, Warning, stacklevel=_users_level())
+        warnings.warn(text, Warning, stacklevel=_user_stack_level())
 
 
-def _users_level() -> int:
+def _user_stack_level() -> int:
     """`stacklevel` of the user's line, for a warning that the caller issues."""
     level, frame = 0, sys._getframe()
     while frame and frame.f_globals.get("__name__", "").startswith("hapticclay."):
@@ -40,9 +40,9 @@ def implausible(scenario: Scenario) -> Iterator[str]:
     hands, given = scenario.operators, scenario.operator
     for i, axis in enumerate(AXES if isinstance(given, tuple) else AXES[:1]):
         field = f"operator.{axis}" if isinstance(given, tuple) else "operator"
-        yield from _hand_parts(field, hands[i])
+        yield from _implausible_hand(field, hands[i])
     clay = scenario.clay
-    if clay is not None and not _within(scenario, clay):
+    if clay is not None and not _within_reach(scenario, clay):
         folded, stretched = scenario.arm.reach
         ox, oy = scenario.origin
         yield (
@@ -51,23 +51,23 @@ def implausible(scenario: Scenario) -> Iterator[str]:
         )
 
 
-def _hand_parts(field: str, hand: Operator | None) -> Iterator[str]:
+def _implausible_hand(field: str, hand: Operator | None) -> Iterator[str]:
     for name, (most, unit) in HAND_MOST.items() if hand else ():
         value = getattr(hand, name)
         if value > most:
             yield f"{field}.{name} = {value:g}: the hand of a person has 0 to {most:g} {unit}"
 
 
-def _within(scenario: Scenario, clay: Clay) -> bool:
+def _within_reach(scenario: Scenario, clay: Clay) -> bool:
     """Whether the handle can reach any point of the clay."""
     laws = [(*law.lines, law.some) for law in clay.laws if law.some.any()]
     inside = np.zeros((3, 3), dtype=bool)
     inside[1, 1] = True
     laws += [(block.x, block.y, inside) for block in clay.blocks]
-    return not laws or any(_meets(scenario, *law) for law in laws)
+    return not laws or any(_meets_reach(scenario, *law) for law in laws)
 
 
-def _meets(scenario: Scenario, x: Any, y: Any, some: np.ndarray) -> bool:
+def _meets_reach(scenario: Scenario, x: Any, y: Any, some: np.ndarray) -> bool:
     """Whether cells between lines [m] meet the ring that the handle can reach."""
     near, far = [], []
     for lines, origin in zip((x, y), scenario.origin, strict=True):

@@ -25,7 +25,7 @@ from ..model.sampled_controller import Controller
 from ..model.signals import Signal
 from ..model.support import check_scene
 from .changes import check_added_hand, nested
-from .files import read_settings, write_part
+from .files import naming_file, read_settings, write_part
 from .text import scenario_rows
 
 SERVO_STEP = 1.0  # radians of the servo's fastest mode in a step: stable below 2, and 4 % off at 1
@@ -152,8 +152,8 @@ class Scenario:
             self._check_reach("length", (self.length, self.start[1]))
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{name}: {value}" for name, value in scenario_rows(self))
-        return f"<Scenario {one_line(self.name)}; {told}>"
+        rows = ", ".join(f"{name}: {value}" for name, value in scenario_rows(self))
+        return f"<Scenario {one_line(self.name)}; {rows}>"
 
     def _repr_html_(self) -> str:
         return html_table(f"Scenario {self.name}", scenario_rows(self))
@@ -200,13 +200,9 @@ class Scenario:
         Raises:
             ParameterError: the file cannot be read, or a field was refused.
         """
-        try:
+        with naming_file(path):
             settings = read_settings(path)
             cls.of(settings)
-        except ParameterError as error:
-            if error.field != "scenario":
-                error = ParameterError(error.field, error.value, f"{error.bound} (in {Path(path)})")
-            raise error from None
         return cls.of(settings, *changes)
 
     def save(self, path: str | os.PathLike[str]) -> Path:

@@ -18,7 +18,7 @@ from ..model.sampled_controller import Controller
 from ..model.signals import Signal
 from ..model.spring import STIFFNESS_MAX
 from .changes import nested
-from .files import read_settings, write_part
+from .files import naming_file, read_settings, write_part
 from .scenario import Scenario
 
 LEVER = 0.24  # [m] link 1, which is the device: its motions are much smaller
@@ -100,15 +100,11 @@ class VirtualWall:
         Raises:
             ParameterError: the file cannot be read, or a field was refused.
         """
-        try:
-            data = read_settings(path)
+        with naming_file(path, "wall"):
+            data = read_settings(path, "wall")
             del data["name"]
             choice("schema", data.pop("schema", WALL_SCHEMA), (WALL_SCHEMA, WALL_SCHEMA_0_2))
             return make_part(cls, nested(data))
-        except ParameterError as error:
-            field = "wall" if error.field == "scenario" else error.field
-            told = "" if field == "wall" else f" (in {Path(path)})"
-            raise ParameterError(field, error.value, error.bound + told) from None
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Writes the fields that differ from the defaults.

@@ -15,53 +15,19 @@ import numpy as np
 from ..arguments import checked
 from ..errors import ParameterError, choice, integer
 from ..kernel.engine import warnings_caught
-from ..model.constants import AXES
-from ..scene.plausible import warn_of
+from ..scene.plausible import warn_implausible
 from ..scene.scenario import Scenario
 from . import record
 from .engines import engine_for
-from .many import SUMMARY_CROSSINGS, Lane, kind_key
-from .monitor import Outcome
-from .run import Crossing, Place, Run, completed
-from .simulate import simulate
+from .many import Lane, kind_key
+from .one_run import check_memory
+from .run import Run, Workspace, completed
+from .summaries import SUMMARY, Summaries, of_run, put_fields
 
 KEEP = ("records", "summaries")
 MANY = 32  # batches of so many runs or more make the runs of one kind together
 PART_STEPS = 20_000.0  # steps in a part of such a batch: 50 ms, after which Ctrl-C takes effect
-WORKS = (
-    "muscle",
-    "motors",
-    "clay",
-    "hand_damper",
-    "kinetic",
-    "hand_stored",
-    "residual",
-    "throughput",
-)
-SUMMARY = np.dtype(
-    [
-        ("code", "U12"),  # record.Outcome.code; the rest of it: record.status of a run made again
-        ("axis", "U1"),  # that is to blame, "" if none
-        ("time", "f8"),  # of the end, or of the verdict [s]
-        ("step", "i8"),  # last good sample
-        ("steps", "i8"),  # engine steps made
-        ("crossings", "i8"),  # number of borders crossed; of the first of them:
-        ("crossing_axis", "i8", SUMMARY_CROSSINGS),  # 0 for x, 1 for y, -1 for none
-        ("crossing_time", "f8", SUMMARY_CROSSINGS),  # [s], NaN for none
-        (
-            "crossing_speed",
-            "f8",
-            SUMMARY_CROSSINGS,
-        ),  # along the axis [m/s]: the steady one, if the region was long enough
-        ("p", "f8", 2),  # at the last good sample: position [m]
-        ("v", "f8", 2),  # velocity [m/s]
-        ("fh", "f8", 2),  # force of the operator [N]
-        ("fe", "f8", 2),  # of the clay [N]
-        ("b", "f8", 2),  # damping [N.s/m]
-        *((name, "f8") for name in WORKS),  # record.Record.energy [J]
-    ]
-)
-LAST_ONLY = 1_000_000_000  # value of `every` that keeps only the last sample
+LAST_ONLY = 1_000_000_000  # value of `every` that keeps only the first sample and the last
 WARNED = 200  # kinds of scene per batch that are checked for implausible values
 
 
@@ -101,105 +67,56 @@ def simulate_batch(
             pass
     todo = checked_scenarios(scenarios, seen)
     first = list(itertools.islice(todo, MANY))
-    out = Summaries() if summaries else _Records()
     engine = engine_for("auto", math.inf if first else 0.0)
-    if engine == "python":  # one after the other: side by side they would wait for each other
-        for i, scenario in enumerate(itertools.chain(first, todo)):
-            r = simulate(scenario, every=every, engine=engine)
-            out.put(i, [summary_entry(*record.brief(r))] if summaries else [r])
-        return out.all()
-    pool, together = BatchPool(every), summaries and len(first) == MANY
+    pool, together = BatchPool(engine), summaries and len(first) == MANY and engine == "native"
+    out, records = Summaries(), dict[int, Any]()
 
     def make(jobs: list[Scenario]) -> Any:
         if summaries:
             return _summaries_of(pool, jobs, together)
-        return [record.Record.of(*pool.run(s)) for s in jobs]
+        return [record.Record.of(*pool.run(s, every)) for s in jobs]
+
+    def put(first: int, results: Any) -> None:
+        records.update(enumerate(results, first))
 
     with warnings_caught():
-        count = max(min(threads, len(first)), 1)
         parts = _in_parts(itertools.chain(first, todo), together)
-        on_threads(parts, make, out.put, count, pool.stop)
-    return out.all()
+        # in Python one after the other: side by side they would wait for each other
+        count = max(min(threads, len(first)), 1) if engine == "native" else 0
+        on_threads(parts, make, out.put if summaries else put, count, pool.stop)
+    return out.all() if summaries else [records[i] for i in range(len(records))]
 
 
 Part = TypeVar("Part", bound=Sized)
 
 
 class BatchPool:
-    """What each thread of a batch owns: a place for its runs, and what runs of one kind share.
+    """What each thread of a batch owns: a lane, with the workspace of its runs."""
 
-    Args:
-        every: keep each every-th sample.
-    """
-
-    def __init__(self, every: int):
-        self.every, self.stop = every, threading.Event()
+    def __init__(self, engine: str = "native"):
+        self.engine, self.stop = engine, threading.Event()
         self.own = threading.local()
 
     def lane(self) -> Lane:
-        """The lane of this thread, which makes runs of one kind together."""
+        """The lane of this thread, unless the batch has ended."""
+        if self.stop.is_set():
+            raise CancelledError
         if not hasattr(self.own, "lane"):
-            self.own.lane = Lane(Place())
+            self.own.lane = Lane(Workspace())
         return self.own.lane
 
-    def _go(self, scenario: Scenario, every: int, brief: bool) -> tuple[Run, float]:
-        """The run, made at this thread's place, and the seconds it took."""
-        if self.stop.is_set():
-            raise CancelledError
-        return completed(scenario, every, "native", self.lane().place, None, brief)
+    def run(self, scenario: Scenario, every: int) -> tuple[Run, float]:
+        """Makes a run, and the time that it took [s]."""
+        check_memory(scenario, every)
+        return completed(scenario, every, self.engine, self.lane().workspace)
 
-    def run(self, scenario: Scenario) -> tuple[Run, float]:
-        """Makes a run."""
-        return self._go(scenario, self.every, False)
+    def together(self, jobs: Sequence[Scenario]) -> tuple[list[Any], list[int]]:
+        """Makes short runs of one kind together, as `Lane.make`."""
+        return self.lane().make(jobs, [kind_key(s) for s in jobs])
 
-    def brief(self, scenario: Scenario) -> tuple[Any, ...]:
-        """The end of a run, without its samples."""
-        return self._go(scenario, LAST_ONLY, True)[0].brief()
-
-    def many(
-        self, scenarios: Sequence[Scenario], keys: Sequence[Any]
-    ) -> tuple[list[tuple[np.ndarray, dict[str, Any]]], list[int]]:
-        """Makes short runs of one kind together, without their samples."""
-        if self.stop.is_set():
-            raise CancelledError
-        return self.lane().make(scenarios, keys)
-
-
-class _Records:
-    """The results of a batch, in the order of its scenarios."""
-
-    def __init__(self):
-        self.found: list[Any] = []
-
-    def put(self, first: int, results: Sequence[Any]) -> None:
-        """Stores the results of consecutive runs."""
-        end = first + len(results)
-        self.found += [None] * (end - len(self.found))
-        self.found[first:end] = results
-
-    def all(self) -> Any:
-        """All of them."""
-        return self.found
-
-
-class Summaries:
-    """The same as an array of SUMMARY, which grows in place."""
-
-    def __init__(self):
-        self.found, self.n = np.zeros(0, SUMMARY), 0
-
-    def put(self, first: int, results: Any) -> None:
-        """Stores the results of consecutive runs."""
-        end = first + len(results)
-        self.n = max(self.n, end)
-        if end > len(self.found):
-            self.found.resize(max(end, len(self.found) + len(self.found) // 4), refcheck=False)
-        self.found[first:end] = results
-
-    def all(self) -> Any:
-        """All of them."""
-        self.found.resize(self.n, refcheck=False)
-        return self.found
+    def summary(self, scenario: Scenario) -> tuple[Any, ...]:
+        """Summary of a run."""
+        return of_run(self.run(scenario, LAST_ONLY)[0])
 
 
 def checked_scenarios(scenarios: Iterable[Any], seen: set[Any]) -> Iterator[Scenario]:
@@ -212,7 +129,7 @@ def checked_scenarios(scenarios: Iterable[Any], seen: set[Any]) -> Iterator[Scen
         scene = id(s.clay), s.origin, s.arm, s.operator
         if len(seen) < WARNED and scene not in seen:
             seen.add(scene)
-            warn_of(s)
+            warn_implausible(s)
         if s.controller is not None:
             s.controller.function()  # imported here, not in a thread
         yield s
@@ -235,12 +152,11 @@ def _summaries_of(pool: BatchPool, jobs: list[Scenario], together: bool) -> np.n
     """Summaries of runs."""
     out, left = np.zeros(len(jobs), SUMMARY), list(range(len(jobs)))
     if together:
-        done, left = pool.many(jobs, [kind_key(s) for s in jobs])
+        done, left = pool.together(jobs)
         for places, fields in done:
-            for name, values in fields.items():
-                out[name][places] = values
+            put_fields(out, places, fields)
     for i in left:
-        out[i] = summary_entry(*pool.brief(jobs[i]))
+        out[i] = pool.summary(jobs[i])
     return out
 
 
@@ -256,12 +172,17 @@ def on_threads(
     threads: int,
     stop: threading.Event,
 ) -> None:
-    """Makes parts of a batch on several threads; the first exception ends all and is raised.
+    """Makes parts of a batch on threads, 0 for none; the first exception ends all and is raised.
 
     The calling thread reads the scenarios and stores the results. So a generator runs where it was
     made, Ctrl-C reaches it, and at most two parts per thread are held.
     """
     at = 0
+    if not threads:
+        for part in parts:
+            put(at, make(part))
+            at += len(part)
+        return
     working: dict[Future[Any], int] = {}
 
     def collect(most: int) -> None:
@@ -280,21 +201,3 @@ def on_threads(
             stop.set()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-
-
-def summary_entry(
-    o: Outcome,
-    steps: int,
-    crossings: Sequence[Crossing],
-    last: Sequence[Any],
-    energy: dict[str, float],
-) -> tuple[Any, ...]:
-    """Entry of a run among summaries."""
-    first = crossings[:SUMMARY_CROSSINGS]
-    rest = SUMMARY_CROSSINGS - len(first)
-    return (
-        o.code, o.axis, o.time, o.step, steps, len(crossings),
-        [AXES.index(c.axis) for c in first] + [-1] * rest,
-        [c.time for c in first] + [np.nan] * rest, [c.speed for c in first] + [np.nan] * rest,
-        *last, *(energy[name] for name in WORKS),
-    )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,18 +17,14 @@ from ..model.cells import Profile
 from ..model.constants import AXES
 from ..scene.changes import HAND, with_fields
 from ..scene.scenario import Scenario
-from . import batch
+from . import batch, summaries
 from .engines import engine_for
-from .many import FEWEST, Draws, draws_of, kind_key
+from .many import FEWEST, Differences, differences_of, kind_key
 
 MOST = 4096  # runs of one part: their models and states take 40 MB
 PART = 100_000.0  # steps of one part of the work of a thread: a quarter of a second
-PAIRS = {
-    "gain": "gain",
-    "force": "force",
-    "velocity": "starts",
-}  # fields, and where draws have them
-Place = tuple[str, tuple[int, ...]]
+PAIRS = {"gain": "gain", "force": "force", "velocity": "starts"}  # and where `Differences` has them
+Entry = tuple[str, tuple[int, ...]]
 
 
 @checked
@@ -57,19 +53,25 @@ def simulate_columns(
             refused; the error names column and row.
     """
     threads = integer("threads", batch.cores() if threads is None else threads, 1, 1024)
-    drawn = Columns(base, columns)
-    many = len(drawn) >= batch.MANY and drawn.is_plain
+    runs = Columns(base, columns)
+    many = len(runs) >= batch.MANY and runs.is_plain
     if not many or engine_for("auto", math.inf) == "python":
-        return batch.simulate_batch(drawn.scenarios(), threads=threads, keep="summaries")
-    return _Lanes(drawn).run(threads)
+        scenarios = map(runs.scenario, range(len(runs)))
+        return batch.simulate_batch(scenarios, threads=threads, keep="summaries")
+    pool, out, n = batch.BatchPool(), summaries.Summaries(), len(runs)
+    size = max(FEWEST, min(int(PART * runs.like.dt / runs.like.t_max), MOST))
+    parts = (range(k, min(k + size, n)) for k in range(0, n, size))
+
+    def make(rows: range) -> np.ndarray:
+        return _summaries_of(pool, runs, rows)
+
+    with warnings_caught():
+        batch.on_threads(parts, make, out.put, min(threads, -(-n // size)), pool.stop)
+    return out.all()
 
 
 class Columns:
-    """Scenarios as columns.
-
-    Args:
-        base: what they have in common.
-        columns: values by dotted name.
+    """Scenarios as columns of values by dotted name.
 
     Attributes:
         like: the first scenario.
@@ -105,31 +107,20 @@ class Columns:
         except ParameterError as error:
             raise ParameterError(f"{error.field}[{k}]", error.value, error.bound) from None
 
-    def scenarios(self) -> Iterator[Scenario]:
-        """All scenarios."""
-        return map(self.scenario, range(self.n))
-
-    def draws(self, first: int, end: int) -> Draws:
+    def differences(self, first: int, end: int) -> Differences:
         """Differences between the scenarios of some rows."""
-        n, one = end - first, draws_of([self.like])
-        values = one.values and [np.repeat(x, n, axis=0) for x in one.values]
-        hands = None if one.hands is None else np.repeat(one.hands, n, axis=0)
-        tiled = {x: np.repeat(getattr(one, x), n, axis=0) for x in ("gain", "force", "starts")}
-        delays = np.repeat(np.array(one.delays, float), n)
-        into = tiled | {"hands": hands, "delays": delays}
-        into |= {f"clay.{axis}": x for axis, x in zip(AXES, values or (), strict=False)}
+        d = differences_of([self.like]).repeated(end - first)
+        into = d._asdict()
+        into |= {f"clay.{axis}": x for axis, x in zip(AXES, d.values or (), strict=False)}
         both = zip(self.columns.values(), self.places, strict=True)
         for x, places in sorted(both, key=lambda each: -len(each[1])):  # a pair, then its entries
             for name, index in places:
                 into[name][(slice(None), *index)] = x[first:end]
-        return Draws(
-            tiled["gain"], tiled["force"], np.repeat(one.origin, n, axis=0), tiled["starts"],
-            [{servo: range(n)} for servo in self.like.servo], hands, delays, values,
-        )  # fmt: skip
+        return d
 
-    def of_kind(self, d: Draws) -> np.ndarray:
-        """Which draws are of the kind of the first: equally delayed, with equally stiff clay."""
-        one, good = draws_of([self.like]), np.ones(len(d.gain), bool)
+    def of_kind(self, d: Differences) -> np.ndarray:
+        """Which runs are of the kind of the first: equally delayed, with equally stiff clay."""
+        one, good = differences_of([self.like]), np.ones(len(d.gain), bool)
         if len(d.delays):
             good &= (d.delays > 0.0) == (one.delays[0] > 0.0)
         if d.values is None or not any(name.startswith("clay.") for name in self.columns):
@@ -144,8 +135,8 @@ class Columns:
         return good
 
 
-def places_of(name: str, base: Scenario) -> list[Place]:
-    """Where draws hold a field: names and indices; none for a field that needs a scenario."""
+def places_of(name: str, base: Scenario) -> list[Entry]:
+    """Where `Differences` has a field: names, indices; none for a field that needs a scenario."""
     head, *rest = name.split(".")
     axes = (0, 1)
     if rest and rest[0] in AXES:
@@ -186,42 +177,17 @@ def _check_bounds(base: Scenario, name: str, column: np.ndarray) -> None:
         number(f"{name}[{k}]", float(column[k]), low, high, above=above, unit=unit)
 
 
-class _Lanes:
-    """Makes these runs together, on threads.
-
-    Args:
-        drawn: the runs.
-    """
-
-    def __init__(self, drawn: Columns):
-        self.drawn, self.pool = drawn, batch.BatchPool(1)
-
-    def run(self, threads: int) -> np.ndarray:
-        """Makes all runs."""
-        like, n = self.drawn.like, len(self.drawn)
-        size = max(FEWEST, min(int(PART * like.dt / like.t_max), MOST))
-        parts = (range(k, min(k + size, n)) for k in range(0, n, size))
-        out = batch.Summaries()
-        with warnings_caught():
-            batch.on_threads(parts, self.part, out.put, min(threads, -(-n // size)), self.pool.stop)
-        return out.all()
-
-    def part(self, rows: range) -> np.ndarray:
-        """Summaries of some runs."""
-        drawn, lane = self.drawn, self.pool.lane()
-        d, out = drawn.draws(rows.start, rows.stop), np.zeros(len(rows), batch.SUMMARY)
-        pattern = lane.pattern(drawn.key, drawn.like)
-        if not pattern.is_made:
-            scenes = [drawn.scenario(k) for k in rows]
-            return np.array(
-                [batch.summary_entry(*self.pool.brief(s)) for s in scenes], batch.SUMMARY
-            )
+def _summaries_of(pool: batch.BatchPool, runs: Columns, rows: range) -> np.ndarray:
+    """Summaries of some runs: together where they are of one kind, else one by one."""
+    out, lane = np.zeros(len(rows), summaries.SUMMARY), pool.lane()
+    pattern, together = lane.pattern(runs.key, runs.like), np.zeros(len(rows), bool)
+    if pattern.is_made:
+        d = runs.differences(rows.start, rows.stop)
         fields, good = lane.group(pattern, d)
-        alike = drawn.of_kind(d)
-        keep = alike[good]
-        good &= alike
-        for name, values in fields.items():
-            out[name][good] = values[keep]
-        for i in np.flatnonzero(~good).tolist():
-            out[i] = batch.summary_entry(*self.pool.brief(drawn.scenario(rows[i])))
-        return out
+        alike = runs.of_kind(d)
+        together = good & alike
+        kept = {name: values[alike[good]] for name, values in fields.items()}
+        summaries.put_fields(out, together, kept)
+    for i in np.flatnonzero(~together).tolist():
+        out[i] = pool.summary(runs.scenario(rows[i]))
+    return out

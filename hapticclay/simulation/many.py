@@ -10,21 +10,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..formulas import regions
-from ..kernel import hardware, layout, native, path, records, scene, user_laws
+from ..kernel import hardware, layout, native, records, scene, user_laws
 from ..kernel.row import CHUNK, NativeRow
-from ..kernel.summary import CROSSINGS as SUMMARY_CROSSINGS
 from ..model import controller
 from ..model.cells import Profile
 from ..model.hardware import Hardware
 from ..model.operator import NO_HAND, mobility_with
 from ..scene.scenario import Scenario
-from . import monitor
-from .run import Place, balance
+from .run import Workspace
+from .summaries import of_rows
 
 LONGEST = 10_000  # most steps of such a run: a call ends soon, so Ctrl-C takes effect soon
 FEWEST = 4  # runs of a kind that repay its pattern
 PATTERNS = 64  # kinds that are kept
-# of the hardware, all but its delay; without noise its seed has no effect
+# fields of the hardware, but the delay, and the seed, which has no effect without noise
 SHARED = tuple(x.name for x in fields(Hardware) if x.name not in ("delay", "seed"))
 _scene = operator.attrgetter(
     "control", "inertia_shaping", "dt", "t_max", "length", "Ts", "render", "torque_limit"
@@ -33,7 +32,7 @@ _shared, _hand_parts = operator.attrgetter(*SHARED), operator.attrgetter("mass",
 
 
 def kind_key(s: Scenario) -> tuple[Any, ...] | None:
-    """Key of runs of one kind; None for a run that `carry` does not make.
+    """Key of runs of one kind; None for a run that is made alone.
 
     Runs of one kind differ in numbers: gain, force, operator, servo, start, velocity, origin, clay
     and delay.
@@ -73,19 +72,14 @@ def is_plain(law: Any) -> bool:
 
 
 class Pattern:
-    """A scene whose model is that of all runs of its kind, except for some numbers.
+    """A scene whose model is that of all runs of its kind, except for some numbers."""
 
-    Args:
-        scenario: a run of the kind.
-        place: where its rows are made.
-    """
-
-    def __init__(self, scenario: Scenario, place: Place):
+    def __init__(self, scenario: Scenario, workspace: Workspace):
         self.scenario = scenario  # kept: the identity of its parts is in the key
-        self.row = NativeRow(scenario, place.movers.of(scenario), place.buffers)
+        self.row = NativeRow(scenario, workspace.movers.of(scenario), workspace.buffers)
         self.is_made = not self.row.m.formed
 
-    def models(self, d: Draws) -> tuple[np.ndarray, list[np.ndarray]]:
+    def models(self, d: Differences) -> tuple[np.ndarray, list[np.ndarray]]:
         """The models of runs, and the arrays that they name."""
         out, kept = np.repeat(self.row.models, len(d.gain)), []
         out["ox"], out["oy"] = d.origin.T
@@ -126,7 +120,7 @@ class Pattern:
         out["queue"], out["forces"] = both.ctypes.data, both[len(ring) :].ctypes.data
         return both
 
-    def _put_tables(self, out: np.ndarray, d: Draws) -> np.ndarray:
+    def _put_tables(self, out: np.ndarray, d: Differences) -> np.ndarray:
         """Puts the values of the clay into tables of their own."""
         table = self.row.arrays["table"]
         tables = np.tile(table, (len(out), 1))
@@ -136,7 +130,7 @@ class Pattern:
         out["table"] = tables.ctypes.data + tables.strides[0] * np.arange(len(out))
         return tables
 
-    def _memory(self, d: Draws, i: int) -> np.ndarray:
+    def _memory(self, d: Differences, i: int) -> np.ndarray:
         """Rows of controller.held_compensator of an axis, shape (n, 20)."""
         Ts, shape = self.row.m.Ts, self.scenario.compensators[i]
         out = np.empty((len(d.gain), 20))
@@ -148,32 +142,31 @@ class Pattern:
         return out
 
 
-class Draws(NamedTuple):
-    """Differences between runs of one kind, as columns over n runs.
+class Differences(NamedTuple):
+    """Differences between runs of one kind, as columns over n runs."""
 
-    Attributes:
-        gain: of x and y [1/kg], shape (n, 2).
-        force: constant muscle force [N], shape (n, 2).
-        origin: world position of p = 0 [m], shape (n, 2).
-        starts: position [m] and velocity [m/s] of the handle, (x, y) each, shape (n, 4).
-        servo: of x and of y: the servos, and the runs that have them.
-        hands: mass, damper and spring of x and of y, shape (n, 2, 3); None without operators.
-        delays: of the torques [s]; empty without hardware.
-        values: dampings of the clay's regions [N.s/m], of x and of y, shape (n, regions) each; None
-            without clay.
-    """
+    gain: np.ndarray  # [1/kg], shape (n, 2)
+    force: np.ndarray  # constant muscle force [N], shape (n, 2)
+    origin: np.ndarray  # world position of p = 0 [m], shape (n, 2)
+    starts: np.ndarray  # position [m] and velocity [m/s] of the handle, (x, y) each, shape (n, 4)
+    servo: Any  # of x and of y: the servos, and the runs that have them
+    hands: Any  # mass, damper, spring of x and of y, shape (n, 2, 3); None without operators
+    delays: Any  # of the torques [s]; empty without hardware
+    values: Any  # dampings of the regions, x and y, shape (n, regions) [N.s/m]; None without clay
 
-    gain: np.ndarray
-    force: np.ndarray
-    origin: np.ndarray
-    starts: np.ndarray
-    servo: Any
-    hands: Any
-    delays: Any
-    values: Any
+    def repeated(self, n: int) -> Differences:
+        """Those of a single run, n times."""
+        hands = None if self.hands is None else np.repeat(self.hands, n, axis=0)
+        return Differences(
+            *(np.repeat(x, n, axis=0) for x in (self.gain, self.force, self.origin, self.starts)),
+            [dict.fromkeys(each, range(n)) for each in self.servo],
+            hands,
+            np.repeat(np.array(self.delays, float), n),
+            self.values and [np.repeat(x, n, axis=0) for x in self.values],
+        )
 
 
-def draws_of(jobs: Sequence[Scenario]) -> Draws:
+def differences_of(jobs: Sequence[Scenario]) -> Differences:
     """Differences between scenarios of one kind."""
     first, hands, values = jobs[0], None, None
     if any(first.operators):
@@ -191,31 +184,27 @@ def draws_of(jobs: Sequence[Scenario]) -> Draws:
     )
     starts = np.array([(*s.start, *s.velocity) for s in jobs], float)
     delays = [s.hardware.delay for s in jobs if s.hardware]
-    return Draws(gain, force, origin, starts, servo, hands, delays, values)
+    return Differences(gain, force, origin, starts, servo, hands, delays, values)
 
 
 class Lane:
-    """Makes many runs in one thread.
+    """Makes many runs in one thread, those of one kind together."""
 
-    Args:
-        place: where they are made.
-    """
-
-    def __init__(self, place: Place):
-        self.place, self.known = place, dict[Any, Pattern]()
+    def __init__(self, workspace: Workspace):
+        self.workspace, self.known = workspace, dict[Any, Pattern]()
 
     def pattern(self, key: Any, scenario: Scenario) -> Pattern:
         """The pattern of a kind."""
         if key not in self.known:
             if len(self.known) >= PATTERNS:
                 del self.known[next(iter(self.known))]
-            self.known[key] = Pattern(scenario, self.place)
+            self.known[key] = Pattern(scenario, self.workspace)
         return self.known[key]
 
     def make(
         self, jobs: Sequence[Scenario], keys: Sequence[Any]
     ) -> tuple[list[tuple[np.ndarray, dict[str, Any]]], list[int]]:
-        """Makes those runs that it can."""
+        """Makes runs by their keys: fields of summaries by runs, and which runs are left."""
         kinds: dict[Any, list[int]] = {}
         for i, key in enumerate(keys):
             kinds.setdefault(key, []).append(i)
@@ -224,47 +213,22 @@ class Lane:
             if len(found) < FEWEST or not (p := self.pattern(key, jobs[found[0]])).is_made:
                 left += found
                 continue
-            summaries, good = self.group(p, draws_of([jobs[i] for i in found]))
+            summaries, good = self.group(p, differences_of([jobs[i] for i in found]))
             at = np.array(found)
             done.append((at[good], summaries))
             left += at[~good].tolist()
         return done, sorted(left)
 
-    def group(self, p: Pattern, d: Draws) -> tuple[dict[str, Any], np.ndarray]:
-        """Makes runs of one kind."""
+    def group(self, p: Pattern, d: Differences) -> tuple[dict[str, Any], np.ndarray]:
+        """Makes runs of one kind: fields of the good ones' summaries, and which are good."""
         models, kept = p.models(d)
         n = len(models)
         states: Any = np.zeros(n, layout.dtype_of(records.State))
         outs = np.zeros(n, layout.dtype_of(records.Summary))
         starts = np.ascontiguousarray(d.starts, float)
-        models["engine"] = self.place.movers.of(p.scenario).row.ctypes.data
+        models["engine"] = self.workspace.movers.of(p.scenario).row.ctypes.data
         places = (x.ctypes.data for x in (models, states, outs))
         native.machine().finish(*places, n, starts.ctypes.data, CHUNK - 1)
         del kept  # the arrays that the models name
         good = states["watch"]["quiet"] > 0
-        return summary_columns(p.scenario, p.row.m, states[good], outs[good]), good
-
-
-def summary_columns(like: Scenario, m: Any, states: np.ndarray, outs: np.ndarray) -> dict[str, Any]:
-    """The fields of summaries, arrays over runs."""
-    seen, moved, unbound, _ = states["watch"]["seen"].T
-    saturated, stalled = monitor.at_rest(seen, moved, unbound, like.dt)
-    ends = np.where(saturated, "saturated", np.where(stalled, "stalled", "time limit"))
-    w = states["work"]
-    work = [w[name] for name in ("muscle", "motors", "clay", "hand", "through")]
-    stored = outs["kinetic"], outs["at_hand"]
-    energy = balance(work, [x[:, 0] for x in stored], [x[:, 1] for x in stored])
-    if like.hardware is not None and any(like.hardware.friction):
-        energy["residual"] = energy["residual"] - w["friction"]
-    row, crossings = outs["row"], outs["crossings"]
-    crossed = outs["crossed"].reshape(-1, SUMMARY_CROSSINGS, 3).copy()
-    none = np.arange(SUMMARY_CROSSINGS) >= crossings[:, None]
-    crossed[none] = -1.0, np.nan, np.nan
-    v, b = row[:, 4:6], row[:, 12:14]
-    return dict(
-        code=np.where(states["code"] == path.FINISHED, "finished", ends),
-        axis=np.zeros(len(states), "U1"), time=states["t"], step=states["i"], steps=outs["steps"],
-        crossings=crossings, crossing_axis=crossed[:, :, 0].astype(np.int64),
-        crossing_time=crossed[:, :, 1], crossing_speed=crossed[:, :, 2], p=row[:, 2:4], v=v,
-        fh=row[:, 6:8], fe=outs["force"] if m.records_clay_force else b * v, b=b, **energy,
-    )  # fmt: skip
+        return of_rows(p.scenario, p.row.m, states[good], outs[good]), good

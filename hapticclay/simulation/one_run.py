@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 from ..errors import ParameterError
 from ..kernel.engine import warnings_caught
@@ -11,7 +10,7 @@ from ..scene.scenario import Scenario
 from .engines import engine_for
 from .memory import memory_left
 from .record import Record
-from .run import borrowed_place, completed
+from .run import Progress, borrowed_workspace, completed
 
 SAMPLE = 430  # bytes per kept sample at the end of a run, measured
 SMALL_MEMORY = 2.0**28  # [bytes] smaller runs skip the check of memory
@@ -21,15 +20,15 @@ def run_once(
     scenario: Scenario,
     every: int,
     engine: str,
-    progress: Callable[[float, float], bool | None] | None = None,
+    progress: Progress | None = None,
 ) -> Record:
     """Runs a scenario to its end, with its own integrator and dt."""
     check_memory(scenario, every)
     if scenario.controller is not None:
         scenario.controller.function()  # refused before a run is made
     engine = engine_for(engine, scenario.t_max / scenario.dt)
-    with warnings_caught(), borrowed_place() as place:
-        return Record.of(*completed(scenario, every, engine, place, progress))
+    with warnings_caught(), borrowed_workspace() as workspace:
+        return Record.of(*completed(scenario, every, engine, workspace, progress))
 
 
 def check_memory(scenario: Scenario, every: int) -> None:

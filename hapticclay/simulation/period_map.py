@@ -13,11 +13,11 @@ import numpy as np
 from ..formulas import arm
 from ..kernel import layout, mover, path, records, scene
 from ..kernel.hardware import QUEUED
-from ..kernel.row import Buffers, Row
+from ..kernel.row import ROWS, Buffers, Row
 from ..model.sampled_controller import BUFFER
 from ..scene.scenario import Scenario
 from .engines import engine_for
-from .run import ROWS, with_checked
+from .run import with_checked
 
 KICK = 1e-6  # in SI units: the squares of angles are 1e-6 of it, their rounding is 1e-10 of it
 LINEAR = 1e-4  # share of the ends by which that of all kicks may miss the sum of those of each

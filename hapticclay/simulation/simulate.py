@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from ..arguments import checked
 from ..errors import integer
-from ..scene.plausible import warn_of
+from ..scene.plausible import warn_implausible
 from ..scene.scenario import Scenario
 from .one_run import run_once
 from .record import Record
@@ -46,7 +46,7 @@ def simulate(
             such as Ctrl-C are raised unchanged.
     """
     every = integer("every", every, 1, 1_000_000)
-    warn_of(scenario)
+    warn_implausible(scenario)
     if error is not None:
         from .asked_error import simulate_within  # imported only if an error is requested
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,8 +17,15 @@ from ..scene.scenario import Scenario
 from .batch import checked_scenarios, cores
 from .engines import engine_for
 from .monitor import Outcome
-from .stepwise import COLUMNS, MOST, MOST_GAIN, gain_of, started_with_operator
+from .run import COLUMNS
+from .stepwise import MOST, MOST_GAIN, Alone, gain_of, started_with_operator
 from .vectored import VectoredRuns
+
+
+def _shown(name: str, words: str) -> Any:
+    """A property: an array of the present samples."""
+    at = COLUMNS[name]
+    return property(lambda batch: batch.numbers()[:, at : at + 2].copy(), doc=words)
 
 
 @checked
@@ -49,6 +55,8 @@ class SimulationBatch:
             `simulate`.
     """
 
+    _noun = "batch"
+
     def __init__(
         self,
         scenarios: Sequence[Scenario],
@@ -64,20 +72,7 @@ class SimulationBatch:
         if not given:
             raise ParameterError("scenarios", scenarios, "must hold at least one Scenario")
         self._lock, self._closed = threading.Lock(), False
-        self._runs = VectoredRuns(given, engine, workers, monitored)
-
-    @contextlib.contextmanager
-    def _alone(self) -> Iterator[VectoredRuns]:
-        """The runs, for this thread alone."""
-        if not self._lock.acquire(blocking=False):
-            raise RuntimeError("another thread uses this batch: give each thread its own")
-        try:
-            if self._closed:
-                raise RuntimeError("the batch is closed")
-            with warnings_caught():
-                yield self._runs
-        finally:
-            self._lock.release()
+        self._run = VectoredRuns(given, engine, workers, monitored)
 
     def __enter__(self) -> SimulationBatch:
         return self
@@ -86,12 +81,12 @@ class SimulationBatch:
         self.close()
 
     def __len__(self) -> int:
-        return len(self._runs.runs)
+        return len(self._run.runs)
 
     def close(self) -> None:
         """Closes the batch; no further step can be made."""
         self._closed = True
-        self._runs.close()
+        self._run.close()
 
     def advance(
         self,
@@ -114,7 +109,7 @@ class SimulationBatch:
             RuntimeError: the batch is closed, or another thread uses it.
         """
         n = integer("n", n, 1, 1_000_000_000)
-        with self._alone() as runs:
+        with Alone(self) as runs, warnings_caught():
             chosen = np.ones(len(self), bool) if mask is None else self._mask("mask", mask)
             which = np.flatnonzero(chosen & ~runs.over)
             if force is not None:
@@ -141,7 +136,7 @@ class SimulationBatch:
             several = not isinstance(scenario, Scenario)
             given = list(_each("scenario", scenario, len(which), several))
             list(checked_scenarios(given, self._warned))
-        with self._alone() as all_:
+        with Alone(self) as all_:
             for k, s in zip(which, given, strict=True):
                 all_.restart(k, s)
 
@@ -171,9 +166,12 @@ class SimulationBatch:
         operators = _each("operator", operator, n, not one)
         gains = None if gain is None else self._gains(gain, n)
         factors = _each("b", b, n, np.ndim(b) == 1)
-        with self._alone() as all_:
+        with Alone(self) as all_:
             for k, hand, factor in zip(which, operators, factors, strict=True):
-                changes = self._changes(all_, k, hand)
+                changes: dict[str, Any] = {}
+                if hand is not None:
+                    started_with_operator(all_.given[k], hand)
+                    changes["operator"] = hand
                 if factor is not None:
                     factor, clay = number(f"b[{k}]", factor, 0.0, 1e6), all_.given[k].clay
                     changes["clay"] = clay and clay.scaled(factor)
@@ -182,24 +180,11 @@ class SimulationBatch:
             if gains is not None:
                 all_.set_gain(np.array(which, np.int64), gains)
 
-    @staticmethod
-    def _changes(runs: VectoredRuns, k: int, operator: Any) -> dict[str, Any]:
-        changes: dict[str, Any] = {}
-        if operator is not None:
-            started_with_operator(runs.given[k], operator)
-            changes["operator"] = operator
-        return changes
-
     # ---- results
-
-    def _shown(self, name: str) -> np.ndarray:
-        with self._alone() as runs:
-            at = COLUMNS[name]
-            return runs.show()[:, at : at + 2].copy()
 
     def numbers(self) -> np.ndarray:
         """The present samples as rows, see `Simulation.numbers`, shape (N, 18)."""
-        with self._alone() as runs:
+        with Alone(self) as runs, warnings_caught():
             return runs.show().copy()
 
     def torque_reached(self, n: int, k: int = 1) -> np.ndarray:
@@ -210,68 +195,33 @@ class SimulationBatch:
             k: how many reach it, at least 1; with 1 it is the largest torque.
         """
         n, k = integer("n", n, 1, 1_000_000_000), integer("k", k, 1, 1_000_000_000)
-        with self._alone() as runs:
+        with Alone(self) as runs:
             return runs.torque_reached(n, k)
 
     @property
     def t(self) -> np.ndarray:
         """Time of the present sample of each run [s], shape (N,)."""
-        return self._runs.times.copy()
+        return self._run.times.copy()
 
-    @property
-    def p(self) -> np.ndarray:
-        """Handle positions [m], shape (N, 2), as `Simulation.state`."""
-        return self._shown("p")
-
-    @property
-    def v(self) -> np.ndarray:
-        """Handle velocities [m/s], shape (N, 2)."""
-        return self._shown("v")
-
-    @property
-    def fh(self) -> np.ndarray:
-        """Forces of the operators on the handles [N], shape (N, 2)."""
-        return self._shown("fh")
-
-    @property
-    def fe(self) -> np.ndarray:
-        """Resisting forces of the clay [N], shape (N, 2)."""
-        return self._shown("fe")
-
-    @property
-    def b(self) -> np.ndarray:
-        """Damping of the clay [N.s/m], shape (N, 2)."""
-        return self._shown("b")
-
-    @property
-    def q(self) -> np.ndarray:
-        """Joint angles [rad], shape (N, 2)."""
-        return self._shown("q")
-
-    @property
-    def qd(self) -> np.ndarray:
-        """Joint rates [rad/s], shape (N, 2)."""
-        return self._shown("qd")
-
-    @property
-    def tau(self) -> np.ndarray:
-        """Motor torques [N.m], shape (N, 2)."""
-        return self._shown("tau")
-
-    @property
-    def delta(self) -> np.ndarray:
-        """Compensator outputs [m], shape (N, 2)."""
-        return self._shown("delta")
+    p = _shown("p", "Handle positions [m], shape (N, 2), as `Simulation.state`.")
+    v = _shown("v", "Handle velocities [m/s], shape (N, 2).")
+    fh = _shown("fh", "Forces of the operators on the handles [N], shape (N, 2).")
+    fe = _shown("fe", "Resisting forces of the clay [N], shape (N, 2).")
+    b = _shown("b", "Damping of the clay [N.s/m], shape (N, 2).")
+    q = _shown("q", "Joint angles [rad], shape (N, 2).")
+    qd = _shown("qd", "Joint rates [rad/s], shape (N, 2).")
+    tau = _shown("tau", "Motor torques [N.m], shape (N, 2).")
+    delta = _shown("delta", "Compensator outputs [m], shape (N, 2).")
 
     @property
     def ended(self) -> np.ndarray:
         """Which runs have ended, shape (N,)."""
-        return self._runs.over.copy()
+        return self._run.over.copy()
 
     @property
     def outcomes(self) -> list[Outcome | None]:
         """How each run ended; None while it is running."""
-        return self._runs.outcomes
+        return self._run.outcomes
 
     @property
     def diverging(self) -> np.ndarray:
@@ -279,13 +229,13 @@ class SimulationBatch:
 
         Evaluated every 20 ms of simulated time, as `Simulation.diverging`; the runs continue.
         """
-        with self._alone() as runs:
+        with Alone(self) as runs:
             return runs.look()
 
     @property
     def scenarios(self) -> list[Scenario]:
         """The scenarios, with the forces, gains, operators and clay now in effect."""
-        with self._alone() as runs:
+        with Alone(self) as runs:
             return [runs.scenario(k) for k in range(len(self))]
 
     # ---- arguments

@@ -14,21 +14,19 @@ import numpy as np
 from ..arguments import checked
 from ..errors import ParameterError, integer, number, numbers_of, pair
 from ..kernel.engine import warnings_caught
-from ..kernel.rows import ROW
 from ..model.hardware import JOINTS
 from ..model.operator import Operator
 from ..model.sampled_controller import Controller
-from ..scene.plausible import warn_of
+from ..scene.plausible import warn_implausible
 from ..scene.scenario import Scenario
 from . import record
 from .engines import engine_for
 from .monitor import Outcome
-from .run import Place, Run, Snapshot
+from .run import COLUMNS, Run, Snapshot, Workspace
 
 MOST = 1e6  # largest force [N] and torque [N.m] that may be given
 MOST_GAIN = 1e6  # largest K of a scenario [1/kg]
 LOOK = 0.02  # [s] of simulated time between two checks for divergence
-COLUMNS = {"q": 0, "p": 2, "v": 4, "fh": 6, "tau": 8, "delta": 10, "b": 12, "qd": 14, "fe": ROW}
 
 
 class Sample(NamedTuple):
@@ -91,6 +89,8 @@ class Simulation:
         ParameterError: scenario is of another type, or refused as by `simulate`.
     """
 
+    _noun = "simulation"
+
     def __init__(
         self,
         scenario: Scenario,
@@ -103,7 +103,7 @@ class Simulation:
             bound = "must be a Scenario, as constant_cut() returns"
             raise ParameterError("scenario", scenario, bound)
         self._engine, self._maker = engine, engine_for(engine, scenario.t_max / scenario.dt)
-        self._lock, self._place = threading.Lock(), Place()
+        self._lock, self._workspace = threading.Lock(), Workspace()
         self._closed, self._warned, self._recorded = False, (), recorded
         self._monitored = monitored
         self._begin(scenario)
@@ -111,10 +111,10 @@ class Simulation:
     def _begin(self, scenario: Scenario) -> None:
         place = scenario.clay, scenario.origin, scenario.arm, scenario.operators
         if place != self._warned:  # warn of clay out of reach and the like once
-            warn_of(scenario)
+            warn_implausible(scenario)
             self._warned = place
-        kept = self._kept()
-        self._run = Run(scenario, 1, self._maker, self._place, watched=True, **kept)
+        kept = self._kept() | {"keep_for_monitor": True}
+        self._run = Run(scenario, 1, self._maker, self._workspace, **kept)
         self._given, self._wall = scenario, 0.0
         self._torque: tuple[float, float] | None = None
         self._forget()
@@ -128,10 +128,6 @@ class Simulation:
         self._record: record.Record | None = None
         self._looked, self._diverging = -math.inf, False
 
-    def _alone(self) -> _Alone:
-        """The run, for this thread alone."""
-        return _Alone(self)
-
     def __enter__(self) -> Simulation:
         return self
 
@@ -139,7 +135,7 @@ class Simulation:
         self.close()
 
     def __getstate__(self) -> dict[str, Any]:
-        with self._alone() as run:
+        with Alone(self) as run:
             names = "_engine", "_torque", "_wall", "_given"
             found = {x: getattr(self, x) for x in names}
             return found | {"kept": self._kept(), "snapshot": run.snapshot()}
@@ -153,7 +149,7 @@ class Simulation:
 
     def close(self) -> None:
         """Closes the simulation; no further step can be made."""
-        if not self._closed and self._recorded and (self._run.filled or self._run.looked):
+        if not self._closed and self._recorded and (self._run.filled or self._run.judged):
             self.record()
         self._closed = True
 
@@ -198,7 +194,7 @@ class Simulation:
         if self._run.outcome is not None and self._recorded:
             x = self.state
             return [float(a) for name in COLUMNS for a in getattr(x, name)]
-        with self._alone() as run:
+        with Alone(self) as run:
             return run.numbers_ahead()
 
     def torque_reached(self, n: int, k: int = 1) -> list[float]:
@@ -211,12 +207,12 @@ class Simulation:
             k: how many reach it, at least 1; with 1 it is the largest torque.
         """
         n, k = integer("n", n, 1, 1_000_000_000), integer("k", k, 1, 1_000_000_000)
-        with self._alone() as run:
-            return run.torque_reached(n, k)
+        with Alone(self) as run:
+            return run.torque_reached(n, k).tolist()
 
     def handle(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Place of the handle [m], and its velocity half a step ago [m/s]; cheaper than `state`."""
-        with self._alone() as run:
+        with Alone(self) as run:
             p, before = run.position(), run.position(-run.scenario.dt)
             vx, vy = ((a - b) / run.scenario.dt for a, b in zip(p, before, strict=True))
         return p, (vx, vy)
@@ -227,7 +223,7 @@ class Simulation:
 
         It is evaluated every 20 ms of simulated time. It is not a verdict: the run continues.
         """
-        with self._alone() as run:
+        with Alone(self) as run:
             if run.outcome is None and run.t >= self._looked + LOOK:
                 self._looked, self._diverging = run.t, run.is_diverging()
             return self._diverging or run.watch.onset is not None
@@ -272,7 +268,7 @@ class Simulation:
             RuntimeError: as by `step`.
         """
         n = integer("n", n, 1, 1_000_000_000)
-        with self._alone() as run:
+        with Alone(self) as run:
             if run.outcome is not None:
                 return
             if force is not None:
@@ -284,7 +280,7 @@ class Simulation:
             self._state, begin = None, time.perf_counter()
             goal = run.i + n
             with warnings_caught():
-                if not run.hop(n):
+                if not run.advance_unprepared(n):
                     run.pause = goal
                     run.go(None)
             self._wall += time.perf_counter() - begin
@@ -295,12 +291,12 @@ class Simulation:
         Args:
             scenario: what to run; None for the same.
         """
-        with self._alone():
+        with Alone(self):
             self._begin(scenario or self._given)
 
     def snapshot(self) -> Snapshot:
         """The run as it is now, to `restore`; it can be pickled."""
-        with self._alone() as run:
+        with Alone(self) as run:
             return run.snapshot()
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -309,7 +305,7 @@ class Simulation:
         Args:
             snapshot: of this simulation, or of another one of the same scenario.
         """
-        with self._alone() as run:
+        with Alone(self) as run:
             run.return_to(snapshot)
             self._forget()
 
@@ -331,7 +327,7 @@ class Simulation:
         Raises:
             ParameterError: a value is out of its bounds, or an operator would be added or removed.
         """
-        with self._alone() as run:
+        with Alone(self) as run:
             gain = None if gain is None else gain_of(gain)
             changes: dict[str, Any] = {}
             if operator is not None:
@@ -358,9 +354,9 @@ class Simulation:
             raise RuntimeError("no record is kept: make the simulation with recorded=True")
         if self._record is not None:
             return self._record
-        with self._alone() as run:
+        with Alone(self) as run:
             if run.outcome is None:
-                if not (run.filled or run.looked):
+                if not (run.filled or run.judged):
                     raise RuntimeError("no step has been made")
                 run.interrupt()
             self._record = record.Record.of(run, self._wall)
@@ -383,27 +379,26 @@ class Simulation:
         self._run.take_over(Controller(lambda *measured: (self._torque, ())))
 
 
-class _Alone:
-    """Access of one thread to a run, for `with`; a generator would cost the time of a step.
+class Alone:
+    """Access of one thread to what an owner runs, for `with`; a generator would take a step's time.
 
-    Args:
-        sim: the simulation.
+    The owner has a `_lock`, its `_run`, whether it is `_closed`, and a `_noun` for errors.
     """
 
-    def __init__(self, sim: Simulation):
-        self.sim = sim
+    def __init__(self, owner: Any):
+        self.owner = owner
 
-    def __enter__(self) -> Run:
-        sim = self.sim
-        if not sim._lock.acquire(blocking=False):
-            raise RuntimeError("another thread uses this simulation: give each thread its own")
-        if sim._closed:
-            sim._lock.release()
-            raise RuntimeError("the simulation is closed")
-        return sim._run
+    def __enter__(self) -> Any:
+        owner = self.owner
+        if not owner._lock.acquire(blocking=False):
+            raise RuntimeError(f"another thread uses this {owner._noun}: give each thread its own")
+        if owner._closed:
+            owner._lock.release()
+            raise RuntimeError(f"the {owner._noun} is closed")
+        return owner._run
 
     def __exit__(self, *error: object) -> None:
-        self.sim._lock.release()
+        self.owner._lock.release()
 
 
 def sample_of(t: float, row: np.ndarray) -> Sample:

@@ -14,20 +14,14 @@ from ..kernel.row import CHUNK, SHOWN, one
 from ..kernel.rows import ROW
 from ..scene.scenario import Scenario
 from .monitor import Outcome
-from .run import Place, Run, torque_reached
+from .run import Run, Workspace
 
 PART = 200_000  # steps of a thread between two checks of the runs, and for Ctrl-C: half a second
 LOOK = 0.02  # [s] of simulated time between two checks for divergence
 
 
 class VectoredRuns:
-    """Runs without a record, and their rows.
-
-    Args:
-        scenarios: what each runs.
-        engine: who makes the steps, "python" or "native".
-        workers: threads that make compiled steps.
-        monitored: whether stability is judged.
+    """Runs without a record, and their rows; compiled steps are made by `workers` threads.
 
     Attributes:
         runs: the runs.
@@ -42,7 +36,7 @@ class VectoredRuns:
         self.given = list(scenarios)
         self.force, self.gain = np.zeros((2, n, 2))
         self.looked_at, self.diverging = np.full(n, -np.inf), np.zeros(n, bool)
-        self.shown, self.is_shown, self.is_asked = np.zeros((n, SHOWN)), False, False
+        self.shown, self.is_shown = np.zeros((n, SHOWN)), False
         self.times, self.rooms = np.zeros(n), np.zeros(n, np.int64)
         self.movers = [mover.Movers() for _ in range(workers)]
         self.pool: ThreadPoolExecutor | None = None
@@ -52,10 +46,7 @@ class VectoredRuns:
         self.spares = [one(records.State) for _ in range(workers * native)]
         self.engines = np.zeros((workers, n), np.int64)  # addresses, by thread and run
         self.kept: list[list[mover.Mover]] = [[] for _ in scenarios]  # what lies there
-        places = [Place(self.movers[0]) for _ in scenarios]
-        self.runs = [
-            self._new(k, s, x) for k, (s, x) in enumerate(zip(scenarios, places, strict=True))
-        ]
+        self.runs = [self._new(k, s, Workspace(self.movers[0])) for k, s in enumerate(scenarios)]
         for k in range(n):
             self._begin(k)
 
@@ -66,10 +57,10 @@ class VectoredRuns:
 
     # ---- one run
 
-    def _new(self, k: int, s: Scenario, place: Place) -> Run:
+    def _new(self, k: int, s: Scenario, workspace: Workspace) -> Run:
         at = (self.models[k : k + 1], self.states[k : k + 1]) if len(self.models) else None
-        kept = dict(watched=True, recorded=False, monitored=self.monitored, at=at)
-        return Run(s, 1, self.engine, place, **kept)
+        kept = dict(keep_for_monitor=True, recorded=False, monitored=self.monitored)
+        return Run(s, 1, self.engine, workspace, at, **kept)
 
     def _begin(self, k: int) -> None:
         """Notes that a run is at its start."""
@@ -107,7 +98,7 @@ class VectoredRuns:
             run.push_evenly((0.0, *run.scenario.steady_force, 0.0, 0.0))
         else:
             self.given[k] = scenario or self.given[k]
-            self.runs[k] = self._new(k, self.given[k], run.place)
+            self.runs[k] = self._new(k, self.given[k], run.workspace)
         self._begin(k)
 
     def change(self, k: int, change: Callable[[Scenario], Scenario]) -> None:
@@ -159,12 +150,17 @@ class VectoredRuns:
         if not len(which):
             return
         self.is_shown = False
-        alone = np.array([self.runs[k]._prepares for k in which.tolist()], bool)
-        for k in which[alone].tolist() if self.engine == "native" else which.tolist():
+        alone, together = self._split(which)
+        for k in alone.tolist():
             self._one(k, n)
-        if self.engine == "native":
-            self._draw(which[~alone], n)
-            self._together(which[~alone], n)
+        self._draw(together, n)
+        self._together(together, n)
+
+    def _split(self, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Runs that advance one by one, in Python or with something to prepare, and the others."""
+        native = self.engine == "native"
+        alone = np.array([not native or self.runs[k].prepares for k in which.tolist()], bool)
+        return which[alone], which[~alone]
 
     def _draw(self, which: np.ndarray, n: int) -> None:
         """Draws what the hardware of runs leaves to chance in the next n steps."""
@@ -172,7 +168,7 @@ class VectoredRuns:
             self.runs[k].draw(n)
 
     def _one(self, k: int, n: int) -> None:
-        """Advances a run for which something is to be prepared, or in Python."""
+        """Advances a run by itself."""
         run = self.runs[k]
         run.pause = run.i + n
         run.go(None)
@@ -182,6 +178,8 @@ class VectoredRuns:
 
     def _together(self, which: np.ndarray, n: int) -> None:
         """Advances rows in one call of each thread."""
+        if not len(which):
+            return
         states, left = self.states, which
         goal = states["i"] + n
         while len(left):
@@ -223,7 +221,7 @@ class VectoredRuns:
     def _settle(self, k: int) -> None:
         """Judges the rows of a run: they are full, or it is over."""
         run = self._sync(k)
-        run._count()
+        run.count_steps()
         run.note_end()
         run.flush()
         if run.outcome is not None:
@@ -231,26 +229,21 @@ class VectoredRuns:
 
     def _end(self, k: int, run: Run) -> None:
         """Stores the last sample of a run that has ended."""
-        self.over[k] = True
-        if run.last_row is None:
-            self.times[k], self.shown[k] = np.nan, np.nan
-            return
-        self.times[k], self.shown[k, :ROW] = run.sample_time(), run.last_row
-        self.shown[k, ROW:] = run.last_force()
+        self.over[k], self.shown[k] = True, run.ending()
+        self.times[k] = np.nan if run.last is None else run.sample_time()
 
     # ---- results
 
     def show(self) -> np.ndarray:
         """The present samples, shape (n, SHOWN)."""
         if not self.is_shown:
-            live = np.flatnonzero(~self.over)
-            alone = np.array([self.runs[k]._prepares for k in live.tolist()], bool)
-            for k in live[alone].tolist() if self.engine == "native" else live.tolist():
+            alone, together = self._split(np.flatnonzero(~self.over))
+            for k in alone.tolist():
                 self.shown[k] = self.runs[k].ahead()
-            if self.engine == "native" and not alone.all():
-                self._draw(live[~alone], 1)
-                self._call(self._peek, live[~alone])
-                self._put_force(live[~alone])
+            if len(together):
+                self._draw(together, 1)
+                self._call(self._peek, together)
+                self._put_force(together)
             self.is_shown = True
         return self.shown
 
@@ -261,12 +254,11 @@ class VectoredRuns:
         at = which[plain & (m["rotated"] == 0)]
         shown[at, ROW:] = shown[at, 12:14] * shown[at, 4:6]
         for k in which[plain & (m["rotated"] == 1)].tolist():
-            self.runs[k]._with_force(shown[k])
+            self.runs[k].put_force(shown[k])
 
     def torque_reached(self, n: int, k: int) -> np.ndarray:
-        """As `run.torque_reached`, in the last rows of each run, shape (runs, 2)."""
-        pairs = [(run.place.buffers.rows, run.filled) for run in self.runs]
-        return np.array([torque_reached(rows[max(i - n, 0) : i], k) for rows, i in pairs])
+        """As `Run.torque_reached`, shape (runs, 2)."""
+        return np.array([run.torque_reached(n, k) for run in self.runs])
 
     def look(self) -> np.ndarray:
         """Whether the motion of each run is unstable by now, evaluated again after LOOK."""

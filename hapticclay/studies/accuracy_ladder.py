@@ -15,8 +15,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..display import fields_of, table_of
 from ..errors import ParameterError
-from ..files import versions
+from ..results import Result, figure_of
 from ..scene.scenario import Scenario
 from ..simulation.asked_error import METHODS, choices
 from ..simulation.engines import engine_for
@@ -24,7 +25,6 @@ from ..simulation.record import Record
 from ..simulation.simulate import simulate
 from ..simulation.step_comparison import ROUNDING_LEFT, Trace, compare_positions, compare_times
 
-LADDER_SCHEMA = "hapticclay-accuracy-1"
 TOP = 0.02  # [s] longest step; the others are halves of halves of it
 RUNGS, QUICK_RUNGS = 9, 6  # steps of the fast integrator, down to 0.08 ms, 0.6 ms
 ACCURATE_FROM = 2  # halvings at which the accurate integrator begins: 5 ms
@@ -37,6 +37,10 @@ BRIEF, REPEATS = 0.3, 3  # [s] runs that take less are timed so often; the media
 CLEAR = 3.0  # an error so many times that of the reference is one of the setting
 ASKED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)  # [s], [m] cheapest settings are named for
 SAMPLED = "sampled, Ts = dt"
+CHEAPEST = {  # tables of the fastest settings, by unit of the error
+    "s": "Cheapest setting by error in the times of the border crossings",
+    "m": "Cheapest setting by error in the position",
+}
 
 
 @dataclass(frozen=True)
@@ -65,8 +69,8 @@ class Setting:
         return self.time if unit == "s" else self.position
 
 
-@dataclass(frozen=True)
-class Ladder:
+@dataclass(frozen=True, repr=False)
+class Ladder(Result):
     """Errors of one scenario at many settings.
 
     Attributes:
@@ -78,6 +82,19 @@ class Ladder:
         simulated: simulated time of the reference [s].
         notes: remarks for the reader.
     """
+
+    drawn_by = "hapticclay.views.accuracy_plots:accuracy_plot"
+    written_as = "accuracy"
+    printed = dict.fromkeys(CHEAPEST.values(), ())
+    formats = {
+        "requested error [s]": ".0e",
+        "requested error [m]": ".0e",
+        "error of border times [s]": ".1e",
+        "error of position [m]": ".1e",
+        "dt [s]": ".3g",
+        "run time [s]": ".2g",
+    }
+    summary_units = {"dt": "s", "time": "s", "position": "m", "wall": "s", "simulated_time": "s"}
 
     scenario: Scenario
     engine: str
@@ -91,62 +108,75 @@ class Ladder:
         """Units in which there are errors, of "s" and "m"."""
         return [u for u in ("s", "m") if any(x.error(u) is not None for x in self.settings)]
 
+    def least(self, unit: str) -> float:
+        """The least error that clearly exceeds that of the reference."""
+        return CLEAR * (self.left[unit] or 0.0)
+
     def shown(self, setting: Setting, unit: str) -> float | None:
         """The error of a setting if it clearly exceeds that of the reference; else None."""
-        error, left = setting.error(unit), self.left[unit]
-        return error if error and error >= CLEAR * (left or 0.0) else None
+        error = setting.error(unit)
+        return error if error and error >= self.least(unit) else None
 
     def cheapest(self, unit: str) -> dict[float, Setting]:
         """The fastest setting by requested error; sampled control replaces no continuous one."""
-        out = {}
-        for asked in ASKED:
-            # bound for an error that does not clearly exceed that of the reference
-            least = CLEAR * (self.left[unit] or 0.0)
-            fit = [
-                x
-                for x in self.settings
-                if x.series != SAMPLED
-                and x.wall is not None
-                and (e := x.error(unit)) is not None
-                and max(e, least) <= asked
-            ]
-            if fit:
-                out[asked] = min(fit, key=lambda x: x.wall or math.inf)
-        return out
+        bounds = {
+            x: max(error, self.least(unit))
+            for x in self.settings
+            if x.series != SAMPLED and x.wall is not None and (error := x.error(unit)) is not None
+        }
+        fit = {asked: [x for x, e in bounds.items() if e <= asked] for asked in ASKED}
+        return {e: min(xs, key=lambda x: x.wall or math.inf) for e, xs in fit.items() if xs}
 
     def tables(self) -> dict[str, dict[str, list]]:
-        """Returns what a figure of the ladder shows: errors and run time of each setting."""
-        settings = {
-            "method": [x.series for x in self.settings],
-            "dt [s]": [x.dt for x in self.settings],
-            "error of border times [s]": [x.time for x in self.settings],
-            "error of position [m]": [x.position for x in self.settings],
-            "run time [s]": [x.wall for x in self.settings],
-            "status": [x.status for x in self.settings],
-        }
-        return {"settings": settings}
+        """Errors and run time of each setting; the fastest setting for each requested error."""
+        head = (
+            "method",
+            "dt [s]",
+            "error of border times [s]",
+            "error of position [m]",
+            "run time [s]",
+            "status",
+        )
+        tables = {"settings": table_of(head, self.settings)}
+        for u in self.units():
+            head = f"requested error [{u}]", "integrator", "dt [s]", f"error [{u}]", "run time [s]"
+            tables[CHEAPEST[u]] = table_of(
+                head,
+                [
+                    (asked, x.series, x.dt, self.error_text(x, u), x.wall)
+                    for asked, x in self.cheapest(u).items()
+                ],
+            )
+        return tables
 
-    def summary(self) -> dict[str, Any]:
-        """Everything, ready for JSON."""
-        return {
-            "schema": LADDER_SCHEMA,
-            "scenario": dataclasses.asdict(self.scenario),
-            "engine": self.engine,
-            "reference": self.reference,
-            "reference_error": self.left,
-            "simulated_time": self.simulated,
-            "settings": [dataclasses.asdict(x) for x in self.settings],
-            "cheapest": {
-                unit: [
-                    {"asked": asked, **dataclasses.asdict(x)}
-                    for asked, x in self.cheapest(unit).items()
-                ]
-                for unit in self.units()
-            },
-            "notes": list(self.notes),
-            "units": {"dt": "s", "time": "s", "position": "m", "wall": "s", "simulated_time": "s"},
-            "versions": versions(),
+    def error_text(self, setting: Setting, unit: str) -> str:
+        """The error of a setting; "<" where it does not clearly exceed that of the reference."""
+        error = self.shown(setting, unit)
+        return f"{error:.1e}" if error else f"< {self.least(unit):.1e}"
+
+    def remarks(self) -> list[str]:
+        """The reference, its error, and notes."""
+        left = [f"{e:.1e} {u}" for u, e in self.left.items() if e and u in self.units()]
+        within = f", good to {' and '.join(left)}" if left else ""
+        return [f"Errors are against the {self.reference}{within}.", *self.notes]
+
+    def headline(self) -> str:
+        """Settings and their reference, in one line."""
+        return f"{len(self.settings)} settings of {self.scenario.name}: {self.remarks()[0]}"
+
+    def figures(self) -> dict[str, Any]:
+        """Error over run time."""
+        shown = {"settings": self.tables()["settings"]}
+        return {"accuracy": figure_of(self, tables=shown)}
+
+    def contents(self) -> dict[str, Any]:
+        """Everything."""
+        cheapest = {
+            unit: [{"asked": e, **fields_of(x)} for e, x in self.cheapest(unit).items()]
+            for unit in self.units()
         }
+        more = {"reference_error": self.left, "simulated_time": self.simulated}
+        return fields_of(self, "left", "simulated") | more | {"cheapest": cheapest}
 
 
 def accuracy_ladder(
@@ -167,20 +197,13 @@ def accuracy_ladder(
     if choices(scenario, SHARP, "s")[0][0] == "accurate":
         best = dataclasses.replace(scenario, dt=FINER * finest / 2.0, integrator="accurate")
     timed = 1 if quick else REPEATS
-    exact: Reference | None = None
-    settings: list[Setting] = []
-    for series, s in progress([("reference", best), *rungs]):
-        if exact is None:
-            exact = _reference(s, grid)
-        else:
-            settings.append(_setting(series, s, exact, grid, timed))
-    assert exact is not None
-    how = f"{best.integrator} integrator at dt = {best.dt:.3g} s"
+    jobs = iter(progress([("reference", best), *rungs]))
+    exact = _reference(next(jobs)[1], grid)
     return Ladder(
         scenario,
         engine_for("auto"),
-        tuple(settings),
-        how,
+        tuple(_setting(series, s, exact, grid, timed) for series, s in jobs),
+        f"{best.integrator} integrator at dt = {best.dt:.3g} s",
         exact.left,
         float(exact.record.t[-1]),
         exact.notes,

@@ -12,7 +12,6 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..errors import Bound, ParameterError, number
-from ..formulas import arm as arm_law
 from ..formulas.constants import B_MAX
 from ..model.arm import Arm
 from ..model.cells import Profile
@@ -263,7 +262,7 @@ def pose_matrix(loop: PushedLoop) -> np.ndarray:
     Without shaping W = Lambda^-1 of that pose replaces the gains of Sh and couples the axes
     (docs/equations.md, section 3).
     """
-    i, links = AXES.index(loop.axis), loop.arm.links
+    i = AXES.index(loop.axis)
     other = Loop(
         axis=AXES[1 - i],
         b=loop.b,
@@ -276,9 +275,7 @@ def pose_matrix(loop: PushedLoop) -> np.ndarray:
     )
     loops = (loop, other) if i == 0 else (other, loop)
     x, y = loop._nominal
-    q1, q2 = arm_law.inverse_kinematics(x + loop.pose[0], y + loop.pose[1], links)
-    xx, xy, yy = arm_law.mobility(arm_law.jacobian(q1, q2, links), links)
-    W = np.array([[xx, xy], [xy, yy]])
+    W = linear_loop.mobility_at(loop.arm, x + loop.pose[0], y + loop.pose[1])
     if loop.Ts is None:
         return linear_loop.state_space(*loops, mobility=None if loop.inertia_shaping else W)[0]
     less, beta, gamma = linear_loop.sampled_differences(*loops, pose=(W, loop.inertia_shaping))

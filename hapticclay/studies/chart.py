@@ -42,6 +42,8 @@ class Chart:
         log: axes that are logarithmic.
     """
 
+    drawn_by = "hapticclay.views.chart_plots:chart_plot"
+
     name: str
     title: str
     caption: str

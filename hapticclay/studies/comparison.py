@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import pkgutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -95,6 +96,8 @@ class Comparison(Result):
     """
 
     drawn_by = "hapticclay.views.compare_plots:main_overlay"
+    written_as = "compare"
+    printed = {"side by side": ()}
 
     files: tuple[Compared, ...]
 
@@ -115,7 +118,25 @@ class Comparison(Result):
         """Key numbers of each file."""
         names = dict.fromkeys(n for x in self.files for n in x.numbers)
         columns = {n: [x.numbers.get(n, math.nan) for x in self.files] for n in names}
-        return {"numbers": {"file": [x.name for x in self.files], **columns}}
+        told = {n: column for n, column in columns.items() if not all(map(math.isnan, column))}
+        side = {"": [*told, "outcome of its run"]}
+        for i, x in enumerate(self.files):
+            side[x.name] = [*(column[i] for column in told.values()), x.record.status]
+        numbers = {"file": [x.name for x in self.files], **columns}
+        return {"numbers": numbers, "side by side": side}
+
+    def remarks(self) -> list[str]:
+        """Nothing: the table shows all."""
+        return []
+
+    def figures(self) -> dict[str, Any]:
+        """Overlays of all files, as far as they apply."""
+        drawn = pkgutil.resolve_name("hapticclay.views.compare_plots:compare_figures")(self)
+        return {name: figure for name, (_, figure) in drawn.items()}
+
+    def contents(self) -> dict[str, Any]:
+        """Key numbers, and the fields that differ."""
+        return {"files": {x.name: x.numbers for x in self}, "fields": differing_fields(self)}
 
 
 @checked

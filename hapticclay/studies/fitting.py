@@ -19,11 +19,11 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from ..arguments import checked, named
+from ..display import fields_of, table_of
 from ..errors import Bound, ParameterError, choice
-from ..files import versions
 from ..model.constants import AXES
 from ..model.flow import N_MAX, N_MIN, Flow
-from ..results import Result
+from ..results import Result, figure_of
 from ..simulation.record import Record
 from .flow_models import (
     FLOW_LAWS,
@@ -32,13 +32,13 @@ from .flow_models import (
     PARSIMONY,
     FlowParameter,
     best_fit,
-    far_forces,
     first_guesses,
-    of_theta,
+    outlying_forces,
     parameter_intervals,
+    parameters_of,
     refit_nested,
     student_quantile,
-    to_theta,
+    theta_of,
 )
 from .measurement import Measurement
 from .outliers import LOST, Cleaned, cleaned, robust_deviation, sentence, times
@@ -48,12 +48,12 @@ from .sliding import (
     ROUNDED,
     UNDITHERED,
     Sliding,
-    check_met,
-    of_known_speed,
-    of_positions,
-    of_record,
+    check_one_law,
+    driving_forces,
     quantum,
-    wrong_way,
+    recorded_motion,
+    sliding_along_positions,
+    sliding_at_known_speed,
 )
 from .trajectory import (
     Joint,
@@ -61,7 +61,6 @@ from .trajectory import (
     correlation_time,
 )
 
-FIT_SCHEMA = "hapticclay-fit-1"
 LEAST_INDEPENDENT = 10  # ... of which so many are independent
 FEW_SLIDING = 300
 NARROW = 3.0  # ratio of speeds below which n is hardly identifiable
@@ -121,6 +120,19 @@ class Fitted(Result):
     """
 
     drawn_by = "hapticclay.views.fit_plots:fit_plot"
+    written_as = "fit"
+    printed = {"candidates": ()}
+    formats = {"AICc": ".1f", "weight": ".3f", "left [N]": ".3g", "fitted": ".6g"}
+    summary_units = {
+        "parameters": FLOW_UNITS,
+        "speed": "m/s",
+        "force_noise": "N",
+        "position_noise": "m",
+        "spacing": "s",
+        "correlation": "samples",
+        "position_outliers": "s",
+        "force_outliers": "s",
+    }
 
     law: str
     parameters: tuple[FlowParameter, ...]
@@ -165,65 +177,63 @@ class Fitted(Result):
         Args:
             v: velocities [m/s], (m,), none of them 0.
         """
-        law, theta = FLOW_LAWS[self.law], to_theta([p.value for p in self.parameters], self.law)
+        law, theta = FLOW_LAWS[self.law], theta_of([p.value for p in self.parameters], self.law)
         J = law.slopes(theta, np.abs(np.asarray(v, dtype=float)))[2]
         quantile = student_quantile(self.level, len(self.v) / self.correlation - len(theta))
         return quantile * np.sqrt(np.einsum("ij,jk,ik->i", J, self.covariance, J))
 
     def tables(self) -> dict[str, dict[str, Any]]:
-        """Returns the numbers of the figure: samples, and the law over the velocity."""
-        law = [self.flow.force(v) for v in self.v]
+        """The numbers of the figure, and the candidates: the chosen one, then the most likely."""
+        rows = []
+        for c in sorted(self.candidates, key=lambda c: (c.law != self.law, c.aicc)):
+            first = [c.law, c.aicc, c.weight, c.deviation]
+            for p in self.parameters if c.law == self.law else c.parameters:
+                name = f"{p.name} [{p.unit}]" if p.unit else p.name
+                span = "" if math.isnan(p.low) else f"{p.low:.6g} to {p.high:.6g}"
+                rows.append([*first, name, p.value, span])
+                first = [None] * len(first)
+        interval = f"{100.0 * self.level:g} % interval"
+        head = ("law", "AICc", "weight", "left [N]", "parameter", "fitted", interval)
         return {
-            "parameters": {
-                "name": [p.name for p in self.parameters],
-                "unit": [p.unit for p in self.parameters],
-                "value": [p.value for p in self.parameters],
-                "low": [p.low for p in self.parameters],
-                "high": [p.high for p in self.parameters],
-            },
+            "parameters": table_of(("name", "unit", "value", "low", "high"), self.parameters),
             "samples": {
                 "time [s]": self.t,
                 "velocity [m/s]": self.v,
                 "force [N]": self.f,
-                "force of the law [N]": law,
+                "force of the law [N]": [self.flow.force(v) for v in self.v],
                 f"half the {100 * self.level:g} % band [N]": self.band(self.v),
                 "residual [N]": self.residuals,
             },
+            "candidates": table_of(head, rows),
         }
 
-    def summary(self) -> dict[str, Any]:
-        """The result without the samples, ready for JSON."""
+    def remarks(self) -> list[str]:
+        """Sliding samples, noise and warnings."""
+        low, high = (1e3 * x for x in self.speed)
+        line = (
+            f"{self.law}: {len(self.v)} of {self.samples} samples slide, at {low:.3g} to "
+            f"{high:.3g} mm/s; noise {self.force_noise:.3g} N"
+        )
+        if self.position_noise:
+            line += f", {1e6 * self.position_noise:.3g} um"
+        return [line, *(f"warning: {x}" for x in self.warnings)]
+
+    def figures(self) -> dict[str, Any]:
+        """The law and its samples."""
+        tables = self.tables()
+        shown = {name: tables[name] for name in ("samples", "parameters")}  # fit.csv: samples
+        return {"fit": figure_of(self, tables=shown)}
+
+    @property
+    def speed(self) -> tuple[float, float]:
+        """Least and largest speed of the sliding samples [m/s]."""
         speed = np.abs(self.v)
-        return {
-            "schema": FIT_SCHEMA,
-            "source": self.source,
-            "axis": self.axis,
-            "law": self.law,
-            "level": self.level,
-            "parameters": [dataclasses.asdict(p) for p in self.parameters],
-            "candidates": [dataclasses.asdict(c) for c in self.candidates],
-            "samples": self.samples,
-            "sliding": len(self.v),
-            "correlation": self.correlation,
-            "speed": [float(speed.min()), float(speed.max())],
-            "force_noise": self.force_noise,
-            "position_noise": self.position_noise,
-            "spacing": self.spacing,
-            "position_outliers": list(self.position_outliers),
-            "force_outliers": list(self.force_outliers),
-            "warnings": list(self.warnings),
-            "units": {
-                "parameters": FLOW_UNITS,
-                "speed": "m/s",
-                "force_noise": "N",
-                "position_noise": "m",
-                "spacing": "s",
-                "correlation": "samples",
-                "position_outliers": "s",
-                "force_outliers": "s",
-            },
-            "versions": versions(),
-        }
+        return float(speed.min()), float(speed.max())
+
+    def contents(self) -> dict[str, Any]:
+        """All but the sliding samples."""
+        data = fields_of(self, "t", "v", "f", "covariance")
+        return {**data, "sliding": len(self.v), "speed": self.speed}
 
 
 Level = Annotated[float, Bound(0.5, 0.999)]
@@ -271,7 +281,7 @@ def fit_flow(
             raise ParameterError("data", data, "must be a Measurement, a Record or its folder")
         source = "record" if isinstance(data, Record) else Path(data).name
         record = data if isinstance(data, Record) else Record.load(data)
-        axis, p, v, f, inside, met = of_record(record, axis)
+        axis, p, v, f, inside, met = recorded_motion(record, axis)
         t = record.t
     for name, span, x in (("time", time, t), ("place", place, p)):
         if span is not None:
@@ -284,7 +294,7 @@ def fit_flow(
         bound = f"must leave {LEAST_SLIDING} samples or more inside clay"
         raise ParameterError("data", f"{count} samples", bound)
     if met is not None:
-        check_met(met, inside)
+        check_one_law(met, inside)
     position = cleaned(p, quantum(p)) if v is None else None
     try:
         return _fitted(_Columns(t, position, v, f, inside), names, level, axis, source)
@@ -325,8 +335,8 @@ class _Columns(NamedTuple):
         """The sliding samples without the forces of a mask."""
         if self.place is None:
             assert self.v is not None
-            return of_known_speed(self.t, self.v, self.f, self.inside & ~out)
-        return of_positions(self.t, self.place, self.f, self.inside, out)
+            return sliding_at_known_speed(self.t, self.v, self.f, self.inside & ~out)
+        return sliding_along_positions(self.t, self.place, self.f, self.inside, out)
 
 
 class _Laws(NamedTuple):
@@ -347,7 +357,7 @@ def _without_outliers(data: _Columns) -> tuple[Sliding, np.ndarray]:
     out = np.zeros(len(data.t), dtype=bool)
     s = data.sliding(out)
     for _ in range(SCREENINGS):
-        some = far_forces(s)
+        some = outlying_forces(s)
         if not some.any():
             break
         out[s.at[some]] = True
@@ -449,7 +459,7 @@ def _left_out(r: Fitted, data: _Columns, out: np.ndarray) -> tuple[str, ...]:
         )
     if len(r.force_outliers):
         why = f"more than {OUTLYING:g} deviations from any law"
-        if n_wrong := np.count_nonzero(wrong_way(data.f, data.place, data.v)[out]):
+        if n_wrong := np.count_nonzero(driving_forces(data.f, data.place, data.v)[out]):
             why += (
                 f"; {n_wrong} of them drive the motion: wrong signs, or a delay between the columns"
             )
@@ -473,7 +483,7 @@ def _compared(
         a = found[law][0]
         parameters = tuple(
             FlowParameter(name, FLOW_UNITS[name], value)
-            for name, value in zip(FLOW_LAWS[law].names, of_theta(a.theta, law), strict=True)
+            for name, value in zip(FLOW_LAWS[law].names, parameters_of(a.theta, law), strict=True)
         )
         deviation = math.sqrt(a.sum / (len(a.v) - len(parameters)))
         weight = odds[law] / sum(odds.values())

@@ -54,13 +54,13 @@ class FlowParameter:
     high: float = math.nan
 
 
-def to_theta(values: Sequence[float], law: str) -> np.ndarray:
+def theta_of(values: Sequence[float], law: str) -> np.ndarray:
     """Converts parameters to the vector theta of `Flowing`."""
     pairs = zip(FLOW_LAWS[law].names, values, strict=True)
     return np.array([math.log(max(x, 1e-300)) if name == "K" else x for name, x in pairs])
 
 
-def of_theta(theta: np.ndarray, law: str) -> list[float]:
+def parameters_of(theta: np.ndarray, law: str) -> list[float]:
     """Converts the vector theta of `Flowing` to parameters of a law."""
     pairs = zip(FLOW_LAWS[law].names, theta.tolist(), strict=True)
     return [math.exp(min(x, 700.0)) if name == "K" else x for name, x in pairs]
@@ -83,7 +83,7 @@ def first_guesses(law: str, v: np.ndarray, f: np.ndarray) -> np.ndarray:
         if best is None or left < best[0]:
             best = left, [a[x] for x in names]
     assert best is not None
-    return to_theta(best[1], law)
+    return theta_of(best[1], law)
 
 
 def best_fit(joint: Joint, law: str, start: np.ndarray) -> tuple[Minimum, Minimum]:
@@ -98,7 +98,7 @@ def best_fit(joint: Joint, law: str, start: np.ndarray) -> tuple[Minimum, Minimu
     return found, free
 
 
-def far_forces(s: Sliding) -> np.ndarray:
+def outlying_forces(s: Sliding) -> np.ndarray:
     """Forces far from the law of most of them, (n,): spikes, wrong signs.
 
     The law is the richest, fitted to the speeds of the motion; the noise is that of the median.
@@ -154,7 +154,7 @@ def parameter_intervals(
 ) -> tuple[FlowParameter, ...]:
     """Profile intervals: where the profiled sum of squares rises by quantile^2 variance."""
     names, out = FLOW_LAWS[law].names, []
-    values = of_theta(best.theta, law)
+    values = parameters_of(best.theta, law)
     for j, (name, value) in enumerate(zip(names, values, strict=True)):
         ends = [_crossing(joint, law, free, j, side * quantile, variance) for side in (-1.0, 1.0)]
         if name == "K":

@@ -77,7 +77,7 @@ def _least_damped(v: np.ndarray, dt: float, slowest: float) -> float:
     z = np.linalg.eigvals(np.linalg.lstsq(u[:-1, :r], u[1:, :r])[0])
     z = z[np.abs(z) > 1e-6]
     weight = np.abs(np.linalg.lstsq(_motions(z, len(v)), v.astype(complex))[0])
-    rate, strong, swings = _judged(z, weight, dt, slowest)
+    rate, strong, swings = _mode_rates(z, weight, dt, slowest)
     return float(rate[swings].max()) if swings.any() else -math.inf
 
 
@@ -90,7 +90,7 @@ def _motions(z: np.ndarray, samples: int) -> np.ndarray:
     return np.exp(k * np.log(z.astype(complex))[..., None, :])
 
 
-def _judged(
+def _mode_rates(
     z: np.ndarray, weight: np.ndarray, dt: float, slowest: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Growth rates of modes [1/s]; which exceed rounding; which of these oscillate or diverge.
@@ -116,22 +116,24 @@ def short_growth(v: np.ndarray, dt: float) -> np.ndarray:
     rows = v.shape[1] // 2
     hankel = np.lib.stride_tricks.sliding_window_view(v, rows, axis=1).transpose(0, 2, 1)
     u, s, _ = np.linalg.svd(hankel, full_matrices=False)
-    (a, miss), (b, less) = (_least_damped_of(v, dt, u, s, share) for share in RANKS)
+    (a, residual_a), (b, residual_b) = (
+        _least_damped_of_many(v, dt, u, s, share) for share in RANKS
+    )
     with np.errstate(invalid="ignore"):
         least = np.minimum(np.abs(a), np.abs(b))
         agree = (np.sign(a) == np.sign(b)) & (np.abs(a - b) < AGREEMENT * least)
-        told = agree & (least > LEAST_RATE) & (np.minimum(miss, less) < LINEAR_SHARE)
-    out[good[told]] = b[told]
+        decided = agree & (least > LEAST_RATE) & (np.minimum(residual_a, residual_b) < LINEAR_SHARE)
+    out[good[decided]] = b[decided]
     return out
 
 
-def _least_damped_of(
+def _least_damped_of_many(
     v: np.ndarray, dt: float, u: np.ndarray, s: np.ndarray, share: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Growth rate of each motion [1/s], NaN for none, and the largest residual of its samples."""
     n, rows = v.shape[1], u.shape[1]
     ranks = np.clip((s > share * s[:, :1]).sum(axis=1), 1, rows // 2)
-    rate, miss = np.full(len(v), np.nan), np.full(len(v), np.inf)
+    rate, residual = np.full(len(v), np.nan), np.full(len(v), np.inf)
     for r in np.unique(ranks):
         j = np.flatnonzero(ranks == r)
         U = u[j, :, :r]
@@ -154,13 +156,13 @@ def _least_damped_of(
         if not len(j):
             continue
         weight = np.linalg.solve(R, q.conj().transpose(0, 2, 1) @ v[j].astype(complex)[..., None])
-        miss[j] = np.abs((powers @ weight)[..., 0] - v[j]).max(axis=1)
-        growth, strong, swings = _judged(z, np.abs(weight[..., 0]), dt, SLOWEST_MODE)
+        residual[j] = np.abs((powers @ weight)[..., 0] - v[j]).max(axis=1)
+        growth, strong, swings = _mode_rates(z, np.abs(weight[..., 0]), dt, SLOWEST_MODE)
         # A slowly growing mode aliased onto zero frequency may oscillate: undecided.
         doubtful = (strong & ~swings & (growth > LEAST_RATE)).any(axis=1)
         found = np.where(swings, growth, -np.inf).max(axis=1)
         rate[j] = np.where(doubtful | ~np.isfinite(found), np.nan, found)
-    return rate, miss
+    return rate, residual
 
 
 def growth_of_map(m: PeriodMap, slowest: float = SLOWEST_MODE) -> float:

@@ -10,15 +10,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import KW_ONLY, asdict, dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
 from ..arguments import function_of, named, part
+from ..display import fields_of, table_of
 from ..errors import Bound, ParameterError, integer, numbers_of
 from ..fields import Axis, Seed
-from ..files import versions
 from ..formulas import arm as arm_law
 from ..model import arm
 from ..model.arm import Arm
@@ -30,7 +30,7 @@ from ..scene.scenario import Control, Position, Scenario
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
 
-IDENTIFICATION_SCHEMA = "hapticclay-identify-1"
+RESPONSE_UNITS = {"G": "m/m", "S": "m/N", "Th": "N/m"}
 NOMINAL_POSE = (L2, L1)  # world position of the handle where the elbow is square [m]
 Block = Literal["G", "S", "Th"]
 BLOCK_KINDS = get_args(Block)
@@ -146,6 +146,7 @@ class Identified(Result):
     """
 
     drawn_by = "hapticclay.views.identification_plots:identified_plot"
+    written_as = "identify"
 
     what: str
     axis: str
@@ -172,10 +173,9 @@ class Identified(Result):
 
     def tables(self) -> dict[str, dict[str, Any]]:
         """Coefficients, and the response beside those of the fit and of the paper."""
-        rows = self.coefficients
         names = ("name", "unit", "printed", "value", "low", "high")
         return {
-            "coefficients": {name: [getattr(c, name) for c in rows] for name in names},
+            "coefficients": table_of(names, self.coefficients),
             "response": response_tables([self])[self.axis],
         }
 
@@ -203,38 +203,24 @@ class Identified(Result):
         """The fitted coefficients, in order."""
         return tuple(c.value for c in self.coefficients)
 
-    def summary(self) -> dict[str, Any]:
-        """Return everything, ready for JSON."""
-        given: dict[str, Any] = {"source": self.source, "estimate": self.estimate}
+    def contents(self) -> dict[str, Any]:
+        """Everything; of the scenario and the source, the one that there is."""
+        data = fields_of(self, "response", "source", "scenario")
         if self.scenario:
-            given = {"scenario": asdict(self.scenario)}
-        return {
-            "schema": IDENTIFICATION_SCHEMA,
-            "what": self.what,
-            "axis": self.axis,
-            "coefficients": [{**asdict(c), "error": c.error} for c in self.coefficients],
-            "frequency": self.frequency.tolist(),
-            "real": self.response.real.tolist(),
-            "imaginary": self.response.imag.tolist(),
-            "deviation": self.deviation.tolist(),
-            "coherence": self.coherence.tolist(),
-            **given,
-            "noise": asdict(self.noise) if self.noise else None,
-            "seed": self.seed,
-            "periods": self.periods,
-            "realisations": self.realisations,
-            "warnings": list(self.warnings),
-            "units": {
-                "frequency": "Hz",
-                "response": {"G": "m/m", "S": "m/N", "Th": "N/m"}[self.what],
-            },
-            "versions": versions(),
+            data["scenario"] = self.scenario
+        else:
+            data |= {"source": self.source, "estimate": self.estimate}
+        return data | {
+            "coefficients": [{**fields_of(c), "error": c.error} for c in self.coefficients],
+            "real": self.response.real,
+            "imaginary": self.response.imag,
+            "units": {"frequency": "Hz", "response": RESPONSE_UNITS[self.what]},
         }
 
 
 def response_tables(results: Sequence[Identified], paper: bool = True) -> dict[str, dict[str, Any]]:
     """Returns the numbers of one block's figure: the response on each axis, and its equations."""
-    unit = {"G": "m/m", "S": "m/N", "Th": "N/m"}[results[0].what]
+    unit = RESPONSE_UNITS[results[0].what]
     out: dict[str, dict[str, Any]] = {}
     for r in results:
         table: dict[str, Any] = {"frequency [Hz]": r.frequency}
@@ -378,14 +364,10 @@ class Identification:
         )  # fmt: skip
 
 
-def _identified(experiment: Identification) -> Identified:
-    return experiment.identified()
-
-
 identify = function_of(
     Identification,
     "identify",
-    _identified,
+    Identification.identified,
     "a value is out of its bounds, the handle cannot be there, or a run ended early or met the "
     "limits of the motors.",
 )

@@ -7,24 +7,22 @@ response is evaluated at its lines over whole periods, as in `identification`.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..arguments import checked, named
 from ..errors import ParameterError, integer, number
-from ..files import versions
 from ..model.constants import AXES
 from ..model.signals import Multisine
-from ..results import Result
+from ..results import Result, figure_of
 from ..scene.scenario import Scenario
 from ..simulation.simulate import simulate
 from ..theory.impedance import Impedance
 from .identification import _multisine, estimate_response
 from .wall import Port, Subject, Wall, as_wall
 
-IMPEDANCE_SCHEMA = "hapticclay-impedance-1"
 IMPEDANCE_BAND = (0.5, 30.0)  # [Hz]
 IMPEDANCE_PERIOD = 4.0  # [s]
 IMPEDANCE_LINES = 24
@@ -52,6 +50,18 @@ class MeasuredImpedance(Result):
     """
 
     drawn_by = "hapticclay.views.impedance_plots:impedance_plot"
+    written_as = "impedance"
+    printed = {
+        "measured": (
+            "f [Hz]",
+            "effective stiffness [N/m]",
+            "effective damping [N.s/m]",
+            "effective mass [kg]",
+            "off theory",
+            "|fe/fh|",
+        )
+    }
+    formats = {"off theory": ".4f %"}
 
     subject: Subject
     measured: Impedance
@@ -90,20 +100,27 @@ class MeasuredImpedance(Result):
     def tables(self) -> dict[str, dict[str, list[float]]]:
         """The numbers of the figures, by table, columns headed with their units."""
         (measured,), (computed,) = (x.tables().values() for x in (self.measured, self.computed))
-        return {"measured": measured | {"deviation": self.deviation.tolist()}, "computed": computed}
+        off = np.abs(self.measured.Z / self.computed.Z - 1.0).tolist()
+        measured = measured | {"deviation": self.deviation.tolist(), "off theory": off}
+        return {"measured": measured, "computed": computed}
 
-    def summary(self) -> dict[str, Any]:
-        """Return everything, ready for JSON."""
-        return {
-            "schema": IMPEDANCE_SCHEMA,
-            "kind": type(self.subject).__name__,
-            "subject": asdict(self.subject),
-            "gap": self.gap,
-            "felt_gap": self.felt_gap,
-            "tables": self.tables(),
-            "notes": list(self.notes),
-            "versions": versions(),
-        }
+    def remarks(self) -> list[str]:
+        """How far theory is off, and what it neglects."""
+        line = f"measured against computed: Z within {100.0 * self.gap:.2g} %"
+        if not math.isnan(self.felt_gap):
+            line += f", fe/fh within {100.0 * self.felt_gap:.2g} %"
+        return [line, *self.notes]
+
+    def figures(self) -> dict[str, Any]:
+        """Impedance and transparency."""
+        by = "hapticclay.views.impedance_plots:transparency_bode_plot"
+        return {"impedance": figure_of(self), "transparency": figure_of(self, by)}
+
+    def contents(self) -> dict[str, Any]:
+        """Subject, differences from theory, tables and notes."""
+        gaps = {"gap": self.gap, "felt_gap": self.felt_gap, "tables": self.tables()}
+        names = {"kind": type(self.subject).__name__, "subject": self.subject}
+        return {**names, **gaps, "notes": self.notes}
 
 
 def computed_impedance(subject: Subject, omega: np.ndarray) -> Impedance:

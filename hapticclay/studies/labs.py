@@ -12,7 +12,7 @@ import numpy as np
 from ..arguments import checked, named
 from ..errors import choice
 from ..model.shapes import Constant
-from ..results import Result
+from ..results import Result, figure_of
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import Device, VirtualWall
 from ..simulation.batch import simulate_batch
@@ -85,6 +85,22 @@ class Lab(Result):
         for chart in self.charts:
             out |= {f"{chart.name}: {name}": table for name, table in chart.tables().items()}
         return out
+
+    def text(self, form: str = "") -> str:
+        """Task, table, result and questions."""
+        return f"{self.title}. {self.task}\n\n{super().text(form)}"
+
+    def remarks(self) -> list[str]:
+        """The result and the questions."""
+        return ["", self.found, "", *(f"{i}. {q}" for i, q in enumerate(self.questions, 1))]
+
+    def figures(self) -> dict[str, Any]:
+        """The charts."""
+        return {chart.name: figure_of(chart) for chart in self.charts}
+
+    def contents(self) -> dict[str, Any]:
+        """Name, questions and tables."""
+        return {"lab": self.name, "questions": self.questions, "tables": self.tables()}
 
 
 def _limits(walls: Sequence[VirtualWall]) -> list[float]:

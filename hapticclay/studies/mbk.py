@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arguments import checked, named
+from ..display import table_of
 from ..errors import choice, integer, numbers_of
-from ..files import versions
-from ..results import Result
+from ..results import Result, figure_of
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import VirtualWall
 from ..theory.hand_boxes import Box
@@ -28,7 +28,6 @@ from ..theory.mbk import (
 from .boundary import PushedLoop, find_crossing, of_scenario, simulated_gain
 from .wall_runs import growth_rates
 
-MBK_SCHEMA = "hapticclay-mbk-1"
 MBK_UNITS = {"M": "kg", "B": "N.s/m", "K": "N/m"}
 MOST_SOUGHT = 100.0  # end of a search, in multiples of the exact border
 HANDS = Box((0.1, 1.0), (1.0, 10.0), (0.0, 300.0))  # a choice of ours: light to firm grips
@@ -65,6 +64,9 @@ class DeviceMBK(Result):
     """
 
     drawn_by = "hapticclay.views.impedance_plots:mbk_plot"
+    written_as = "mbk"
+    printed = {"borders": ()}
+    formats = {"off": "+.2g %"}
 
     wall: VirtualWall
     regions: dict[str, Region]
@@ -89,13 +91,15 @@ class DeviceMBK(Result):
             a, b = (f"{name} [{MBK_UNITS[name]}]" for name in PLANES[plane])
             low, high = region.low.tolist(), region.high.tolist()
             out[plane] = {a: region.x.tolist(), f"least {b}": low, f"largest {b}": high}
-            runs = self.found[plane]
-            out[f"{plane} by runs"] = {
-                a: [r.x for r in runs],
-                b: [r.y for r in runs],
-                f"exact {b}": [r.exact for r in runs],
-                "end": [r.end for r in runs],
-            }
+            out[f"{plane} by runs"] = table_of((a, b, f"exact {b}", "end"), self.found[plane])
+        out["borders"] = table_of(
+            ("plane", "at", "border", "by runs", "exact", "off"),
+            [
+                (plane, x.x, x.end, x.y, x.exact, x.y / x.exact - 1.0)
+                for plane, some in self.found.items()
+                for x in some
+            ],
+        )
         r = self.range
         out["range"] = {
             "f [Hz]": (r.omega / (2.0 * math.pi)).tolist(),
@@ -106,18 +110,39 @@ class DeviceMBK(Result):
         }
         return out
 
-    def summary(self) -> dict[str, Any]:
-        """Return everything, ready for JSON."""
+    def remarks(self) -> list[str]:
+        """Units of the planes, the dynamic range, and what the theory ignores."""
+        r = self.range
+        low, high = (float(r.omega[i]) / (2.0 * math.pi) for i in (0, -1))
+        wall = f"K = {r.stiffest.K:.4g} N/m with B = {r.stiffest.B:.4g} N.s/m"
+        ends = f"{r.decibels[0]:.3g} dB at {low:.3g} Hz, {r.decibels[-1]:.3g} dB at {high:.3g} Hz"
+        lines = [
+            "mass-damper: kg, N.s/m; mass-stiffness: kg, N/m; damper-stiffness: N.s/m, N/m",
+            f"dynamic range from the free device to {wall}: {ends}, mean {r.mean:.3g} dB",
+        ]
+        device = r.stiffest.device
+        if device.friction or device.quantum or r.stiffest.unilateral:
+            lines.append("all of the linear loop: friction, encoder and surface are ignored")
+        return lines
+
+    def figures(self) -> dict[str, Any]:
+        """The planes, and the dynamic range."""
+        tables = self.tables()
+        span = {"range": tables.pop("range")}
+        del tables["borders"]
+        by = "hapticclay.views.impedance_plots:dynamic_range_plot"
+        return {"mbk": figure_of(self, tables=tables), "range": figure_of(self, by, span)}
+
+    def contents(self) -> dict[str, Any]:
+        """Wall, stiffest wall, mean dynamic range and tables."""
         r = self.range
         return {
-            "schema": MBK_SCHEMA,
             "kind": "device",
-            "wall": asdict(self.wall),
+            "wall": self.wall,
             "gap": self.gap,
             "range_mean_dB": r.mean,
-            "stiffest": asdict(r.stiffest),
+            "stiffest": r.stiffest,
             "tables": self.tables(),
-            "versions": versions(),
         }
 
 
@@ -138,6 +163,8 @@ class ArmMBK(Result):
     """
 
     drawn_by = "hapticclay.views.impedance_plots:least_mass_plot"
+    written_as = "mbk"
+    printed = {"least masses": ()}
 
     loop: PushedLoop
     box: Box
@@ -162,24 +189,31 @@ class ArmMBK(Result):
             name: {B: b.tolist(), M: m.tolist()}
             for name, (m, b) in (("this hand", self.nominal), ("hand box", self.worst))
         }
-        out["runs"] = {
-            B: [r.x for r in self.found],
-            M: [r.y for r in self.found],
-            "exact M [kg]": [r.exact for r in self.found],
+        out["runs"] = table_of((B, M, "exact M [kg]"), self.found)
+        by_runs = {r.exact: r.y for r in self.found}
+        out["least masses"] = {
+            B: self.nominal[1].tolist(),
+            M: self.nominal[0].tolist(),
+            "by runs [kg]": [by_runs.get(m) for m in self.nominal[0].tolist()],
+            f"hand box: {B}": self.worst[1].tolist(),
+            f"hand box: {M}": self.worst[0].tolist(),
         }
         return out
 
-    def summary(self) -> dict[str, Any]:
-        """Return everything, ready for JSON."""
-        return {
-            "schema": MBK_SCHEMA,
-            "kind": "arm",
-            "loop": asdict(self.loop),
-            "box": asdict(self.box),
-            "gap": self.gap,
-            "tables": self.tables(),
-            "versions": versions(),
-        }
+    def remarks(self) -> list[str]:
+        """Nothing: the table shows all."""
+        return []
+
+    def figures(self) -> dict[str, Any]:
+        """The least masses over the damper."""
+        tables = self.tables()
+        del tables["least masses"]
+        return {"mass": figure_of(self, tables=tables)}
+
+    def contents(self) -> dict[str, Any]:
+        """Loop, hands and tables."""
+        tables = {"gap": self.gap, "tables": self.tables()}
+        return {"kind": "arm", "loop": self.loop, "box": self.box, **tables}
 
 
 @checked

@@ -13,6 +13,7 @@ from ..arguments import checked, named
 from ..display import brief
 from ..errors import ParameterError, array_of, number
 from ..model.hardware import Hardware
+from ..results import Result, figure_of
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import VirtualWall
 from ..simulation.record import Record, port_energy
@@ -51,6 +52,8 @@ class IndexOverFrequency:
         worst_omega: frequencies of the runs along the worst paths of a hand [rad/s], (k,).
         worst: energy taken over the integral of v^2 in those runs [N.s/m], (k,).
     """
+
+    drawn_by = "hapticclay.views.passivity_plots:index_plot"
 
     def __repr__(self) -> str:
         return brief(self)
@@ -92,6 +95,8 @@ class EnergyOverTime:
         without: the run without them.
         controlled: the run with `Hardware(passivity=True)`.
     """
+
+    drawn_by = "hapticclay.views.passivity_plots:port_energy_plot"
 
     without: Record
     controlled: Record
@@ -138,6 +143,8 @@ class PassiveRegion:
         found: largest K at which no path of a hand draws energy, by runs [N/m], (len(delays), m).
     """
 
+    drawn_by = "hapticclay.views.passivity_plots:region_plot"
+
     def __repr__(self) -> str:
         return brief(self)
 
@@ -158,6 +165,68 @@ class PassiveRegion:
                 "K [N/m]": K.ravel(),
             }
         return out
+
+
+@named
+@dataclass(frozen=True, eq=False, repr=False)
+class Passivity(Result):
+    """Passivity of a wall and of an arm over frequency, of rendered clay over time, and over K.
+
+    Attributes:
+        index: the wall.
+        arms: the arm, by axis.
+        energy: rendered clay, without and with the controller.
+        region: the largest passive stiffness of the wall.
+    """
+
+    printed = {"to spare": (), "largest passive K": ()}
+
+    index: IndexOverFrequency
+    arms: dict[str, IndexOverFrequency]
+    energy: EnergyOverTime
+    region: PassiveRegion
+
+    def headline(self) -> str:
+        """What the wall has to spare."""
+        return f"{self.index.name}: {self.index.margin:.4g} N.s/m to spare"
+
+    def tables(self) -> dict[str, dict[str, Any]]:
+        """Margins of wall and arm; limits by theory and by runs."""
+        found, r = (self.index, *self.arms.values()), self.region
+        walls = [replace(r.wall, Ts=Ts, delay=d * Ts) for d in r.delays for Ts in r.run_Ts.tolist()]
+        return {
+            "to spare": {
+                "subject": [x.name for x in found],
+                "to spare [N.s/m]": [x.margin for x in found],
+                "passive": [x.margin >= 0.0 for x in found],
+            },
+            "largest passive K": {
+                "delay [samples]": [w.delay / w.Ts for w in walls],
+                "Ts [ms]": [1e3 * w.Ts for w in walls],
+                "theory [N/m]": [wall_limits.colgate_schenkel_limit(w) for w in walls],
+                "by runs [N/m]": r.found.ravel().tolist(),
+            },
+        }
+
+    def remarks(self) -> list[str]:
+        """Energy that the rendered clay takes."""
+        return [
+            f"rendered clay {name} controller: least energy taken {float(e.min()):.3g} J, "
+            f"at the end {float(e[-1]):.3g} J"
+            for name, e in zip(("without", "with"), self.energy.observed, strict=True)
+        ]
+
+    def _parts(self) -> dict[str, Any]:
+        arms = {f"arm_{axis}": arm for axis, arm in self.arms.items()}
+        return {"index": self.index, "energy": self.energy, "region": self.region, **arms}
+
+    def figures(self) -> dict[str, Any]:
+        """Wall and arm over frequency, energy over time, and the region of K."""
+        return {name: figure_of(part) for name, part in self._parts().items()}
+
+    def contents(self) -> dict[str, Any]:
+        """The numbers of all figures but the energy over time."""
+        return {name: x.tables() for name, x in self._parts().items() if name != "energy"}
 
 
 @checked

@@ -54,8 +54,7 @@ class Hands:
     correlation: Correlations = (0.0, 0.0, 0.0)
 
     def __post_init__(self):
-        for name in HAND:
-            value = getattr(self, name)
+        for name, value in self._values.items():
             if isinstance(value, Distribution) and (value.law == "normal" or value.first < 0.0):
                 laws = ", ".join(x for x in LAWS if x != "normal")
                 bound = f"must have no negative values: {laws}, from 0 on"
@@ -74,25 +73,27 @@ class Hands:
             variation: standard deviation over mean of each number, 0.001 to 10.
             **about: other attributes.
         """
-        c = variation
         mass, damper, spring = (
-            Distribution("log-normal", x, c * x) if x else 0.0
+            Distribution("log-normal", x, variation * x) if x else 0.0
             for x in (operator.mass, operator.damper, operator.spring)
         )
-        return cls(
-            mass, damper, spring, **{"spread": f"assumed: {100.0 * c:g} % of the mean", **about}
-        )
+        spread = f"assumed: {100.0 * variation:g} % of the mean"
+        return cls(mass, damper, spring, **{"spread": spread, **about})
 
     @property
     def random(self) -> tuple[str, ...]:
         """Which of mass, damper and spring vary."""
-        return tuple(n for n in HAND if isinstance(getattr(self, n), Distribution))
+        return tuple(n for n, x in self._values.items() if isinstance(x, Distribution))
 
     @property
     def median(self) -> Operator:
         """The hand with median mass, damper and spring."""
-        values = [getattr(self, n) for n in HAND]
+        values = self._values.values()
         return Operator(*(x.median if isinstance(x, Distribution) else x for x in values))
+
+    @property
+    def _values(self) -> dict[str, float | Distribution]:
+        return {name: getattr(self, name) for name in HAND}
 
     @property
     def _correlations(self) -> np.ndarray:
@@ -113,9 +114,8 @@ class Hands:
             w, v = np.linalg.eigh(self._correlations)  # singular ones have no Cholesky factor
             z = z @ (v * np.sqrt(np.maximum(w, 0.0))) @ v.T
         out = np.empty_like(z)
-        for i, name in enumerate(HAND):
-            law = getattr(self, name)
-            out[:, i] = law.of_score(z[:, i]) if isinstance(law, Distribution) else law
+        for i, x in enumerate(self._values.values()):
+            out[:, i] = x.of_score(z[:, i]) if isinstance(x, Distribution) else x
         return out
 
     def sample(self, n: int, seed: int = 0) -> list[Operator]:
@@ -137,10 +137,9 @@ class Hands:
         """
         out = 0.5 * (1.0 - number("share", share, 0.0, 1.0 - 1e-9))
         ends = {}
-        for name in HAND:
-            law = getattr(self, name)
-            x = law.spread(np.array([out, 1.0 - out])) if isinstance(law, Distribution) else law
-            ends[name] = (float(np.min(x)), float(np.max(x)))
+        for name, x in self._values.items():
+            both = x.spread(np.array([out, 1.0 - out])) if isinstance(x, Distribution) else x
+            ends[name] = (float(np.min(both)), float(np.max(both)))
         return Box(**ends)
 
     def row(self, name: str) -> list[str]:
@@ -149,9 +148,9 @@ class Hands:
         Args:
             name: of the population.
         """
-        values = [getattr(self, n) for n in HAND]
-        told = [x.text() if isinstance(x, Distribution) else f"{x:g}" for x in values]
-        return [name, *told, str(self.subjects or "-"), self.spread or "none", self.source]
+        values = self._values.values()
+        texts = [x.text() if isinstance(x, Distribution) else f"{x:g}" for x in values]
+        return [name, *texts, str(self.subjects or "-"), self.spread or "none", self.source]
 
 
 PAPER_HAND = "Her, Hsu, Lan, Karkoub 2002, J. Intelligent and Robotic Systems 35, Eq. 19"

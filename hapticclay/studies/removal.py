@@ -7,6 +7,7 @@ a headless run computes it from the record.
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -24,6 +25,7 @@ PICTURE_CELLS, VOLUME_CELLS = 10, 32  # least number of cells in the tool's widt
 PATH_TOLERANCE = 5e-4  # of the width: largest deviation of the path from its straight segments
 MAP_MARGIN = 0.02  # [m] of a block without borders, before the start and beyond the end of the path
 HIGHEST = 0.8  # of a block's thickness in a picture, above the floor of its grooves
+MOST_CELLS = 20_000  # along one axis
 HALF_BREADTH = 0.08  # [m] of a block without borders, across the path
 
 TOOL = Tool()
@@ -80,12 +82,10 @@ class Removal:
         cell: float | None = None,
         path: np.ndarray | None = None,
     ):
-        """Lay the grid over the block, or over the path where one is given."""
-        fit = (
-            min(CELL_SIZE, tool.width / PICTURE_CELLS)
-            if path is None
-            else tool.width / VOLUME_CELLS
-        )
+        """Lays the grid over the block, or over the path where one is given."""
+        fit = tool.width / VOLUME_CELLS
+        if path is None:
+            fit = min(CELL_SIZE, tool.width / PICTURE_CELLS)
         self.tool = tool
         self.cell = number("cell", fit if cell is None else cell, 1e-4, 0.5 * tool.width, unit="m")
         low, high = block_of_clay(scenario)
@@ -94,36 +94,34 @@ class Removal:
         if path is not None and len(path):
             reach = 0.5 * tool.width + self.cell
             low, high = path.min(axis=0) - reach, path.max(axis=0) + reach
-            borders = [
-                [e for span in spans[i] for e in span if low[i] < e < high[i]] for i in (0, 1)
-            ]
-        if np.max((high - low) / self.cell) > 20_000:
-            bound = "path too long for a map of the clay"
-            raise ParameterError("record", scenario.name, bound)
+            for i in (0, 1):
+                borders[i] = [e for span in spans[i] for e in span if low[i] < e < high[i]]
+        if np.max((high - low) / self.cell) > MOST_CELLS:
+            raise ParameterError("record", scenario.name, "path too long for a map of the clay")
         lines = [_border_lines(low[i], high[i], borders[i], self.cell) for i in (0, 1)]
         self.x, self.y = (0.5 * (at[1:] + at[:-1]) for at in lines)
         self.wide, self.high = (np.diff(at) for at in lines)
         self.clay = _clay_share(scenario.clay, spans, lines)
-        self._before = np.zeros(self.clay.shape)
+        self._initial_cut = np.zeros(self.clay.shape)
         self.ground = scenario.clay.ground if scenario.clay else None
         if self.ground:
             edges, places = self.ground.edges, (self.x, self.y)
             at = [np.searchsorted(e, c, "right") for e, c in zip(edges, places, strict=True)]
             cells = np.ix_(*at)
             self.clay = np.pad(self.ground.relief, 1)[cells].T / tool.depth  # none beyond
-            self._before = 1.0 - np.pad(self.ground.shares, 1)[cells].T
+            self._initial_cut = 1.0 - np.pad(self.ground.shares, 1)[cells].T
         self.restore()
 
     def restore(self) -> None:
-        """Restore the uncut block."""
-        self.cut, self.volume = self._before.copy(), 0.0
+        """Restores the uncut block."""
+        self.cut, self.volume = self._initial_cut.copy(), 0.0
 
     def sweep(self, begin: Any, end: Any) -> float:
-        """Move the tool in a straight line."""
+        """Moves the tool in a straight line; returns the volume removed [m^3]."""
         r, reach = 0.5 * self.tool.width, 0.5 * self.tool.width + self.cell
         (x0, y0), (x1, y1) = begin, end
-        i = _window(self.x, min(x0, x1) - reach, max(x0, x1) + reach)
-        j = _window(self.y, min(y0, y1) - reach, max(y0, y1) + reach)
+        i = _cells_between(self.x, min(x0, x1) - reach, max(x0, x1) + reach)
+        j = _cells_between(self.y, min(y0, y1) - reach, max(y0, y1) + reach)
         if i.start >= i.stop or j.start >= j.stop:
             return 0.0
         x, y = self.x[i] - x0, self.y[j] - y0
@@ -193,10 +191,7 @@ def removed(
     bends = way[moving][_bends(p[moving], PATH_TOLERANCE * tool.width)]
     knots = np.union1d(np.arange(0.0, way[-1], grid.cell), bends)
     at = np.column_stack([np.interp(knots, way[moving], p[moving, i]) for i in (0, 1)]).tolist()
-    gained = [
-        grid.sweep(at[0], at[0]),
-        *(grid.sweep(a, b) for a, b in zip(at, at[1:], strict=False)),
-    ]
+    gained = [grid.sweep(a, b) for a, b in itertools.pairwise([at[0], *at])]
     total = np.cumsum(gained)
     if len(knots) < 2:
         return np.full(len(p), total[0]), rate
@@ -232,8 +227,7 @@ def _border_lines(low: float, high: float, borders: list[float], cell: float) ->
         return low + cell * np.arange(max(math.ceil((high - low) / cell - 1e-9), 2) + 1)
     ends = np.unique([low, *borders, high])
     pieces = [
-        np.linspace(a, b, math.ceil((b - a) / cell) + 1)[:-1]
-        for a, b in zip(ends, ends[1:], strict=False)
+        np.linspace(a, b, math.ceil((b - a) / cell) + 1)[:-1] for a, b in itertools.pairwise(ends)
     ]
     return np.append(np.concatenate(pieces), high)
 
@@ -267,6 +261,6 @@ def _cell_parts(edges: np.ndarray, lines: np.ndarray) -> np.ndarray:
     return np.diff(np.clip(lines[:, None], low, high), axis=0) / np.diff(lines)[:, None]
 
 
-def _window(centres: np.ndarray, low: float, high: float) -> slice:
+def _cells_between(centres: np.ndarray, low: float, high: float) -> slice:
     begin, end = np.searchsorted(centres, (low, high))
     return slice(int(begin), int(end))

@@ -19,8 +19,9 @@ import numpy as np
 from ..arguments import checked, named
 from ..display import brief
 from ..errors import ParameterError, choice, integer
-from ..results import Result
+from ..results import Result, figure_of
 from . import store, store_runs
+from .population import Band
 from .probability import LEVEL, Probability, clopper_pearson
 from .trials import Trials
 from .verdicts import NOT_RUN
@@ -210,6 +211,50 @@ class Instability(Result):
             }  # fmt: skip
             out["cells"] = cells
         return out
+
+
+@named
+@dataclass(frozen=True, repr=False)
+class Robustness(Result):
+    """Judged runs, and a band of gain limits over the same hands.
+
+    Attributes:
+        instability: the runs.
+        band: the band; None for none.
+    """
+
+    instability: Instability
+    band: Band | None = None
+
+    def headline(self) -> str:
+        """Probability of instability, in one line."""
+        return self.instability.headline()
+
+    def tables(self) -> dict[str, dict[str, Sequence]]:
+        """The tables of the runs."""
+        return self.instability.tables()
+
+    def remarks(self) -> list[str]:
+        """The probability, and what it is a mean of."""
+        mean = ["over a grid this is the mean of its cells"] * bool(self.instability.trials.grid)
+        return [self.headline(), *mean]
+
+    def figures(self) -> dict[str, Any]:
+        """Instability over the grid, and the band."""
+        band = {"gain_band": figure_of(self.band)} if self.band else {}
+        return {"instability": figure_of(self.instability), **band}
+
+    def contents(self) -> dict[str, Any]:
+        """Trials, counts and tables."""
+        found = self.instability
+        return {
+            "trials": found.trials.described(),
+            "total": found.total,
+            "repeated": int(found.longer.sum()),
+            "refused": found.refused,
+            "tables": self.tables(),
+            "band": self.band.tables()["band"] if self.band else None,
+        }
 
 
 # ---- making the runs -----------------------------------------------------------------------------

@@ -56,7 +56,7 @@ class Range:
         try:
             if isinstance(text, str) and (found := re.fullmatch(RANGE_PATTERN, text.strip())):
                 low, high = (number_in(field, found[end], unit) for end in ("low", "high"))
-                n, log = found["n"] and int(found["n"]), bool(found["log"])
+                n, log = int(found["n"]) if found["n"] else None, bool(found["log"])
                 finite = math.isfinite(low) and math.isfinite(high)
                 if not finite or n == 0 or (log and low <= 0.0) or (n != 1 and low >= high):
                     raise ValueError

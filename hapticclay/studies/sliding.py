@@ -31,7 +31,7 @@ ROUNDED = 0.29  # counts: standard deviation of rounding
 UNDITHERED = 0.4  # counts: rounding alone leaves 0.29, noise of 0.3 beside it 0.42
 
 
-class Met(NamedTuple):
+class SampledClay(NamedTuple):
     """The clay at the samples of a record.
 
     Attributes:
@@ -85,7 +85,7 @@ class Sliding(NamedTuple):
         return np.maximum(self.motion.velocity(self.v), 0.5 * self.slowest)
 
 
-def of_record(r: Record, axis: str | None) -> tuple[str, Any, Any, Any, Any, Any]:
+def recorded_motion(r: Record, axis: str | None) -> tuple[str, Any, Any, Any, Any, Any]:
     """Axis, position, velocity, force, which samples lie inside clay, and the clay at them."""
     clay = r.scenario.clay
     if clay is None:
@@ -105,7 +105,7 @@ def of_record(r: Record, axis: str | None) -> tuple[str, Any, Any, Any, Any, Any
     inside = law.some[at]
     still = {x.name: x.force(law, 0.0, 1.0) for x in clay.kinds if x.force and not x.of_velocity}
     dented = {name: force[at] > 0.0 for name, force in still.items() if np.any(force)}
-    met = Met(np.array([r.b[:, index], *law.flows_at(*places)]).T, dented)
+    met = SampledClay(np.array([r.b[:, index], *law.flows_at(*places)]).T, dented)
     if axis in AXES:
         return axis, places[index], r.v[:, index], r.fe[:, index], inside, met
     if not np.array_equal(*r.b.T):
@@ -117,7 +117,7 @@ def of_record(r: Record, axis: str | None) -> tuple[str, Any, Any, Any, Any, Any
     return axis, along, speed, force, inside, met
 
 
-def check_met(met: Met, inside: np.ndarray) -> None:
+def check_one_law(met: SampledClay, inside: np.ndarray) -> None:
     """Refuse samples in clays of several laws, or in clay whose force depends on more variables."""
     for name, where in met.dented.items():
         if np.any(where[inside]):
@@ -126,16 +126,18 @@ def check_met(met: Met, inside: np.ndarray) -> None:
     kinds = met.flows[inside]
     if np.any(np.ptp(kinds, axis=0) > 1e-9 * np.max(np.abs(kinds), axis=0)):
         low, high = kinds.min(axis=0).tolist(), kinds.max(axis=0).tolist()
-        told = ", ".join(
+        differing = ", ".join(
             f"{name} {a:g} to {b:g}"
             for name, a, b in zip(("b", "Fy", "K", "n"), low, high, strict=True)
             if a < b
         )
         bound = "must lie in clay of one law: choose a part of them by time or place"
-        raise ParameterError("data", f"samples with {told}", bound)
+        raise ParameterError("data", f"samples with {differing}", bound)
 
 
-def of_known_speed(t: np.ndarray, v: np.ndarray, f: np.ndarray, inside: np.ndarray) -> Sliding:
+def sliding_at_known_speed(
+    t: np.ndarray, v: np.ndarray, f: np.ndarray, inside: np.ndarray
+) -> Sliding:
     """Moving samples of known velocity whose velocity changes little in a step."""
     change = np.abs(np.diff(v, prepend=v[:1]))
     change = np.maximum(change, np.append(change[1:], 0.0))
@@ -156,12 +158,12 @@ def _too_few(count: int) -> ParameterError:
     return ParameterError("data", f"{count} samples", bound)
 
 
-def of_positions(
+def sliding_along_positions(
     t: np.ndarray, p: Cleaned, f: np.ndarray, inside: np.ndarray, out: np.ndarray
 ) -> Sliding:
     """Sliding stretches and the splines along them."""
     inside, good, p = _unbroken(inside, p), ~p.bad, p.x - p.x.mean()
-    told, count = good & ~out, quantum(p[good])
+    usable, count = good & ~out, quantum(p[good])
     runs = [(a, b) for a, b in runs_of(inside) if b - a >= LEAST_STRETCH]
     if not runs:
         raise _too_few(0)
@@ -177,17 +179,8 @@ def of_positions(
     direction = np.zeros(len(t))
     direction[at] = np.where(np.abs(v[at]) > slow, np.sign(v[at]), 0.0)
     pieces = [x for a, b in runs for x in _between_rests(direction, a, b, margin)]
-    # of each piece, where it slides one way
-    slides = [
-        sorted((c + a, d + a) for way in (1.0, -1.0) for c, d in runs_of(direction[a:b] == way))
-        for a, b in pieces
-    ]
-    slides = [
-        [x for x in some if np.count_nonzero(told[slice(*x)]) >= LEAST_PER_KNOT] for some in slides
-    ]
-    pieces = [x for x, some in zip(pieces, slides, strict=True) if some]
-    slides = [some for some in slides if some]
-    single = [x for some in slides for x in some]
+    found = [(x, some) for x in pieces if (some := _one_way_slides(direction, usable, *x))]
+    single = [x for _, some in found for x in some]
     if sum(b - a for a, b in single) < LEAST_SLIDING:
         raise _too_few(sum(b - a for a, b in single))
     stretches = [
@@ -196,16 +189,17 @@ def of_positions(
             [0.5 * float(t[x[1]] + t[y[0]]) for x, y in zip(some, some[1:], strict=False)],
             good[a:b],
         )
-        for (a, b), some in zip(pieces, slides, strict=True)
+        for (a, b), some in found
     ]
-    at, sliding = (np.concatenate([np.arange(*x) for x in some]) for some in (pieces, single))
+    at = np.concatenate([np.arange(*x) for x, _ in found])
+    sliding = np.concatenate([np.arange(*x) for x in single])
     place = np.where(good[at], p[at], 0.0)
-    one_way = [x for a, b in single for x in _without_gaps(told, a, b)]
-    told_at = np.concatenate([np.arange(*x) for x in one_way])
-    forces = [Stretch(t[a:b], (), told[a:b]) for a, b in one_way]
-    series = [Series(stretches, place), Series(forces, direction[told_at] * f[told_at])]
+    one_way = [x for a, b in single for x in _without_gaps(usable, a, b)]
+    usable_at = np.concatenate([np.arange(*x) for x in one_way])
+    forces = [Stretch(t[a:b], (), usable[a:b]) for a, b in one_way]
+    series = [Series(stretches, place), Series(forces, direction[usable_at] * f[usable_at])]
     spacing, (of_p, of_f) = chosen_spacing(series)
-    sliding = sliding[told[sliding]]
+    sliding = sliding[usable[sliding]]
     sign = direction[sliding]
     motion = Motion(stretches, spacing, np.searchsorted(at, sliding), sign)
     c = motion.follow(place)
@@ -228,6 +222,18 @@ def of_positions(
         math.sqrt(of_p) / usual,
         sliding,
     )
+
+
+def _one_way_slides(
+    direction: np.ndarray, usable: np.ndarray, start: int, stop: int
+) -> list[tuple[int, int]]:
+    """Parts of a piece that slide one way and have enough usable samples, in order of time."""
+    out = [
+        (a + start, b + start)
+        for way in (1.0, -1.0)
+        for a, b in runs_of(direction[start:stop] == way)
+    ]
+    return sorted(x for x in out if np.count_nonzero(usable[slice(*x)]) >= LEAST_PER_KNOT)
 
 
 def _unbroken(inside: np.ndarray, p: Cleaned) -> np.ndarray:
@@ -283,7 +289,7 @@ def quantum(x: np.ndarray) -> float:
     return 0.0 if np.any(np.abs(whole - np.round(whole)) > 0.02) else float(steps.min())
 
 
-def wrong_way(f: np.ndarray, p: Cleaned | None, v: np.ndarray | None) -> np.ndarray:
+def driving_forces(f: np.ndarray, p: Cleaned | None, v: np.ndarray | None) -> np.ndarray:
     """Mask of the forces that drive the motion, (n,)."""
     if v is None:
         assert p is not None

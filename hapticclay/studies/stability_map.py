@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from ..display import brief
+from ..display import table_of, text_table
 from ..errors import choice
 from ..model.constants import TS
+from ..results import Result, figure_of
 from ..scene.virtual_wall import Device, VirtualWall
 from ..theory import gain_crossings, loop_passivity, stability_margins, wall_limits
 from ..theory.loops import TIMING
@@ -48,8 +50,8 @@ class MapCell:
     cause: str = ""
 
 
-@dataclass(frozen=True)
-class StabilityMap:
+@dataclass(frozen=True, repr=False)
+class StabilityMap(Result):
     """Boundaries over a plane; the loop is stable below them.
 
     Attributes:
@@ -66,8 +68,7 @@ class StabilityMap:
             1; "" for none.
     """
 
-    def __repr__(self) -> str:
-        return brief(self)
+    drawn_by = "hapticclay.views.stability_map_plots:stability_map_plot"
 
     kind: str
     loop: PushedLoop
@@ -83,14 +84,7 @@ class StabilityMap:
     def tables(self) -> dict[str, dict[str, list]]:
         """Returns the numbers of the figure: cells, lines, and boundaries by runs."""
         x, y = self.x_name, self.y_name
-        cells = {
-            x: [c.x for c in self.cells],
-            y: [c.y for c in self.cells],
-            "stable by theory": [c.theory for c in self.cells],
-            "run": [c.simulated for c in self.cells],
-            "cause": [c.cause for c in self.cells],
-        }
-        out = {"cells": cells}
+        out = {"cells": table_of((x, y, "stable by theory", "run", "cause"), self.cells)}
         for name, lines in (("lines", self.lines), ("runs", self.found)):
             out[name] = {
                 "line": [label for label, (places, _) in lines.items() for _ in places],
@@ -98,6 +92,29 @@ class StabilityMap:
                 y: [value for _, values in lines.values() for value in values],
             }
         return out
+
+    def headline(self) -> str:
+        """How far the boundary of the runs is from the exact one."""
+        gap = f"within {100.0 * self.gap():.2g} %"
+        return f"boundary found by runs against the exact one of the same loop: {gap}"
+
+    def text(self, form: str = "") -> str:
+        """Cells whose run differs from the analysis in continuous time, and the causes."""
+        wrong = [c for c in self.cells if c.cause]
+        lines = [
+            self.headline(),
+            *self.notes,
+            f"{len(wrong)} of {len(self.cells)} cells differ from continuous time without delay "
+            "at the nominal pose",
+        ]
+        if wrong:
+            head = (self.x_name, self.y_name, "stable by theory", "run", "cause")
+            lines.append(text_table(table_of(head, wrong), form=form))
+        return "\n".join(lines)
+
+    def figures(self) -> dict[str, Any]:
+        """The map."""
+        return {self.kind: figure_of(self)}
 
     def gap(self) -> float:
         """Largest relative gap between the runs and the exact line of their loop; NaN for none."""

@@ -259,7 +259,7 @@ def claimed(plan: P, out: Path) -> Iterator[tuple[P, list[range]]]:
             "out", str(out), f"must be a writable folder ({error.strerror})"
         ) from None
     try:
-        _hold(lock, out, plan.noun)
+        _lock(lock, out, plan.noun)
         size = (_head(out) or {}).get("chunk")
         if plan.chunk is None and type(size) is int and size > 0:
             plan = dataclasses.replace(plan, chunk=size)  # type: ignore[type-var]
@@ -268,7 +268,7 @@ def claimed(plan: P, out: Path) -> Iterator[tuple[P, list[range]]]:
         os.close(lock)
 
 
-def _hold(lock: int, out: Path, noun: str) -> None:
+def _lock(lock: int, out: Path, noun: str) -> None:
     """Locks an open file; the system releases the lock when the process ends, even if killed."""
     try:
         import fcntl
@@ -294,9 +294,9 @@ def begin(plan: Plan, out: Path) -> list[range]:
     """
     head = _head(out)
     if head is None:
-        told = {"digest": plan.digest(), "total": len(plan), **plan.described()}
+        content = {"digest": plan.digest(), "total": len(plan), **plan.described()}
         with atomic(out / "sweep.json") as f:
-            f.write(f"{json.dumps(told, indent=1)}\n".encode())
+            f.write(f"{json.dumps(content, indent=1)}\n".encode())
     elif head.get("digest") != plan.digest():
         fault = f"holds another {plan.noun}{_difference(plan, head)}: {plan.remedy}"
         raise ParameterError("out", str(out), fault)
@@ -398,8 +398,8 @@ def read_sweep(out: str | os.PathLike[str]):
         "units": {name: unit for name, (unit, _) in notes.items() if unit},
         "descriptions": {name: text for name, (_, text) in notes.items()},
     }
-    more = {b"pandas": json.dumps({"attributes": attrs, **NO_INDEX}).encode()}
-    return table.cast(pa.schema([_with_note(x, notes[x.name]) for x in table.schema], more))
+    pandas = {b"pandas": json.dumps({"attributes": attrs, **NO_INDEX}).encode()}
+    return table.cast(pa.schema([_with_note(x, notes[x.name]) for x in table.schema], pandas))
 
 
 def _note(field: Any) -> tuple[str, str]:

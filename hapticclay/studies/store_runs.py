@@ -143,6 +143,26 @@ class Work:
         if runs:
             self.left.append(runs)
 
+    def spread(
+        self,
+        crew: Callable[[], int],
+        ahead: int,
+        submit: Callable[[range], Any],
+        finished: Callable[[dict[Any, range]], Any],
+    ) -> Generator[int, None, None]:
+        """Keeps `ahead` tasks with each process; yields the number of runs of each one done."""
+        jobs: dict[Any, range] = {}
+        while True:
+            workers = crew()
+            while len(jobs) < ahead * workers and (runs := self.take(workers)) is not None:
+                jobs[submit(runs)] = runs
+            if not jobs:
+                return
+            job = finished(jobs)
+            made, seconds = job.result()
+            self.give_back(jobs.pop(job), made, seconds)
+            yield made
+
 
 def _run_here(work: Work, out: str, crew: int) -> Generator[int, None, None]:
     """As `run_chunks`, on this machine."""
@@ -164,21 +184,16 @@ def _made_in_turn(work: Work, out: str) -> int:
 
 
 def _run_in_processes(work: Work, out: str, crew: int) -> Generator[int, None, None]:
-    from concurrent.futures import FIRST_COMPLETED, Future, wait
+    from concurrent.futures import FIRST_COMPLETED, wait
 
     with started(crew) as submit:
-        jobs: dict[Future[tuple[int, float]], range] = {}
         try:
-            while True:  # one task per worker: Ctrl-C would wait for queued ones
-                while len(jobs) < crew and (runs := work.take(crew)) is not None:
-                    job = submit(run_part, work.plan, runs, out, work.patience, ended)
-                    jobs[job] = runs
-                if not jobs:
-                    return
-                for job in wait(jobs, return_when=FIRST_COMPLETED).done:
-                    made, seconds = job.result()
-                    work.give_back(jobs.pop(job), made, seconds)
-                    yield made
+            yield from work.spread(
+                lambda: crew,
+                1,  # Ctrl-C would wait for queued tasks
+                lambda runs: submit(run_part, work.plan, runs, out, work.patience, ended),
+                lambda jobs: wait(jobs, return_when=FIRST_COMPLETED).done.pop(),
+            )
         except (KeyboardInterrupt, GeneratorExit):  # Ctrl-C here or in the consumer of the results
             print(FINISHING, file=sys.stderr, flush=True)
             raise
@@ -228,23 +243,20 @@ def _run_on_cluster(work: Work, out: str, address: str) -> Generator[int, None, 
         raise ParameterError(
             "scheduler", address, f"must be the address of a dask scheduler ({error})"
         ) from None
-    jobs: dict[Any, range] = {}
     with _quiet("distributed"), client:
         results = as_completed(loop=client.loop)
+
+        def submit(runs: range) -> Any:
+            given = (work.plan, runs, out, work.patience)
+            job = client.submit(run_part, *given, pure=False, retries=10)
+            results.add(job)
+            return job
+
+        def crew() -> int:  # workers come and go
+            return max(1, sum(client.nthreads().values()))
+
         try:
-            while True:
-                crew = max(1, sum(client.nthreads().values()))  # workers come and go
-                while len(jobs) < AHEAD * crew and (runs := work.take(crew)) is not None:
-                    given = (work.plan, runs, out, work.patience)
-                    job = client.submit(run_part, *given, pure=False, retries=10)
-                    jobs[job.key] = runs
-                    results.add(job)
-                if not jobs:
-                    return
-                job = next(results)
-                made, seconds = job.result()
-                work.give_back(jobs.pop(job.key), made, seconds)
-                yield made
+            yield from work.spread(crew, AHEAD, submit, lambda jobs: next(results))
         except CancelledError:
             raise ConnectionError(
                 f"the dask scheduler {address} has gone; the same command resumes the sweep"

@@ -64,7 +64,7 @@ class Trials(Plan):
     runs: Annotated[int, Bound(1, MOST_RUNS)] = 1000
     push: Annotated[float | None, Bound(1e-9, 1.0, "m/s")] = None
     seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
-    chunk: Annotated[int, Bound(1, 100_000)] = 1000
+    chunk: Annotated[int, Bound(1, 100_000)] = 1000  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def __post_init__(self):
         for name, law in self.vary.items():

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
     from multiprocessing.process import BaseProcess
 
-UNGUARDED = 77  # exit status of a worker that came upon a study while it imported the script
+UNGUARDED = 77  # exit status of a worker whose import of the script reached a study
 ALONE = "use workers=1 (--workers 1)"
 NO_GUARD = (
     'the study must stand below `if __name__ == "__main__":`, since each worker process imports '
@@ -28,7 +28,7 @@ NOT_BEGUN = (
 )
 KILLED = "a worker was killed (memory?); the same command resumes the sweep"
 DAEMON = f"a daemonic process, as of multiprocessing.Pool, can start no workers: {ALONE}"
-_end: Any = None  # in a worker: the event that tells it to take no further run
+_end: Any = None  # in a worker: the event that stops it after the present run
 
 
 @contextlib.contextmanager
@@ -47,7 +47,7 @@ def started(crew: int) -> Iterator[Callable[..., Future[Any]]]:
     if _has_lost_script():
         raise ChildProcessError(NO_FILE)
     # the engine's threads do not survive a fork
-    context = _Noting(multiprocessing.get_context("spawn"))
+    context = _Tracked(multiprocessing.get_context("spawn"))
     try:
         end, begun = context.Event(), context.Event()
         pool = ProcessPoolExecutor(
@@ -65,8 +65,8 @@ def started(crew: int) -> Iterator[Callable[..., Future[Any]]]:
         except BrokenProcessPool:
             raise
         except (OSError, RuntimeError) as error:  # the latter for a thread
-            told = getattr(error, "strerror", None) or error
-            fault = f"a worker process cannot be started ({told}): use fewer, or {ALONE}"
+            reason = getattr(error, "strerror", None) or error
+            fault = f"a worker process cannot be started ({reason}): use fewer, or {ALONE}"
             raise ChildProcessError(fault) from None
 
     try:
@@ -79,8 +79,8 @@ def started(crew: int) -> Iterator[Callable[..., Future[Any]]]:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-class _Noting:
-    """A context of multiprocessing that notes the processes it makes: a pool hides its own."""
+class _Tracked:
+    """A context of multiprocessing that keeps the processes it makes: a pool hides its own."""
 
     def __init__(self, context: Any):
         self.context, self.made = context, []
@@ -95,9 +95,9 @@ class _Noting:
 
 
 def _no_semaphores(error: Exception) -> str:
-    told = getattr(error, "strerror", None) or error
+    reason = getattr(error, "strerror", None) or error
     return (
-        f"worker processes cannot be started ({told}): they need shared memory, on Linux a "
+        f"worker processes cannot be started ({reason}): they need shared memory, on Linux a "
         f"writable /dev/shm; mount it, or {ALONE}"
     )
 
@@ -117,10 +117,10 @@ def _cause(workers: list[BaseProcess], begun: bool) -> str:
 
 
 def leave_if_imported() -> None:
-    """Ends a worker that imports a script without main guard and has come to a study in it.
+    """Ends a worker whose import of a script without main guard has reached a study.
 
-    The process that started it says why. To start processes in turn, Python would raise an error
-    of many lines in each worker.
+    Left alone, Python would raise an error of many lines in each worker; instead the process that
+    started them gives the reason.
     """
     imported = sys.modules.get("__mp_main__")
     if imported is not None and sys.modules.get("__main__") is not imported:
@@ -135,12 +135,12 @@ def batch_threads() -> int | None:
 
 
 def ended() -> bool:
-    """Whether this worker shall take no further run."""
+    """Whether this worker should make no further run."""
     return _end is not None and _end.is_set()
 
 
 def _begin(end: Any, begun: Any) -> None:
-    """Ignores signals of the terminal, so a worker finishes; the worker ends with its parent."""
+    """Prepares a worker: it ignores signals of the terminal, and ends with its parent."""
     import signal
     import threading
 

@@ -9,10 +9,11 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..display import brief
+from ..display import fields_of
 from ..errors import Bound
 from ..fields import Seed
 from ..model.constants import AXES, L1, L2
+from ..results import Result, figure_of
 from .identification import (
     COEFFICIENT_NAMES,
     NOMINAL_POSE,
@@ -30,8 +31,8 @@ DRIFT_SETTINGS: dict[str, Any] = dict(
 
 
 @named
-@dataclass(frozen=True, eq=False)
-class Drift:
+@dataclass(frozen=True, eq=False, repr=False)
+class Drift(Result):
     """Coefficients fitted over the workspace.
 
     Attributes:
@@ -44,8 +45,11 @@ class Drift:
         mobility: Wxx and Wyy of the bare arm [1/kg], (m, 2): the gain of Sh without shaping.
     """
 
-    def __repr__(self) -> str:
-        return brief(self)
+    drawn_by = "hapticclay.views.workspace_plots:workspace_plot"
+    written_as = "map"
+    printed = {"ranges": ()}
+    formats = {"printed": "g"}
+    summary_units = {"x": "m", "y": "m", "spacing": "m", "mobility": "1/kg"}
 
     x: np.ndarray
     y: np.ndarray
@@ -61,44 +65,36 @@ class Drift:
                 gain = self.coefficients[:, k, DRIFT_BLOCKS.index("S"), i, 0]
                 table[f"gain of Sh along {axis} {way} [1/kg]"] = gain
             table[f"W of the bare arm along {axis} [1/kg]"] = self.mobility[:, i]
-        return {"poses": table}
+        pairs = list(zip(self.ranges()[::2], self.ranges()[1::2], strict=True))
+        ranges = {name: [a[name] for a, _ in pairs] for name in ("what", "axis", "name", "printed")}
+        for k, way in enumerate(("without shaping", "with shaping")):
+            ranges[way] = [f"{x[k]['lowest']:.5g} to {x[k]['highest']:.5g}" for x in pairs]
+        return {"poses": table, "ranges": ranges}
+
+    def headline(self) -> str:
+        """The number of poses."""
+        return f"workspace: {len(self.x)} poses, {100.0 * self.spacing:g} cm apart"
+
+    def figures(self) -> dict[str, Any]:
+        """The gain of Sh over the workspace."""
+        return {"map": figure_of(self, tables={"poses": self.tables()["poses"]})}
 
     def ranges(self) -> list[dict[str, Any]]:
         """Return the range of each coefficient over the poses, and the printed value."""
         out = []
         for j, i, n, k in np.ndindex(2, 2, 3, 2):
             what, axis, values = DRIFT_BLOCKS[j], AXES[i], self.coefficients[:, k, j, i, n]
-            out.append(
-                {
-                    "what": what,
-                    "axis": axis,
-                    "name": COEFFICIENT_NAMES[what][n],
-                    "inertia_shaping": bool(k),
-                    "printed": printed_form(what, axis)[n],
-                    "lowest": float(values.min()),
-                    "highest": float(values.max()),
-                }
-            )
+            name, printed = COEFFICIENT_NAMES[what][n], printed_form(what, axis)[n]
+            row = {"what": what, "axis": axis, "name": name, "inertia_shaping": bool(k)}
+            ends = {"lowest": float(values.min()), "highest": float(values.max())}
+            out.append({**row, "printed": printed, **ends})
         return out
 
-    def summary(self) -> dict[str, Any]:
-        """Return everything, ready for JSON."""
-        return {
-            "x": self.x.tolist(),
-            "y": self.y.tolist(),
-            "spacing": self.spacing,
-            "coefficients": self.coefficients.tolist(),
-            "order": [
-                "pose",
-                "shaping (off, on)",
-                "block (G, S)",
-                "axis (x, y)",
-                "gain, damping, stiffness",
-            ],
-            "mobility": self.mobility.tolist(),
-            "ranges": self.ranges(),
-            "units": {"x": "m", "y": "m", "spacing": "m", "mobility": "1/kg"},
-        }
+    def contents(self) -> dict[str, Any]:
+        """Everything."""
+        axes = "pose", "shaping (off, on)", "block (G, S)", "axis (x, y)"
+        order = (*axes, "gain, damping, stiffness")
+        return {**fields_of(self), "order": order, "ranges": self.ranges()}
 
 
 def poses(spacing: float) -> tuple[np.ndarray, np.ndarray]:
@@ -137,18 +133,13 @@ def drift_map(
     """
     x, y = poses(spacing)
     out = np.empty((len(x), 2, 2, 2, 3))
-    for m, at in enumerate(zip(x.tolist(), y.tolist(), strict=True)):
+    places = list(zip(x.tolist(), y.tolist(), strict=True))
+    for m, at in enumerate(places):
         for k, j, i in np.ndindex(2, 2, 2):
-            found = identify(
-                AXES[i],
-                DRIFT_BLOCKS[j],
-                origin=at,
-                inertia_shaping=bool(k),
-                seed=seed,
-                **DRIFT_SETTINGS,
-            )
+            place: dict[str, Any] = {"origin": at, "inertia_shaping": bool(k), "seed": seed}
+            found = identify(AXES[i], DRIFT_BLOCKS[j], **place, **DRIFT_SETTINGS)
             out[m, k, j, i] = found.values
         if progress:
             progress(m + 1, len(x))
-    w = np.array([endpoint_mobility(*at) for at in zip(x.tolist(), y.tolist(), strict=True)])
+    w = np.array([endpoint_mobility(*at) for at in places])
     return Drift(x, y, spacing, out, w)

@@ -9,11 +9,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..display import brief
+from ..display import table_of, text_table
 from ..errors import ParameterError, choice
 from ..model.clay import slab
 from ..model.constants import AXES
 from ..model.flow import Flow
+from ..results import Result
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from ..simulation.simulate import simulate
@@ -75,8 +76,8 @@ class YieldCell:
     speed: float
 
 
-@dataclass(frozen=True)
-class YieldMap:
+@dataclass(frozen=True, repr=False)
+class YieldMap(Result):
     """Outcome of a push over yield force and gain.
 
     Motions of the loop scale with Fy. Each gain therefore has two numbers, both for a yield force
@@ -92,8 +93,8 @@ class YieldMap:
         cells: points at which theory and a run are compared.
     """
 
-    def __repr__(self) -> str:
-        return brief(self)
+    drawn_by = "hapticclay.views.stability_map_plots:yield_map_plot"
+    written_as = "gain-yield"
 
     loop: PushedLoop
     least: float
@@ -105,22 +106,38 @@ class YieldMap:
 
     def tables(self) -> dict[str, dict[str, Any]]:
         """Returns the numbers of the figure: cells, and lines over the gain."""
-        return {
-            "cells": {
-                "Fy [N]": [c.Fy for c in self.cells],
-                "K [1/kg]": [c.K for c in self.cells],
-                "expected": [c.expected for c in self.cells],
-                "predicted speed [m/s]": [c.predicted for c in self.cells],
-                "exact speed [m/s]": [c.exact for c in self.cells],
-                "run": [c.simulated for c in self.cells],
-                "speed of the run [m/s]": [c.speed for c in self.cells],
-            },
-            "lines": {
-                "K [1/kg]": self.K,
-                "push that just sticks [m/s per N]": self.critical,
-                "speed of the cycle [m/s per N]": self.speed,
-            },
+        head = (
+            "Fy [N]",
+            "K [1/kg]",
+            "expected",
+            "predicted speed [m/s]",
+            "exact speed [m/s]",
+            "run",
+            "speed of the run [m/s]",
+        )
+        lines = {
+            "K [1/kg]": self.K,
+            "push that just sticks [m/s per N]": self.critical,
+            "speed of the cycle [m/s per N]": self.speed,
         }
+        return {"cells": table_of(head, self.cells), "lines": lines}
+
+    def headline(self) -> str:
+        """The number of runs that differ from theory."""
+        wrong = sum(c.simulated != c.expected for c in self.cells)
+        return f"{wrong} of {len(self.cells)} runs end otherwise than theory says"
+
+    def text(self, form: str = "") -> str:
+        """How the runs compare with theory."""
+        gaps = [abs(c.speed / c.exact - 1.0) for c in self.cells if c.exact > 0.0 and c.speed > 0.0]
+        lines = [self.headline()]
+        if gaps:
+            share = f"within {100.0 * max(gaps):.2g} % of the exact"
+            lines.append(f"largest speed of the cycles: {share}")
+        if wrong := [c for c in self.cells if c.simulated != c.expected]:
+            rows = [(c.Fy, c.K, c.expected, c.simulated) for c in wrong]
+            lines.append(text_table(table_of(("Fy [N]", "K", "theory", "run"), rows), form=form))
+        return "\n".join(lines)
 
 
 def yielding_run(loop: PushedLoop, flow: Flow, t_max: float) -> Scenario:

@@ -45,6 +45,7 @@ TOP_SHARES = (0.72, 0.88, 0.97)  # shares of the largest B: points where the bou
 REST_RESOLVED = 0.01  # share of K to which decay separates stable from unstable
 FALLEN = 0.01  # share of the largest K below which a boundary has fallen to nothing
 BY_GROWTH, BY_REST = "growth rate", "rest after a push"
+NO_VIOLATION = "no run was unstable below a line that is sufficient"
 
 
 @named
@@ -158,6 +159,18 @@ class ZWidth(Result):
     """
 
     drawn_by = "hapticclay.views.wall_plots:zwidth_plot"
+    printed = {
+        "regions": (
+            "region",
+            "K at the least B [N/m]",
+            "largest K [N/m]",
+            "largest B [N.s/m]",
+            "area [N^2.s/m^2]",
+            "verdict",
+            "gap to exact",
+        )
+    }
+    formats = {"gap to exact": ".2g %"}
 
     regions: tuple[ZRegion, ...]
     vary: str = ""
@@ -214,6 +227,31 @@ class ZWidth(Result):
             "gap to exact": [r.gap() for r in self.regions],
         }
         return {"runs": runs, "lines": lines, "regions": regions}
+
+    def remarks(self) -> list[str]:
+        """Where K may be larger, how runs were judged, and whether they agree with theory."""
+        lines = []
+        for r in self.regions:
+            if len(r.B) > 1:  # between the tested dampings it is not known
+                name, (low, high) = f"{r.name}: " if r.name else "", r.top_between
+                between = f"between B = {low:.4g} and {high:.4g}"
+                lines.append(f"{name}{between}, of {len(r.B)} tried, K may be larger")
+        if not math.isnan(self.gap()):
+            lines.append(f"runs against the exact linear loop: within {100.0 * self.gap():.2g} %")
+        if rough := [r for r in self.regions if not r.linear]:
+            lines.append(
+                f"rest: back and forth by {1e6 * self.press.still:g} um at most, after a push of "
+                f"{self.press.force:g} N at {1e3 * self.press.speed:g} mm/s"
+                f" ({len(rough)} of {len(self.regions)} regions)"
+            )
+        return lines + (
+            self.violations() or ["no run was unstable below a line that is sufficient"]
+        )
+
+    def contents(self) -> dict[str, Any]:
+        """Push, tables, and the differences between theory and runs."""
+        violations = {"violations": self.violations()}
+        return {"press": self.press, "tables": self.tables(), "gap": self.gap(), **violations}
 
 
 @checked

@@ -11,21 +11,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+from typing import Annotated
 
 import numpy as np
 
 from ..arguments import checked
 from ..display import brief
-from ..errors import ParameterError, number, pair
-from ..formulas.arm import inverse_kinematics, jacobian, mobility
+from ..errors import Bound, ParameterError, number
+from ..model.controller import matrix_exponential
+from ..model.operator import NO_HAND
 from ..scene.scenario import Scenario
 from . import linear_loop, roots
 
 STIFFEST = 1e9  # [N/m] end of the search for a limit
 SCANNED = 240  # values of K in the search, spaced evenly in log K
 SOFTEST = 1e-3  # [N/m] start of the search
-AT_ONCE = 40  # values of K evaluated at a time
 AT_REST = 1e-6  # modes this near to z = 1 are rigid motion of the handle, which may have no spring
 ROUNDING = 1e-12  # of an eigenvalue
 PERIODS = 199  # in the search for the longest one
@@ -56,25 +57,19 @@ class Handle:
     def of(
         cls,
         scenario: Scenario,
-        place: tuple[float, float] = (0.0, 0.0),
+        place: Annotated[tuple[float, float], Bound(-10.0, 10.0, "m")] = (0.0, 0.0),
         normal: tuple[float, float] = (1.0, 0.0),
     ) -> Handle:
         """The handle of a scenario's arm and operator."""
-        place = pair("place", place, -10.0, 10.0, unit="m")
         size = math.hypot(*normal)
         if not (size > 0.0 and math.isfinite(size)):
             raise ParameterError("normal", normal, "must have a direction")
-        links = scenario.arm.links
         x, y = scenario.origin[0] + place[0], scenario.origin[1] + place[1]
         low, high = scenario.arm.reach
         if not low < math.hypot(x, y) < high:
             raise ParameterError("place", place, "must lie within the reach of the arm")
-        wxx, wxy, wyy = mobility(jacobian(*inverse_kinematics(x, y, links), links), links)
-        inertia = np.linalg.inv([[wxx, wxy], [wxy, wyy]])
-        hands = [
-            (0.0, 0.0, 0.0) if h is None else (h.mass, h.damper, h.spring)
-            for h in scenario.operators
-        ]
+        inertia = np.linalg.inv(linear_loop.mobility_at(scenario.arm, x, y))
+        hands = [astuple(hand or NO_HAND) for hand in scenario.operators]
         mass, damping, stiffness = np.array(hands).T
         return cls(inertia + np.diag(mass), damping, stiffness, np.array(normal) / size)
 
@@ -100,32 +95,32 @@ def client_map(handle: Handle, K: float, B: float, Ts: float, delay: float) -> n
 
 def _held(handle: Handle, t: float) -> tuple[np.ndarray, np.ndarray]:
     """Transition of position and velocity over a time, and the response to a held normal force."""
-    from scipy.linalg import expm
-
     inverse = np.linalg.inv(handle.inertia)
     a = np.zeros((5, 5))
     a[:2, 2:4] = np.eye(2)
     a[2:4, :2] = -inverse * handle.stiffness
     a[2:4, 2:4] = -inverse * handle.damping
     a[2:4, 4] = inverse @ handle.normal
-    e = expm(a * t)
+    e = matrix_exponential(a * t)
     return e[:4, :4], e[:4, 4]
 
 
 def holds(handle: Handle, K: float, B: float, Ts: float, delay: float) -> bool:
     """Whether the loop is stable: all modes but rigid motion lie within the unit circle."""
-    return bool(_stable(client_map(handle, K, B, Ts, delay)))
+    return _stable(client_map(handle, K, B, Ts, delay))
 
 
-def _stable(maps: np.ndarray) -> np.ndarray:
-    """Whether each map is stable: maps (..., n, n), result (...)."""
-    z = np.linalg.eigvals(maps)
-    size = np.where(np.abs(z - 1.0) > AT_REST, np.abs(z), 0.0)
-    return size.max(axis=-1) < 1.0 + ROUNDING
+def _stable(loop: np.ndarray) -> bool:
+    z = np.linalg.eigvals(loop)
+    return bool(np.abs(z[np.abs(z - 1.0) > AT_REST]).max(initial=0.0) < 1.0 + ROUNDING)
+
+
+Sample = Annotated[float, Bound(1e-6, 1.0, "s")]
+Delay = Annotated[float, Bound(0.0, 10.0, "s")]
 
 
 @checked
-def rendered_stiffness_limit(handle: Handle, B: float, Ts: float, delay: float = 0.0) -> float:
+def rendered_stiffness_limit(handle: Handle, B: float, Ts: Sample, delay: Delay = 0.0) -> float:
     """Largest stable stiffness of a wall rendered by a program [N/m]."""
     (limit,) = rendered_stiffness_limits(handle, (B,), Ts, delay)
     return limit
@@ -133,31 +128,21 @@ def rendered_stiffness_limit(handle: Handle, B: float, Ts: float, delay: float =
 
 @checked
 def rendered_stiffness_limits(
-    handle: Handle, B: Sequence[float], Ts: float, delay: float = 0.0
+    handle: Handle, B: Sequence[float], Ts: Sample, delay: Delay = 0.0
 ) -> tuple[float, ...]:
     """Largest stable stiffness by damping of the wall: the Z-width of a program's loop."""
     dampings = [number("B", b, -1e6, 1e6) for b in B]
-    Ts, delay = number("Ts", Ts, 1e-6, 1.0), number("delay", delay, 0.0, 10.0)
     free = client_map(handle, 0.0, 0.0, Ts, delay)  # the loop is linear in K and B
     by_K = client_map(handle, 1.0, 0.0, Ts, delay) - free
     by_B = client_map(handle, 0.0, 1.0, Ts, delay) - free
-    return tuple(_limit(free + b * by_B, by_K) for b in dampings)
+    grid = np.geomspace(SOFTEST, STIFFEST, SCANNED).tolist()
 
+    def limit(B: float) -> float:
+        soft = free + B * by_B
+        low, high = roots.first_failure(lambda K: _stable(soft + K * by_K), grid, rtol=1e-9)
+        return low if high < math.inf else math.inf
 
-def _limit(soft: np.ndarray, by_K: np.ndarray) -> float:
-    """Least K at which soft + K by_K is unstable [N/m]; inf if no tested K is unstable."""
-
-    def stable(K: float) -> bool:
-        return bool(_stable(soft + K * by_K))
-
-    grid = np.geomspace(SOFTEST, STIFFEST, SCANNED)
-    for first in range(0, SCANNED, AT_ONCE):
-        some = grid[first : first + AT_ONCE]
-        failed = np.flatnonzero(~_stable(soft + some[:, None, None] * by_K))
-        if len(failed):
-            i = first + int(failed[0])
-            return roots.bisect(stable, float(grid[i - 1]), float(grid[i]), 1e-9)[0] if i else 0.0
-    return math.inf
+    return tuple(map(limit, dampings))
 
 
 @checked
@@ -171,9 +156,5 @@ def slowest_period(handle: Handle, K: float, B: float, late: float, Ts: float) -
     def stable(period: float) -> bool:
         return holds(handle, K, B, period, late * period)
 
-    if not stable(grid[0]):
-        return 0.0
-    for low, high in zip(grid[:-1], grid[1:], strict=True):
-        if not stable(high):
-            return roots.bisect(stable, low, high, 1e-9)[0]
-    return math.inf
+    low, high = roots.first_failure(stable, grid, rtol=1e-9)
+    return low if high < math.inf else math.inf

@@ -63,12 +63,14 @@ class LinearLaw:
     D: np.ndarray
 
     def __post_init__(self):
-        n = len(array_of("A", self.A))
-        shapes = {"A": (n, n), "B": (n, 6), "C": (2, n), "D": (2, 6)}
-        for name, shape in shapes.items():
+        A = array_of("A", self.A)
+        n = len(A) if A.ndim == 2 else 0
+        for name, shape in {"A": (n, n), "B": (n, 6), "C": (2, n), "D": (2, 6)}.items():
             given = array_of(name, getattr(self, name))
-            if given.shape != shape and given.size + math.prod(shape):  # [] for no states
-                raise ParameterError(name, given.shape, f"must have the shape {shape}")
+            empty = not given.size and not math.prod(shape)  # [] for a controller without states
+            if (given.shape != shape and not empty) or not np.isfinite(given).all():
+                bound = f"must be finite numbers of the shape {shape}, A square"
+                raise ParameterError(name, getattr(self, name), bound)
             object.__setattr__(self, name, given.reshape(shape))
 
     def scaled(self, gain: float) -> LinearLaw:

@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..arguments import named
-from ..errors import ParameterError, choice, number, pair
+from ..errors import Bound, ParameterError, pair
 from ..model.compensator import Compensator
 from ..results import Result
 from . import gain_limits, margin_gains, stability_margins
 from .loops import TIMING, Loop, of_loop
+from .stability_margins import Break
 
 K_MAX = 1e6  # bound of Scenario.gain: a margin that holds up to here counts as holding for any gain
 SPARE = 1e-10  # a gain is lower by this share, so that rounding does not cost it its margin
@@ -25,11 +26,11 @@ DESIGN_BAND = (0.3, 30.0)  # [rad/s]: voluntary motion of a hand, up to about 5 
 def design_gain(
     loop: Loop,
     *,
-    gain_margin: float = 1.0,
-    phase_margin: float = 0.0,
-    disk_margin: float = 0.0,
-    delay_margin: float = 0.0,
-    at: str = "compensator",
+    gain_margin: Annotated[float, Bound(1.0)] = 1.0,
+    phase_margin: Annotated[float, Bound(0.0, math.pi, "rad")] = 0.0,
+    disk_margin: Annotated[float, Bound(0.0, 2.0)] = 0.0,
+    delay_margin: Annotated[float, Bound(0.0, unit="s")] = 0.0,
+    at: Break = "compensator",
 ) -> float:
     """Largest K for which it and every lower K keep all requested margins.
 
@@ -51,11 +52,7 @@ def design_gain(
     Raises:
         ParameterError: a value is out of its bounds.
     """
-    gain = number("gain_margin", gain_margin, 1.0)
-    phase = number("phase_margin", phase_margin, 0.0, math.pi, unit="rad")
-    disk = number("disk_margin", disk_margin, 0.0, 2.0)
-    late = number("delay_margin", delay_margin, 0.0, unit="s")
-    choice("at", at, stability_margins.BREAKS)
+    gain, phase, disk, late = gain_margin, phase_margin, disk_margin, delay_margin
     top = gain_limits.gain_limit(loop)
     if loop.Ts is not None or loop.delay:
         if phase or disk or late or at != "compensator":
@@ -83,7 +80,7 @@ class Design(Result):
         margins: stability margins of the loop.
     """
 
-    drawn_by = "hapticclay.views.result_plots:design_plot"
+    drawn_by = "hapticclay.views.theory_plots:design_plot"
 
     compensator: Compensator
     K: float
@@ -133,7 +130,7 @@ def compare(
     compensators: Iterable[Any],
     *,
     band: tuple[float, float] = DESIGN_BAND,
-    at: str = "compensator",
+    at: Break = "compensator",
     **margin: float,
 ) -> list[Design]:
     """Compensators at equal margin, the most transparent first.

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -28,7 +27,6 @@ from .linear_loop import LinearLoop
 PHASE_STEP = 1.01  # the frequency grid grows by this factor ...
 NEAR_AXIS = 10.0 ** np.arange(-9.0, 0.0, 0.25)  # ... and closes in on every resonance
 SAME_FREQUENCY = 1e-10  # of a pole's: a crossing as near belongs to K = 0
-GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 LOWEST = -200.0  # logarithm of the least frequency of a search
 MOST_TURNS = 100_000  # points that follow the turns of a delay
 LEAST_GAIN = 1e-60  # no pole crosses at a lower gain, and products of such numbers underflow
@@ -168,6 +166,8 @@ def _zeros(
     f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, y: np.ndarray, where: np.ndarray
 ) -> list[float]:
     """exp of the zeros of f between points x, with y = f(x), next to a point of the mask."""
+    from scipy.optimize.elementwise import find_minimum
+
     y = np.where(y == 0.0, 1e-300, y)  # a grid point on a crossing is found from one side
     i = np.flatnonzero((y[:-1] * y[1:] < 0.0) & (where[:-1] | where[1:]))
     low, high = [x[i]], [x[i + 1]]
@@ -175,73 +175,30 @@ def _zeros(
     i = np.flatnonzero(dip & (y[1:-1] * y[2:] > 0.0) & where[1:-1]) + 1
     if len(i):
         sign = np.sign(y[i])
-        bottom = _bottoms(lambda x: sign * f(x), x[i - 1], x[i + 1])
+        around = x[i - 1], x[i], x[i + 1]
+        with np.errstate(invalid="ignore"):  # a flat dip
+            found = find_minimum(lambda x, sign: sign * f(x), around, args=(sign,))
+        bottom = np.where(found.success, found.x, x[i])
         through = sign * f(bottom) < 0.0
         i, bottom = i[through], bottom[through]
         low, high = [*low, x[i - 1], bottom], [*high, bottom, x[i + 1]]
     return np.exp(_bracketed(f, np.concatenate(low), np.concatenate(high))).tolist()
 
 
-def _bottoms(
-    f: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray
-) -> np.ndarray:
-    """Where f is least between low and high, each element for itself, by golden sections."""
-    at = np.array([high - GOLDEN * (high - low), low + GOLDEN * (high - low)])
-    y = np.array([f(at[0]), f(at[1])])
-    for _ in range(34):  # to 1e-7 of the width
-        left = y[0] < y[1]
-        low, high = np.where(left, low, at[0]), np.where(left, at[1], high)
-        new = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
-        at = np.where(left, [new, at[0]], [at[1], new])
-        value = f(new)
-        y = np.where(left, [value, y[0]], [y[1], value])
-    return 0.5 * (low + high)
-
-
 def _bracketed(
     f: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
-    """The zeros of f between low and high, all at once (Chandrupatla 1997).
+    """The zeros of f between low and high.
 
     Where f has one sign at both ends, up to rounding, the zero is the end nearer to it.
     """
-    out = np.array(low)
-    active: Any = np.arange(len(low))
-    a, b, c, t = high, low, low, np.full(len(low), 0.5)
-    fa, fb = (f(a), f(b)) if len(a) else (a, b)
-    fc = fb
-    for _ in range(200):
-        least = np.abs(fa) < np.abs(fb)
-        best, width = np.where(least, a, b), np.abs(b - a)
-        tolerance = 4.0 * 2.0**-52 * np.maximum(np.abs(best), 1.0)
-        out[active] = best
-        go = (width > tolerance) & (fa * fb < 0.0)
-        if not np.any(go):
-            break
-        active, a, b, c, fa, fb, fc, t, width, tolerance = (
-            v[go] for v in (active, a, b, c, fa, fb, fc, t, width, tolerance)
-        )
-        nearest = 0.5 * tolerance / width
-        new = a + np.clip(t, nearest, 1.0 - nearest) * (b - a)
-        value = f(new)
-        same = (value > 0.0) == (fa > 0.0)
-        c, fc = np.where(same, a, b), np.where(same, fa, fb)
-        b, fb = np.where(same, b, a), np.where(same, fb, fa)
-        a, fa = new, value
-        t = _inverse_quadratic((a, b, c), (fa, fb, fc))
-    return out
+    from scipy.optimize.elementwise import find_root
 
-
-def _inverse_quadratic(x: tuple[np.ndarray, ...], y: tuple[np.ndarray, ...]) -> np.ndarray:
-    """Share of the way from x[0] to x[1] of the next point; half where no parabola fits."""
-    (a, b, c), (fa, fb, fc) = x, y
-    with np.errstate(divide="ignore", invalid="ignore"):
-        xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
-        share = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (
-            fc - fb
-        )
-        fits = (phi * phi < xi) & ((1.0 - phi) ** 2 < 1.0 - xi) & np.isfinite(share)
-    return np.where(fits, share, 0.5)
+    if not len(low):
+        return low
+    found = find_root(f, (low, high))
+    nearer = np.where(np.abs(found.f_bracket[0]) < np.abs(found.f_bracket[1]), low, high)
+    return np.where(found.success, found.x, nearer)
 
 
 def frequency_grid(low: float, high: float, resonances: np.ndarray) -> np.ndarray:

@@ -7,13 +7,13 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Annotated
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from ..arguments import named
-from ..errors import ParameterError, flag, integer, number, numbers_of
-from ..fields import nodes_of
+from ..arguments import named, part
+from ..errors import Bound, ParameterError, number
 from ..model.operator import Operator
 from . import exact_roots, gain_crossings, linear_loop, roots
 from .exact_roots import axis_parts, rational, value
@@ -24,8 +24,10 @@ from .stability_margins import LINEAR, Verdict
 # ---- the worst case over hands -------------------------------------------------------------------
 
 
-@named
-@dataclass(frozen=True)
+ENDS = ("low", "high")
+
+
+@part("box.")
 class Box:
     """Ranges of Th, with or without a rigid arm.
 
@@ -36,21 +38,17 @@ class Box:
         rigid: True adds a rigid arm, Th = infinity.
     """
 
-    mass: tuple[float, float] = (0.25, 0.25)
-    damper: tuple[float, float] = (2.0, 2.0)
-    spring: tuple[float, float] = (6.0, 6.0)
+    mass: Annotated[tuple[float, float], Bound(0.0, unit="kg", names=ENDS)] = (0.25, 0.25)
+    damper: Annotated[tuple[float, float], Bound(0.0, unit="N.s/m", names=ENDS)] = (2.0, 2.0)
+    spring: Annotated[tuple[float, float], Bound(0.0, unit="N/m", names=ENDS)] = (6.0, 6.0)
     rigid: bool = False
 
     def __post_init__(self):
-        for field, node in nodes_of(Operator).items():
-            unit = node.bound.unit
-            given = getattr(self, field)
-            low, high = numbers_of(f"box.{field}", given, ("low", "high"), 0.0, unit=unit)
+        for field in ("mass", "damper", "spring"):
+            low, high = getattr(self, field)
             if high < low:
                 raise ParameterError(f"box.{field}", (low, high), "must have low <= high")
-            object.__setattr__(self, field, (low, high))
             Operator(**{field: high})
-        flag("box.rigid", self.rigid)
 
     def corners(self) -> list[Operator]:
         """Return the up to eight distinct corners."""
@@ -165,7 +163,9 @@ def rigid_limit(loop: Loop) -> tuple[float, float]:
 
 
 @of_loop("K", "b", "box", timing=True)
-def worst_case(loop: Loop, box: Box, *, samples: int = 56) -> WorstCase:
+def worst_case(
+    loop: Loop, box: Box, *, samples: Annotated[int, Bound(0, 10_000)] = 56
+) -> WorstCase:
     """The lowest gain limit over a box of hands.
 
     In continuous time without delay the result is exact: the least K at which `critical_hand` finds
@@ -181,7 +181,7 @@ def worst_case(loop: Loop, box: Box, *, samples: int = 56) -> WorstCase:
     K = number("K", loop.gain, 0.0, above=True)
     timed = loop.Ts is not None or loop.delay > 0.0
     if timed:
-        members = box.corners() + box.sample(integer("samples", samples, 0, 10_000))
+        members = box.corners() + box.sample(samples)
         found = [(*gain_crossings.critical_gain(replace(loop, operator=th)), th) for th in members]
         limit, omega, hand = min(found, key=lambda x: x[0])
         how = f"sampled: the corners and {samples} random members, no proof for those between"

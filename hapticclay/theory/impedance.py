@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -23,6 +22,7 @@ from ..results import Result
 from ..scene.virtual_wall import VirtualWall
 from . import linear_loop
 from .loops import Loop, of_loop
+from .wall_limits import wall_law
 
 UNIT_SPRING = Operator(0.0, 0.0, 1.0)
 
@@ -43,7 +43,7 @@ class Impedance(Result):
         rendered: Ze, the desired impedance [N.s/m], complex, shape (n,).
     """
 
-    drawn_by = "hapticclay.views.result_plots:effective_parts_plot"
+    drawn_by = "hapticclay.views.impedance_plots:effective_parts_plot"
 
     omega: np.ndarray
     Z: np.ndarray
@@ -98,49 +98,6 @@ class Impedance(Result):
         """Z/Ze, effective over rendered impedance, complex, shape (n,); NaN where Ze = 0."""
         out = np.full(self.Z.shape, complex(np.nan, np.nan))
         return np.divide(self.Z, self.rendered, out=out, where=self.rendered != 0.0)
-
-
-class HeldArm(NamedTuple):
-    """A mass, damper and spring under a sinusoidal and a held force, phasors of the fundamental.
-
-    Each field has shape (n,), over the given frequencies. z = exp(j omega Ts).
-
-    Attributes:
-        place: position per unit of the sinusoidal force [m/N].
-        speed: velocity per unit of the sinusoidal force [m/(N.s)].
-        held_place: position at the samples, per unit of the force commanded at them [m/N].
-        held_speed: velocity at the samples, likewise [m/(N.s)].
-        before: force that acts up to a sample per unit of commanded force: z^-1 or a higher power
-            of it.
-        hold: fundamental of the held, delayed force per unit of commanded force.
-    """
-
-    place: np.ndarray
-    speed: np.ndarray
-    held_place: np.ndarray
-    held_speed: np.ndarray
-    before: np.ndarray
-    hold: np.ndarray
-
-
-def held_arm(
-    mass: float, damper: float, spring: float, Ts: float, delay: float, omega: np.ndarray
-) -> HeldArm:
-    """Responses of a mass, damper and spring whose motor force is held from sample to sample."""
-    whole, part = linear_loop.whole_samples(delay, Ts)
-    own, s = np.array([-spring, -damper]) / mass, 1j * omega
-    # under the force of one sample for a share `part`, then under the next
-    head, old = linear_loop.held_motion(own, 1.0 / mass, part * Ts)
-    rest, new = linear_loop.held_motion(own, 1.0 / mass, (1.0 - part) * Ts)
-    change, z1 = rest + head + rest @ head, np.expm1(s * Ts)
-    before = np.exp(-s * Ts * (1 + whole))
-    drive = np.multiply.outer(before, old + rest @ old)
-    drive += np.multiply.outer(np.exp(-s * Ts * whole), new)
-    ahead = z1[:, None, None] * np.eye(2) - change
-    held = np.linalg.solve(ahead, drive[:, :, None])[:, :, 0]
-    place = 1.0 / (mass * s * s + damper * s + spring)
-    hold = -np.expm1(-s * Ts) / (s * Ts) * np.exp(-s * delay)
-    return HeldArm(place, s * place, held[:, 0], held[:, 1], before, hold)
 
 
 @of_loop("K", "b", "omega", timing=True)
@@ -227,7 +184,7 @@ def _sampled_response(loop: Loop, omega: np.ndarray) -> tuple[np.ndarray, np.nda
     shaped = loop.servo.S.gain / W - 1.0  # share of the net force that shapes the inertia
     total = 1.0 / W + th.mass
     damper, spring = th.damper + physical * b, th.spring + physical * k
-    arm = held_arm(total, damper, spring, Ts, loop.delay, omega)
+    arm = linear_loop.held_arm(total, damper, spring, Ts, loop.delay, omega)
     # compensator and reference model, to the net force
     D, B = linear_loop.held_change(loop, loop.gain)
     ahead = np.expm1(s * Ts)[:, None, None] * np.eye(n + 2) - D
@@ -268,16 +225,11 @@ def wall_response(wall: VirtualWall, omega: np.ndarray) -> Impedance:
     """
     omega = frequencies(omega)
     s, Ts, d, th = 1j * omega, wall.Ts, wall.device, wall.hand
-    z1 = np.exp(-s * Ts)
-    arm = held_arm(d.mass + th.mass, d.damper + th.damper, th.spring, Ts, wall.delay, omega)
-    place, speed = wall.K + 0.0 * s, 0.0 * s  # force per unit of each, measured
-    rate = wall.B - wall.M * np.expm1(-s * Ts) / Ts
-    if wall.velocity == "exact":
-        speed = rate
-    else:
-        keep = math.exp(-2.0 * math.pi * wall.velocity_filter * Ts) if wall.velocity_filter else 0.0
-        slope = -np.expm1(-s * Ts * wall.velocity_window) / (wall.velocity_window * Ts)
-        place = place + rate * slope * (1.0 - keep) / (1.0 - keep * z1)
+    arm = linear_loop.held_arm(
+        d.mass + th.mass, d.damper + th.damper, th.spring, Ts, wall.delay, omega
+    )
+    by_place, speed = wall_law(wall, omega * Ts)  # force per unit of each, measured
+    place = wall.K + by_place
     held = place * arm.held_place + speed * arm.held_speed
     asked = -(place * arm.place + speed * arm.speed) / (1.0 + held)
     v = arm.speed * (1.0 + arm.hold * asked)

@@ -10,7 +10,7 @@ import cmath
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -18,8 +18,10 @@ from numpy.polynomial import Polynomial
 from ..arguments import named
 from ..errors import Bound, ParameterError, choice, number
 from ..fields import check_fields
+from ..formulas import arm as arm_law
 from ..formulas.constants import B_MAX
 from ..model import controller
+from ..model.arm import Arm
 from ..model.compensator import PRINTED, Compensator
 from ..model.constants import AXES
 from ..model.controller import SERVO, Servo
@@ -350,6 +352,13 @@ def whole_samples(delay: float, Ts: float) -> tuple[int, float]:
     return whole, part if part > 1e-9 else 0.0
 
 
+def mobility_at(arm: Arm, x: float, y: float) -> np.ndarray:
+    """Mobility of the bare handle with the handle at a world position [1/kg], shape (2, 2)."""
+    u = arm_law.jacobian(*arm_law.inverse_kinematics(x, y, arm.links), arm.links)
+    xx, xy, yy = arm_law.mobility(u, arm.links)
+    return np.array([[xx, xy], [xy, yy]])
+
+
 def _places(loops: Sequence[LinearLoop]) -> list[int]:
     """Index of the first state of each axis, and of the end of the last."""
     at = [0]
@@ -472,6 +481,59 @@ def held_motion(own: np.ndarray, w: float, t: float) -> tuple[np.ndarray, np.nda
     pulse, sums = pulse.real, sums.real
     change = [[own[0] * sums, pulse], [own[0] * pulse, own[1] * pulse + own[0] * sums]]
     return np.array(change), w * np.array([sums, pulse])
+
+
+class HeldArm(NamedTuple):
+    """A mass, damper and spring under a sinusoidal and a held force, phasors of the fundamental.
+
+    Each field has shape (n,), over the given frequencies. z = exp(j omega Ts).
+
+    Attributes:
+        place: position per unit of the sinusoidal force [m/N].
+        speed: velocity per unit of the sinusoidal force [m/(N.s)].
+        held_place: position at the samples, per unit of the force commanded at them [m/N].
+        held_speed: velocity at the samples, likewise [m/(N.s)].
+        before: force that acts up to a sample per unit of commanded force: z^-1 or a higher power
+            of it.
+        hold: fundamental of the held, delayed force per unit of commanded force.
+    """
+
+    place: np.ndarray
+    speed: np.ndarray
+    held_place: np.ndarray
+    held_speed: np.ndarray
+    before: np.ndarray
+    hold: np.ndarray
+
+
+def held_arm(
+    mass: float, damper: float, spring: float, Ts: float, delay: float, omega: np.ndarray
+) -> HeldArm:
+    """Responses of a mass, damper and spring whose motor force is held from sample to sample."""
+    change, new, old, whole = split_motion(mass, damper, spring, Ts, delay)
+    s = 1j * omega
+    before = np.exp(-s * Ts * (1 + whole))
+    drive = np.multiply.outer(before, old) + np.multiply.outer(np.exp(-s * Ts * whole), new)
+    ahead = np.expm1(s * Ts)[:, None, None] * np.eye(2) - change
+    held = np.linalg.solve(ahead, drive[:, :, None])[:, :, 0]
+    place = 1.0 / (mass * s * s + damper * s + spring)
+    hold = -np.expm1(-s * Ts) / (s * Ts) * np.exp(-s * delay)
+    return HeldArm(place, s * place, held[:, 0], held[:, 1], before, hold)
+
+
+def split_motion(
+    mass: float, damper: float, spring: float, Ts: float, delay: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Change of (position, velocity) over a sample, and the responses to two held forces.
+
+    The newer force is that of `whole` samples before; the older one, which it replaces within the
+    sample, is that of one sample more.
+    """
+    whole, part = whole_samples(delay, Ts)
+    own = np.array([-spring, -damper]) / mass
+    head, old = held_motion(own, 1.0 / mass, part * Ts)
+    rest, new = held_motion(own, 1.0 / mass, (1.0 - part) * Ts)
+    return rest + head + rest @ head, new, old + rest @ old, whole
 
 
 def crossing_times(

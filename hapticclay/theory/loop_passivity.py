@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..arguments import checked
-from ..errors import number
+from ..errors import Bound, number
 from ..scene.virtual_wall import Device, VirtualWall
 from . import linear_loop, roots
 from .loops import Loop, of_loop
@@ -93,7 +94,11 @@ def _sampled_verdict(need: np.ndarray, damping: float, omega: np.ndarray) -> Ver
 
 @checked
 def clay_passivity(
-    b: float, Ts: float, damping: float = 0.0, stiffness: float = 0.0, delay: float = 0.0
+    b: Annotated[float, Bound(0.0, unit="N.s/m")],
+    Ts: Annotated[float, Bound(0.0, unit="s", above=True)],
+    damping: Annotated[float, Bound(0.0, unit="N.s/m")] = 0.0,
+    stiffness: Annotated[float, Bound(0.0, unit="N/m")] = 0.0,
+    delay: Annotated[float, Bound(0.0, unit="s")] = 0.0,
 ) -> Verdict:
     """Passivity of held clay alone, its velocity a backward difference.
 
@@ -109,9 +114,8 @@ def clay_passivity(
         stiffness: stiffness of a wall beside the clay [N/m].
         delay: from a sample to the force computed from it [s], 0 to 100 Ts.
     """
-    b, k = number("b", b, 0.0, unit="N.s/m"), number("stiffness", stiffness, 0.0, unit="N/m")
-    if not number("delay", delay, 0.0, unit="s"):
-        return colgate_schenkel(lambda z: k + b * (1.0 - 1.0 / z) / Ts, Ts, damping)
-    wall = VirtualWall(K=k, B=b, device=Device(damper=damping), Ts=Ts, delay=delay)
+    if not delay:
+        return colgate_schenkel(lambda z: stiffness + b * (1.0 - 1.0 / z) / Ts, Ts, damping)
+    wall = VirtualWall(K=stiffness, B=b, device=Device(damper=damping), Ts=Ts, delay=delay)
     omega = np.linspace(0.0, np.pi, FREQUENCIES)[1:] / Ts
     return _sampled_verdict(damping - passivity_index(wall, omega), damping, omega)

@@ -108,72 +108,72 @@ PARTS = tuple(f.name for f in fields(Loop))
 def of_loop(
     *order: str, timing: bool = False
 ) -> Callable[[Callable[..., Answer]], Callable[..., Answer]]:
-    """Lets an analysis of a `Loop` accept the parts of a loop, too.
+    """Lets an analysis of a `Loop` accept a scenario or the parts of a loop, too.
 
-    `f(loop, ...)`, `f(loop, K=2.0, ...)`; `f(scenario, "x", ...)`, with b= for another clay, which
-    calls `Loop.of`; or `f("x", *order, servo=..., compensator=..., ...)`: the axis, what `order`
-    names by position or by name, and every other part of a Loop by name.
+    `f(loop, ...)` and `f(loop, K=2.0, ...)`; `f(scenario, "x", ...)`, with b= for another clay; or
+    `f("x", *order, servo=..., compensator=..., ...)`: the axis, what `order` names by position or
+    by name, and every other part of a Loop by name. Without `timing` a sampled or delayed loop is
+    refused.
     """
 
     def decorate(analysis: Callable[..., Answer]) -> Callable[..., Answer]:
-        name = analysis.__name__
+        name, guarded = analysis.__name__, checked(analysis)
         own = [p for n, p in inspect.signature(analysis).parameters.items() if n != "loop"]
-        free = tuple(n for n in order if n not in PARTS)
-        guarded, signature = checked(analysis), _signature(order, own)
-        known = {"loop", *PARTS, *signature.parameters}
-        known = known if all(p.kind is not p.VAR_KEYWORD for p in own) else None
+        free = [n for n in order if n not in PARTS]
+        form = _form(["axis", *order], own)
+        forms = {Loop: _form(["axis", *free], own), Scenario: _form(["loop", "axis", *free], own)}
+        closed = all(p.kind is not p.VAR_KEYWORD for p in own)
 
         @functools.wraps(analysis)
         def ask(*args: Any, **given: Any) -> Answer:
-            if known:
-                known_names(name, given, known)
-            whole, *rest = _loop_first(name, args, given)
-            _by_name(name, free if isinstance(whole, Loop) else order, rest, given)
-            parts = {word: given.pop(word) for word in PARTS if word in given}
-            if isinstance(whole, Loop):
-                loop = _with_gain(whole, parts)
-            else:
-                missing = [n for n in order if n in PARTS and n not in ("operator", *parts)]
-                if missing:
-                    raise TypeError(f"{name}() lacks {', '.join(missing)}")
-                loop = Loop(whole, **parts)
+            if "loop" in given:
+                args = (given.pop("loop"), *args)
+            if closed:
+                known_names(name, given, {"loop", *form.parameters})
+            first = args[0] if args else given.get("axis")
+            try:
+                bound = forms.get(type(first), form).bind(*args, **given)
+            except TypeError as error:
+                raise TypeError(f"{name}(): {error}") from None
+            rest = bound.kwargs | dict(zip(bound.signature.parameters, bound.args, strict=False))
+            loop = _loop({n: rest.pop(n) for n in ("loop", *PARTS) if n in rest})
             if not timing:
                 _refuse_timing(loop)
-            return guarded(loop, **given)
+            return guarded(loop, **rest)
 
-        ask.__signature__ = signature  # type: ignore[attr-defined]
+        ask.__signature__ = form  # type: ignore[attr-defined]
         return ask
 
     return decorate
 
 
-def _loop_first(name: str, args: Sequence[Any], given: dict[str, Any]) -> Sequence[Any]:
-    """Positional arguments of an analysis, after a Loop, the Loop of a Scenario, or an axis.
-
-    The parts of the first argument are taken out of `given`, the arguments by name.
-    """
-    if args and isinstance(args[0], Scenario):
-        scenario, *rest = args
-        if not rest and "axis" not in given:
-            raise TypeError(f"{name}() of a Scenario needs an axis")
-        axis = rest.pop(0) if rest else given.pop("axis")
-        args = (Loop.of(scenario, axis, given.pop("b", None)), *rest)
-    for word in ("loop", "axis"):
-        if word in given:
-            args = (given.pop(word), *args)
-    if not args:
-        raise TypeError(f"{name}() needs a Loop, or a Scenario or parts and an axis")
-    return args
+def _form(order: Sequence[str], own: Sequence[inspect.Parameter]) -> inspect.Signature:
+    """A call by position in a given order, or by name, with every part of a Loop by name."""
+    P, defaults = inspect.Parameter, {f.name: f.default for f in fields(Loop)}
+    kinds = {"axis": "str | Loop | Scenario"}
+    out = [
+        P(n, P.POSITIONAL_OR_KEYWORD, annotation=kinds.get(n, P.empty),
+          default=None if n == "operator" else P.empty)
+        for n in order
+    ]  # fmt: skip
+    out += [P(n, P.KEYWORD_ONLY, default=defaults[n]) for n in PARTS if n not in order]
+    rest = [p for p in own if p.name not in order]
+    out += [p.replace(kind=P.KEYWORD_ONLY) for p in rest if p.kind is not P.VAR_KEYWORD]
+    return inspect.Signature(out + [p for p in rest if p.kind is P.VAR_KEYWORD])
 
 
-def _by_name(name: str, names: Sequence[str], rest: Sequence[Any], given: dict[str, Any]) -> None:
-    """Moves positional arguments to the arguments by name."""
-    if len(rest) > len(names):
-        raise TypeError(f"{name}() takes {1 + len(names)} positional arguments at most")
-    for word, value in zip(names, rest, strict=False):
-        if word in given:
-            raise TypeError(f"{name}() got multiple values for argument {word!r}")
-        given[word] = value
+def _loop(parts: dict[str, Any]) -> Loop:
+    """The loop of a scenario's axis, a loop with another gain, or that of some parts."""
+    if "loop" in parts:
+        axis, b = parts.pop("axis"), parts.pop("b", None)
+        parts["axis"] = Loop.of(parts.pop("loop"), axis, b)
+    if not isinstance(parts["axis"], Loop):
+        return Loop(**parts)
+    loop = parts.pop("axis")
+    for word, value in parts.items():
+        if word != "K":
+            raise ParameterError(word, value, "must not be given beside a Loop, which has its own")
+    return replace(loop, **parts) if parts else loop
 
 
 def _refuse_timing(loop: Loop) -> None:
@@ -181,30 +181,6 @@ def _refuse_timing(loop: Loop) -> None:
     for word, value in TIMING.items():
         if getattr(loop, word) != value:
             raise ParameterError(word, getattr(loop, word), NO_TIMING.format(value))
-
-
-def _with_gain(loop: Loop, parts: dict[str, Any]) -> Loop:
-    """The loop, with K if given."""
-    for word, value in parts.items():
-        if word != "K":
-            raise ParameterError(word, value, "must not be given beside a Loop, which has its own")
-    return replace(loop, **parts) if parts else loop
-
-
-def _signature(order: Sequence[str], own: Sequence[inspect.Parameter]) -> inspect.Signature:
-    """Signature of an analysis: an axis or a Loop, the positional arguments, and the rest."""
-    P, more = inspect.Parameter, {p.name: p for p in own}
-    blank = {"operator": None}
-    out = [P("axis", P.POSITIONAL_OR_KEYWORD, annotation="str | Loop | Scenario")]
-    out += [P(n, P.POSITIONAL_OR_KEYWORD, default=blank.get(n, P.empty)) for n in order]
-    out += [
-        P(f.name, P.KEYWORD_ONLY, default=f.default)
-        for f in fields(Loop)
-        if f.name != "axis" and f.name not in order
-    ]
-    rest = [p for n, p in more.items() if n not in order]
-    out += [p.replace(kind=P.KEYWORD_ONLY) for p in rest if p.kind is not P.VAR_KEYWORD]
-    return inspect.Signature(out + [p for p in rest if p.kind is P.VAR_KEYWORD])
 
 
 @of_loop("K", "b", "operator")

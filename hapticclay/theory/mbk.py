@@ -12,13 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from ..arguments import checked, named
 from ..display import brief
-from ..errors import ParameterError, choice, number
+from ..errors import Bound, ParameterError, choice, number
 from ..model.compensator import Compensator
 from ..scene.virtual_wall import VirtualWall
 from . import gain_limits, hand_boxes
@@ -65,7 +65,7 @@ class Region:
 
 
 @checked
-def stable_band(wall: VirtualWall, part: str) -> tuple[float, float]:
+def stable_band(wall: VirtualWall, part: Literal["K", "B", "M"]) -> tuple[float, float]:
     """Range of one part in which the linear wall is stable, with its own values of the other two.
 
     Eigenvalues of the sampled loop are computed on a grid of values; the ends are then refined to
@@ -80,7 +80,7 @@ def stable_band(wall: VirtualWall, part: str) -> tuple[float, float]:
         (low, high) in the unit of the part; low of B and M is mostly negative. high is inf where
         even 16 mass/Ts^2, 16 mass/Ts or 16 mass is stable; both are NaN if no value is stable.
     """
-    grid, stable = _stability(wall, choice("part", part, ("K", "B", "M")))
+    grid, stable = _stability(wall, part)
 
     def edge(inside: float, outside: float) -> float:
         for _ in range(REFINEMENTS):
@@ -169,16 +169,12 @@ def renderable(wall: VirtualWall, plane: str = "mass-damper", n: int = 41) -> Re
 # ---- the arm: an admittance --------------------------------------------------------------------
 
 
-def rendering(loop: Loop, M: float, B: float, K: float = 0.0) -> Loop:
-    """The loop whose compensator is the admittance 1/(M s^2 + B s + K)."""
-    M = number("M", M, 1e-6, 1e6, unit="kg")
-    B, K = number("B", B, 0.0, unit="N.s/m"), number("K", K, 0.0, unit="N/m")
-    return replace(loop, compensator=Compensator((1.0,), (1.0, B / M, K / M)), K=1.0 / M)
-
-
 @checked
 def least_mass(
-    loop: Loop, decay: float, box: Box | None = None, samples: int = 24
+    loop: Loop,
+    decay: Annotated[float, Bound(0.0, 1e6, "1/s")],
+    box: Box | None = None,
+    samples: int = 24,
 ) -> tuple[float, float]:
     """Least virtual mass that the arm renders stably, with a damper B = decay M.
 
@@ -193,7 +189,6 @@ def least_mass(
     Returns:
         M [kg] and B [N.s/m]; 0 where any mass is stable, inf where none is.
     """
-    decay = number("decay", decay, 0.0, 1e6, unit="1/s")
     loop = replace(loop, compensator=Compensator((1.0,), (1.0, decay, 0.0)), K=1.0)
     if box is None:
         limit = gain_limits.gain_limit(loop)
@@ -249,7 +244,9 @@ class DynamicRange:
 
 @checked
 def dynamic_range(
-    wall: VirtualWall, omega: Sequence[float] | np.ndarray, share: float = 0.9
+    wall: VirtualWall,
+    omega: Sequence[float] | np.ndarray,
+    share: Annotated[float, Bound(0.1, 0.999)] = 0.9,
 ) -> DynamicRange:
     """Range of impedance of a device over frequency, from free motion to the stiffest stable wall.
 
@@ -261,7 +258,7 @@ def dynamic_range(
     Raises:
         ParameterError: a value is out of its bounds, or no wall is stable.
     """
-    omega, share = frequencies(omega), number("share", share, 0.1, 0.999)
+    omega = frequencies(omega)
     off = replace(wall, K=0.0, B=0.0, M=0.0, unilateral=False)
     low, high = stable_band(off, "B")
     if not high > low:

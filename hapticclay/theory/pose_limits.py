@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from ..formulas import arm
 from ..model.constants import AXES
 from ..model.operator import NO_HAND, Operator
 from ..scene.scenario import Scenario
@@ -216,10 +215,7 @@ def _mobility(s: Scenario, p: tuple[float, float]) -> np.ndarray:
     """Gains of Sh of both axes at a place, shape (2, 2) [1/kg]."""
     if s.inertia_shaping:
         return np.diag([servo.S.gain for servo in s.servo])
-    links = s.arm.links
-    q = arm.inverse_kinematics(s.origin[0] + p[0], s.origin[1] + p[1], links)
-    xx, xy, yy = arm.mobility(arm.jacobian(*q, links), links)
-    return np.array([[xx, xy], [xy, yy]])
+    return linear_loop.mobility_at(s.arm, s.origin[0] + p[0], s.origin[1] + p[1])
 
 
 def _environment(s: Scenario, b: tuple[float, float]) -> list[list[Polynomial]]:

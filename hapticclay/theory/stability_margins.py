@@ -8,25 +8,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..arguments import named
 from ..display import brief, html_table
-from ..errors import (
-    ParameterError,
-    array_of,
-    choice,
-    integer,
-)
+from ..errors import Bound, ParameterError, array_of
 from . import exact_roots, gain_crossings, linear_loop, roots
 from .exact_roots import rational
 from .loops import Loop, of_loop
 
-BREAKS = ("force", "compensator")
+Break = Literal["force", "compensator"]
+BREAKS = get_args(Break)
 DIPS = 20  # dips of |1 + L| that are refined, the deepest ones on the grid
 LINEAR = "one axis at the nominal pose, linear, motors within their torque limits"
 
@@ -133,7 +129,7 @@ class Nyquist:
 
 
 @of_loop("K", "b", "operator")
-def open_loop(loop: Loop, *, at: str = "force") -> tuple[Polynomial, Polynomial]:
+def open_loop(loop: Loop, *, at: Break = "force") -> tuple[Polynomial, Polynomial]:
     """The loop's transfer function as (numerator, denominator), common factors s removed."""
     return _opened(loop, at)
 
@@ -144,7 +140,7 @@ def _opened(
     """As `open_loop`, by polynomials of another kind: see `linear_loop.loop_polynomials`."""
     blank, passive, driven = linear_loop.loop_polynomials(loop, polynomial)
     driven = polynomial([loop.gain]) * driven
-    if choice("at", at, BREAKS) == "force":
+    if at == "force":
         n, d = passive + driven, blank
     else:
         n, d = driven, blank + passive
@@ -155,7 +151,7 @@ def _opened(
 
 
 @of_loop("K", "b", "operator", timing=True)
-def nyquist(loop: Loop, *, at: str = "force") -> Nyquist:
+def nyquist(loop: Loop, *, at: Break = "force") -> Nyquist:
     """The Nyquist curve and its encirclements.
 
     With sampling the contour is the unit circle, z = exp(j omega Ts), and P and Z count poles
@@ -192,7 +188,7 @@ def encirclements(n: Polynomial, d: Polynomial) -> tuple[int, int]:
 
 
 @of_loop("K", "b", "operator", timing=True)
-def margins(loop: Loop, *, at: str = "compensator") -> Margins:
+def margins(loop: Loop, *, at: Break = "compensator") -> Margins:
     """Gain, phase, delay and disk margins, in continuous time from roots of polynomials.
 
     With sampling or delay the margins follow from the frequency response at the compensator, up to
@@ -211,28 +207,19 @@ def margins(loop: Loop, *, at: str = "compensator") -> Margins:
     n, d = (p.trim() for p in _opened(loop, at, rational))
     if not roots.hurwitz(n + d):
         return NO_MARGINS
-    factor, omega = np.array(roots.crossings(d, n)).reshape(-1, 2).T
-    more, more_at = _extreme(factor, omega, factor > 1.0, np.argmin, math.inf)
-    less, less_at = _extreme(factor, omega, (factor > 0.0) & (factor < 1.0), np.argmax, 0.0)
-    omega, lag = exact_roots.unit_crossings(n, d)
-    every = lag > -1.0
-    turn = np.minimum(lag, 2.0 * np.pi - lag)
-    phase, phase_at = _extreme(turn, omega, every, np.argmin, math.inf)
-    delay, delay_at = _extreme(lag / omega, omega, every, np.argmin, math.inf)
-    if n.degree() == d.degree() and abs(n.coef[-1]) >= abs(d.coef[-1]):
-        delay, delay_at = 0.0, math.inf  # L does not roll off: any delay makes it encircle -1
+    factors, crossed = roots.crossings(d, n), exact_roots.unit_crossings(n, d)
+    rolls_off = n.degree() < d.degree() or abs(n.coef[-1]) < abs(d.coef[-1])
     n, d = exact_roots.approximate(n), exact_roots.approximate(d)
     worst, disk_at = roots.peak_ratio(d - n, d + n)
-    disk = 2.0 / worst
-    return Margins(
-        True, (less, more), phase, delay, disk, (less_at, more_at), phase_at, delay_at, disk_at
-    )
+    found = _margins(factors, *crossed, (2.0 / worst, disk_at))
+    # where L does not roll off, any delay makes it encircle -1
+    return found if rolls_off else replace(found, delay=0.0, delay_omega=math.inf)
 
 
 def _is_timed(loop: Loop, at: str) -> bool:
     """Whether the loop is sampled or delayed; it can then be opened at the compensator only."""
     timed = loop.Ts is not None or loop.delay > 0.0
-    if choice("at", at, BREAKS) != "compensator" and timed:
+    if at != "compensator" and timed:
         raise ParameterError("at", at, "must be 'compensator' with sampling or delay")
     return timed
 
@@ -252,20 +239,10 @@ def _response_margins(family: gain_crossings.LoopFamily, K: float) -> Margins:
     if not family.stable(K):
         return NO_MARGINS
     found = [*gain_crossings.gain_crossings(family), (family.most, math.inf)]
-    factor, omega = np.array(found).T / [[K or 1e-300], [1.0]]
-    more, more_at = _extreme(factor, omega, (factor > 1.0) & (factor < np.inf), np.argmin, math.inf)
-    less, less_at = _extreme(factor, omega, factor < 1.0, np.argmax, 0.0)
+    factors = [(crossing / (K or 1e-300), omega) for crossing, omega in found]
     omega = np.array(gain_crossings.unit_crossings(family, K) if K else [])
     lag = np.angle(-family.h(omega)) + np.pi if len(omega) else omega
-    every = lag > -1.0
-    turn = np.minimum(lag, 2.0 * np.pi - lag)
-    phase, phase_at = _extreme(turn, omega, every, np.argmin, math.inf)
-    delay, delay_at = _extreme(lag / omega, omega, every, np.argmin, math.inf)
-
-    disk, disk_at = _response_disk(family, K, [w for _, w in found])
-    return Margins(
-        True, (less, more), phase, delay, disk, (less_at, more_at), phase_at, delay_at, disk_at
-    )
+    return _margins(factors, omega, lag, _response_disk(family, K, [w for _, w in found]))
 
 
 def _response_disk(
@@ -294,14 +271,28 @@ def _response_disk(
     return 2.0 * least, at
 
 
-def _extreme(
-    value: np.ndarray, omega: np.ndarray, mask: np.ndarray, pick: Callable, none: float
-) -> tuple[float, float]:
-    """The value that `pick` selects within the mask, and its omega; (none, nan) if it is empty."""
-    if not np.any(mask):
-        return none, math.nan
-    i = np.flatnonzero(mask)[pick(value[mask])]
-    return float(value[i]), float(omega[i])
+def _margins(
+    factors: Sequence[tuple[float, float]],
+    omega: np.ndarray,
+    lag: np.ndarray,
+    disk: tuple[float, float],
+) -> Margins:
+    """Margins of a stable loop.
+
+    They follow from the factors on the gain at which a pole crosses, with their frequencies; the
+    frequencies at which |L| = 1, with the phase ahead of -1; and the disk margin.
+    """
+    none = math.inf, math.nan
+    more = min((x for x in factors if 1.0 < x[0] < math.inf), default=none)
+    less = max((x for x in factors if 0.0 < x[0] < 1.0), default=(0.0, math.nan))
+    turns = zip(np.minimum(lag, 2.0 * np.pi - lag).tolist(), omega.tolist(), strict=True)
+    phase, phase_at = min(turns, default=none)
+    delays = zip((lag / omega).tolist(), omega.tolist(), strict=True)
+    delay, delay_at = min(delays, default=none)
+    return Margins(
+        True, (less[0], more[0]), phase, delay, disk[0], (less[1], more[1]), phase_at, delay_at,
+        disk[1],
+    )  # fmt: skip
 
 
 @of_loop("K", "b", "operator", timing=True)
@@ -333,7 +324,7 @@ def coupled_stability(loop: Loop) -> Verdict:
 
 
 @of_loop("K", "b", "operator")
-def small_gain(loop: Loop, *, equation: int = 13) -> Verdict:
+def small_gain(loop: Loop, *, equation: Annotated[int, Bound(9, 13)] = 13) -> Verdict:
     """The paper's conditions for stability (Eqs. 9 to 13), with the bands where they fail.
 
     (11), the same as (10), requires |L| < 1 and (13), the same as (12), |G C| < |1/(Te + Th) + Sh|:
@@ -347,7 +338,6 @@ def small_gain(loop: Loop, *, equation: int = 13) -> Verdict:
     Returns:
         Verdict whose margin is the least ratio of right to left side; for (9), the least |1 + L|.
     """
-    equation = integer("equation", equation, 9, 13)
     at = "force" if equation < 12 else "compensator"
     n, d = open_loop(loop, at=at)
     n2, d2 = roots.squared_magnitude(n), roots.squared_magnitude(d)

@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..arguments import checked
-from ..errors import ParameterError, array_of, integer, number
+from ..errors import Bound, ParameterError, array_of, number
 from ..model.operator import Operator
 from ..scene.virtual_wall import Device, VirtualWall
 from . import gain_crossings, linear_loop, roots
@@ -96,7 +96,8 @@ def wall_differences(wall: VirtualWall) -> np.ndarray:
     `window` samples, the filtered velocity and the measured velocity of the previous sample, and
     the delayed forces, newest first. A fraction of a sample in the delay splits the hold in two.
     """
-    change, soon, late, whole, part = _motion(wall)
+    change, soon, late, whole = linear_loop.split_motion(*_moving(wall))
+    part = _split_delay(wall)[1]
     Ts, moves = wall.Ts, wall.B != 0.0 or wall.M != 0.0
     differs = moves and wall.velocity == "difference"
     window = wall.velocity_window if differs else 0
@@ -149,19 +150,6 @@ def _split_delay(wall: VirtualWall) -> tuple[int, float]:
     return linear_loop.whole_samples(wall.delay, wall.Ts)
 
 
-def _motion(wall: VirtualWall) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, float]:
-    """Change of (position, velocity) of device and hand over a sample."""
-    d, hand = wall.device, wall.hand
-    whole, part = _split_delay(wall)
-    mass = d.mass + hand.mass
-    own = np.array([-hand.spring, -d.damper - hand.damper]) / mass
-    rest, soon = linear_loop.held_motion(own, 1.0 / mass, (1.0 - part) * wall.Ts)
-    if not part:
-        return rest, soon, np.zeros(2), whole, part
-    head, old = linear_loop.held_motion(own, 1.0 / mass, part * wall.Ts)
-    return rest + head + rest @ head, soon, old + rest @ old, whole, part
-
-
 def _within(less: np.ndarray) -> bool:
     """Whether every eigenvalue of 1 + less lies within the unit circle."""
     if not np.all(np.any(less, axis=0)):  # a state without effect: an eigenvalue at z = 1
@@ -170,18 +158,18 @@ def _within(less: np.ndarray) -> bool:
     return bool(np.all(2.0 * z1.real + np.abs(z1) ** 2 < 0.0))
 
 
-def _at_samples(wall: VirtualWall, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Position and velocity at the samples per delayed, held wall force; turn is omega Ts."""
-    change, soon, late, whole, _ = _motion(wall)
-    z1 = np.expm1(1j * turn)
-    back = np.exp(-1j * turn)
-    drive = (soon[:, None] + late[:, None] * back) * np.exp(-1j * turn * whole)
-    (a, b), (c, d) = change
-    det = z1 * (z1 - a - d) + (a * d - b * c)
-    return ((z1 - d) * drive[0] + b * drive[1]) / det, ((z1 - a) * drive[1] + c * drive[0]) / det
+def _moving(wall: VirtualWall) -> tuple[float, float, float, float, float]:
+    """Mass, damper and spring of device and hand, sample and delay."""
+    d, hand = wall.device, wall.hand
+    return d.mass + hand.mass, d.damper + hand.damper, hand.spring, wall.Ts, wall.delay
 
 
-def _object(wall: VirtualWall, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _held(wall: VirtualWall, turn: np.ndarray) -> linear_loop.HeldArm:
+    """Device and hand under the delayed, held wall force; turn is omega Ts."""
+    return linear_loop.held_arm(*_moving(wall), turn / wall.Ts)
+
+
+def wall_law(wall: VirtualWall, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Force of the wall per measured position, without K, and per exact velocity, without delay."""
     back = -np.expm1(-1j * turn)  # 1 - 1/z
     law = wall.B + wall.M / wall.Ts * back
@@ -201,9 +189,8 @@ def _every_stiffness(wall: VirtualWall) -> gain_crossings.LoopFamily:
     n, Ts, top = len(free), wall.Ts, math.pi / wall.Ts
 
     def h(omega: np.ndarray) -> np.ndarray:
-        place, speed = _at_samples(wall, omega * Ts)
-        by_place, by_speed = _object(wall, omega * Ts)
-        return -place / (1.0 + by_place * place + by_speed * speed)
+        arm, (by_place, by_speed) = _held(wall, omega * Ts), wall_law(wall, omega * Ts)
+        return -arm.held_place / (1.0 + by_place * arm.held_place + by_speed * arm.held_speed)
 
     z1 = np.linalg.eigvals(free).astype(complex)
     poles = np.log1p(z1[(np.abs(1.0 + z1) > 1e-6) & (z1 != 0.0)]) / Ts
@@ -289,7 +276,7 @@ def colgate_schenkel_limit(wall: VirtualWall) -> float:
     def limits(turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest passive K; none for nan."""
         late = np.exp(-1j * turn * whole)
-        rest = _object(wall, turn)[0] * late
+        rest = wall_law(wall, turn)[0] * late
         asked, more = _asked(wall, turn, rest), _asked(wall, turn, late)
         q = 0.25 * part * (1.0 - part) * Ts * Ts
         p = b * more + 2.0 * q * (late.conj() * rest).real
@@ -353,7 +340,7 @@ def passivity_index(wall: VirtualWall, omega: Any) -> np.ndarray:
     omega = _frequencies(omega)
     turn = omega * wall.Ts
     whole, part = _split_delay(wall)
-    by_place, by_speed = _object(wall, turn)
+    by_place, by_speed = wall_law(wall, turn)
     if np.any(by_speed):
         return np.full(turn.shape, -math.inf)
     H = (wall.K + by_place) * np.exp(-1j * turn * whole)
@@ -375,7 +362,7 @@ def worst_middle(wall: VirtualWall, turn: float) -> complex | None:
     if not part:
         return None
     back = np.exp(-1j * np.array([turn]))
-    H = (wall.K + _object(wall, np.array([turn]))[0]) * back**whole
+    H = (wall.K + wall_law(wall, np.array([turn]))[0]) * back**whole
     straight = (1.0 - part) + part / back
     late = part * (1.0 - part) * wall.Ts * H * (1.0 - back)
     return complex((straight + late / (2.0 * b))[0])
@@ -478,7 +465,7 @@ def jury_limit(wall: VirtualWall) -> float:
             raise ParameterError(f"wall.{field}", getattr(wall, field), bound)
     if wall.hand.spring:
         raise ParameterError("wall.operator.spring", wall.hand.spring, "must be 0 here")
-    (_, travel), (_, slowing), soon = *_motion(wall)[0], _motion(wall)[1]
+    ((_, travel), (_, slowing)), soon, *_ = linear_loop.split_motion(*_moving(wall))
     # place per force: (n1 z + n0)/((z - 1)(z - e))
     e, beta = 1.0 + slowing, wall.B / wall.Ts
     n1, n0 = float(soon[0]), float(travel * soon[1] - soon[0] * e)
@@ -507,7 +494,11 @@ def jury_limit(wall: VirtualWall) -> float:
 
 @checked
 def hulin_boundary(
-    mass: float, damper: float, Ts: float, samples: float = 0.0, n: int = 401
+    mass: float,
+    damper: float,
+    Ts: float,
+    samples: Annotated[float, Bound(0.0, 100.0)] = 0.0,
+    n: Annotated[int, Bound(3, 100_001)] = 401,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exact stability boundary of the held, delayed wall in the plane of B and K.
 
@@ -528,13 +519,12 @@ def hulin_boundary(
     """
     from scipy.optimize import brentq
 
-    samples, n = number("samples", samples, 0.0, 100.0), integer("n", n, 3, 100_001)
     wall = VirtualWall(device=Device(mass=mass, damper=damper), Ts=Ts)
     wall = replace(wall, delay=samples * wall.Ts)
 
     def crossing(turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """B and K that put a pair of poles at z = exp(+-j turn): K + B (1 - 1/z)/Ts = -1/G."""
-        asked = -1.0 / _at_samples(wall, turn)[0]
+        asked = -1.0 / _held(wall, turn).held_place
         B = asked.imag * wall.Ts / np.sin(turn)
         return B, asked.real - 2.0 * B / wall.Ts * np.sin(0.5 * turn) ** 2
 
@@ -548,7 +538,7 @@ def hulin_boundary(
         i = int(gone[0])
         last = float(brentq(stiffness, turn[i - 1], turn[i])) if i else last  # type: ignore[arg-type]
     B, K = crossing(np.linspace(0.0, last, n)[1:])
-    if (opposite := _at_samples(wall, np.array([math.pi]))[0].real[0]) < 0.0:
+    if (opposite := _held(wall, np.array([math.pi])).held_place.real[0]) < 0.0:
         K = np.minimum(K, -1.0 / opposite - 2.0 * B / wall.Ts)
     kept = K >= -1e-9 * K.max()
     return np.append(-damper, B[kept]), np.append(0.0, np.maximum(K[kept], 0.0))

@@ -13,6 +13,5 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "sweep_plots",
         "theory_plots",
         "workspace_plots",
-        "yield_map_plots",
     ],
 )

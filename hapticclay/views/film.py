@@ -19,13 +19,15 @@ import numpy as np
 from ..errors import ParameterError, choice, integer, number
 from ..files import atomic
 from ..kernel.engine import mujoco
+from ..live.status import held_words
 from ..simulation.record import Record
 from ..studies.removal import TOOL, Tool
-from .stage import CAMERAS, Stage, held_words
+from .stage import CAMERAS, Stage
 
 FRAME_RATES = {".mp4": 30, ".webp": 20, ".gif": 20}  # [1/s], by kind of file
 LEAST_ASPECT = 1.2  # aspect ratio for which the cameras of room.xml are designed
 PLOTS_SHARE = 0.375  # of the width
+FONT_WIDTH = 175  # [pixels] of a picture by which its title grows by half of its usual size
 ONE_LINE_WIDTH = 240  # [pixels] of a picture from which its title is one line
 SOFT_SAMPLES, SOFT_SHADOW = 4, 2048  # a pixel; width of the shadow map [pixels]
 GL_ON = ("enable", "enabled", "on", "true", "1")  # values of MUJOCO_GL
@@ -124,7 +126,7 @@ def _opened(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, mujoco
             warnings.simplefilter("ignore")
             gl = GLContext(width, height)
             gl.make_current()
-        return gl, mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        return gl, mujoco.MjrContext(model, 50 * min(max(width // FONT_WIDTH, 2), 6))
     except Exception as error:  # ImportError, AttributeError, GLError, FatalError: each backend
         if wanted not in ("", "egl", "osmesa"):
             bound = "needs a display: unset it, or set egl or osmesa"

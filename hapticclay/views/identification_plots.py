@@ -13,6 +13,7 @@ from matplotlib.ticker import MultipleLocator
 from ..model.constants import AXES
 from ..studies import identification
 from ..studies.identification import Identified
+from ..studies.identified_blocks import IdentifiedBlocks
 from .captions import unit_text
 from .palette import BLACK, BLUE, GREY, VERMILION
 from .panels import add_legend, hollow, plain_ticks, set_title
@@ -22,16 +23,15 @@ from .style import figure_size, figure_style, panel_grid, points, stroke
 class PlottedBlock(NamedTuple):
     """Labels of an identified block."""
 
-    figure: str  # file name for the simulated arm, after the figure of the paper
     symbol: str  # in titles
     unit: str  # of its magnitude
     equations: tuple[str, str]  # of the paper, on x and y
 
 
 BLOCKS = {
-    "G": PlottedBlock("fig4", "G", "dB re 1 m/m", ("Eq. 15", "Eq. 16")),
-    "S": PlottedBlock("fig5", "S", "dB re 1 m/N", ("Eq. 17", "Eq. 18")),
-    "Th": PlottedBlock("fig6", "T$_h$", "dB re 1 N/m", ("Eq. 19", "Eq. 19")),
+    "G": PlottedBlock("G", "dB re 1 m/m", ("Eq. 15", "Eq. 16")),
+    "S": PlottedBlock("S", "dB re 1 m/N", ("Eq. 17", "Eq. 18")),
+    "Th": PlottedBlock("T$_h$", "dB re 1 N/m", ("Eq. 19", "Eq. 19")),
 }
 HEIGHTS = (2.2, 2.0, 0.8)  # of magnitude, phase and coherence
 
@@ -63,6 +63,11 @@ def identification_plot(results: Sequence[Identified], paper: bool | None = None
     figure.align_ylabels(labelled.ravel())
     add_legend(figure, 3)
     return figure
+
+
+def blocks_plot(found: IdentifiedBlocks) -> Figure:
+    """As `identification_plot` of one block on its axes."""
+    return identification_plot(found.results, found.paper)
 
 
 def identified_plot(result: Identified) -> Figure:

@@ -79,6 +79,16 @@ def parts_panels(shown: Sequence[Impedance]) -> tuple[Figure, dict[str, Axes]]:
 
 
 @figure_style()
+def effective_parts_plot(found: Impedance) -> Figure:
+    """Plots effective stiffness, damping and mass over frequency."""
+    figure, panels = parts_panels([found])
+    for part, ax in panels.items():
+        ax.plot(found.frequency, getattr(found, part), color=BLUE)
+    set_title(figure.axes[0], "impedance that the hand feels")
+    return figure
+
+
+@figure_style()
 def transparency_bode_plot(found: MeasuredImpedance) -> Figure:
     """Plots fe/fh and the impedance ratio Z/Ze over frequency, measured and computed."""
     m = found.measured

@@ -17,57 +17,38 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError
+from ..kernel.engine import mujoco
 from ..live.frame import Frame
 from ..live.player import Player
 from ..live.session import Session
-from ..live.verdict import clay_here
+from ..live.status import banner, status
 from ..model.constants import AXES
 from ..ports.guard import LOCAL, REFUSED, Guard, listening, url_host
+from .captions import unit_text
 from .palette import (
     CLAY_DEEP,
     FORCE_COLORS,
     GRID,
-    PART_COLORS,
     SKY,
     TABLE,
     cutting_force,
     rgb_bytes,
     verdict_color,
 )
-from .stage import (
-    ARROW_WIDTH,
-    GROUND,
-    THICKNESS,
-    Stage,
-    hardest,
-    held_words,
-    plotted_axes,
-    room_scale,
-)
+from .stage import ARROW_WIDTH, GROUND, THICKNESS, Stage, hardest, plotted_axes, room_scale
 
 REFRESH_TIME = 1.0 / 30.0  # [s] between two updates of the scene
 CLAY_TIME, PLOT_TIME = 0.2, 0.5  # [s] between two updates of the clay, and of the plots
 PLOT_POINTS = 400
 MOST_FORCE = 5.0  # [N] of the slider, or twice what cuts harder clay
 TAB_TITLE = "hapticclay"
-CENTRE = (0.22, 0.12)  # of the table [m]
 BANNER_STYLE = (
     "color:white;padding:0.4em 0.6em;margin:0 0.7em 0.5em;border-radius:4px;font-size:0.85em"
 )
 
 
 class Page:
-    """The page of a session, served until `close`.
-
-    Attributes:
-        session: what is played.
-        url: address of the page, with the token if it needs one.
-        port: of the page.
-        guard: admits the requests.
-        server: viser's server.
-        player: player of the session.
-        stage: holds the map of the clay.
-    """
+    """The page of a session, served until `close`; `url` has the token that it may need."""
 
     def __init__(self, session: Session, host: str = "127.0.0.1", port: int = 8080):
         """Begins to serve the page."""
@@ -133,12 +114,12 @@ class Page:
         lamp: Any = dict(color=(255, 250, 240), intensity=1.2, cast_shadow=True)
         add.add_light_directional("/lamp", position=(-0.4, 0.6, 1.1), **lamp)
         add.world_axes.visible = False
-        table, centre = (0.92 * size, 0.88 * size), (CENTRE[0] * size, CENTRE[1] * size)
-        place = (*centre, GROUND - 0.012)
-        add.add_box("/table", rgb_bytes(TABLE), (*table, 0.02), position=place)
-        lines: Any = dict(cell_size=0.1, section_size=0.1)
+        table = self.stage.model.geom("table")
+        (x, y, z), (width, depth, _) = table.pos, 2.0 * table.size
+        add.add_box("/table", rgb_bytes(TABLE), (width, depth, 0.02), position=(x, y, z - 0.012))
+        lines: Any = dict(cell_size=0.1, section_size=0.1, plane="xy", position=(x, y, z - 0.001))
         lines.update(cell_color=rgb_bytes(GRID), section_color=rgb_bytes(GRID))
-        add.add_grid("/grid", *table, plane="xy", position=(*centre, GROUND - 0.001), **lines)
+        add.add_grid("/grid", width, depth, **lines)
         self._draw_arm()
         self._clay: Any = None
         if self.stage.field >= 0:
@@ -157,27 +138,24 @@ class Page:
         self.target.on_update(self._dragged)
 
     def _draw_arm(self) -> None:
-        """Adds foot, links and tool."""
-        add, tool, arm = self.server.scene, self.session.tool, self.session.scenario.arm
-        dark, steel, blue, orange = (
-            rgb_bytes(PART_COLORS[name]) for name in ("dark", "steel", "blue", "orange")
-        )
-        add.add_cylinder("/foot", 0.06, 0.03, dark, position=(0.0, 0.0, GROUND + 0.015))
-        add.add_cylinder("/shoulder", 0.042, 0.052, steel, position=(0.0, 0.0, -0.004))
-        along_x = math.cos(math.pi / 4), 0.0, math.sin(math.pi / 4), 0.0  # of a cylinder
-        self._link1 = add.add_frame("/link1", show_axes=False)
-        l1, l2 = arm.l1, arm.l2
-        half = (0.5 * l1, 0.0, 0.0)
-        add.add_cylinder("/link1/bar", 0.017, l1, dark, wxyz=along_x, position=half)
-        self._link2 = add.add_frame("/link2", show_axes=False)
-        half = (0.5 * l2, 0.0, 0.0)
-        add.add_cylinder("/link2/bar", 0.012, l2, blue, wxyz=along_x, position=half)
-        add.add_cylinder("/link2/elbow", 0.026, 0.048, steel)
-        tip = GROUND + THICKNESS - tool.depth
-        place = (l2, 0.0, 0.5 * tip)
-        add.add_cylinder("/link2/tool", 0.5 * tool.width, -tip, steel, position=place)
-        add.add_cylinder("/link2/handle", 0.008, 0.045, dark, position=(l2, 0.0, 0.022))
-        add.add_icosphere("/link2/knob", 0.016, orange, position=(l2, 0.0, 0.052))
+        """Adds foot, links and tool: the round geoms of the stage, in a frame for each body."""
+        add, model = self.server.scene, self.stage.model
+        self._bodies: dict[str, Any] = {}
+        for i, kind in enumerate(map(mujoco.mjtGeom, model.geom_type)):
+            body, name = model.body(model.geom_bodyid[i]).name, kind.name.removeprefix("mjGEOM_")
+            if body == "target" or name not in ("SPHERE", "CYLINDER", "CAPSULE"):
+                continue
+            if body not in self._bodies:
+                self._bodies[body] = add.add_frame(f"/{body}", show_axes=False)
+            color = tuple(
+                (255 * model.mat_rgba[model.geom_matid[i], :3]).round().astype(int).tolist()
+            )
+            (radius, half, _), place = model.geom_size[i], dict(position=model.geom_pos[i])
+            if name == "SPHERE":
+                add.add_icosphere(f"/{body}/{i}", radius, color, **place)
+            else:
+                place["wxyz"] = model.geom_quat[i]
+                add.add_cylinder(f"/{body}/{i}", radius, 2.0 * half, color, **place)
 
     def _vertices(self) -> np.ndarray:
         """Corners of the clay's mesh [m], shape (n, 3): its surface, closed down to the table."""
@@ -194,7 +172,7 @@ class Page:
         self.keep = gui.add_checkbox("Record", True)
         hint = "The hand pulls towards the arrows; drag them."
         self.hold = gui.add_checkbox("Hand holds", False, hint=hint)
-        top, gain, name, step = hardest(session.given), session.gain[0], "Clay b [N.s/m]", 1.0
+        top, gain, name, step = hardest(session.given), session.gain[0], "Clay b [N·s/m]", 1.0
         clay, most = session.given.clay, MOST_FORCE
         if clay and not clay.viscous:
             top, name, step = 1.0, "Clay strength [times]", 0.05
@@ -291,18 +269,19 @@ class Page:
         with self.player.lock:
             frames = session.frames
             new, self._shown = frames[self._shown :], len(frames)
-            frame, point, q = frames[-1], session.point, list(session.run.q)
+            frame, point, q = frames[-1], session.point, session.angles
             plots_due = now - self._plot_time > PLOT_TIME
             some = frames[:: max(1, len(frames) // PLOT_POINTS)] if plots_due else []
             banner = self._banner() if plots_due else ""
             status = self._status() if plots_due else ""
             self.stage.carve([f.p for f in new])
         with self.server.atomic():
-            self._link1.wxyz, self._link2.wxyz = _about_z(q[0]), _about_z(q[0] + q[1])
-            l1 = session.scenario.arm.l1
-            self._link2.position = (l1 * math.cos(q[0]), l1 * math.sin(q[0]), 0.0)
+            self.stage.pose(q)
+            for name, body in self._bodies.items():
+                place = self.stage.data.body(name)
+                body.position, body.wxyz = place.xpos, place.xquat
             if self._arrow:
-                self._point_arrow(frame, q)
+                self._point_arrow(frame)
             if point is None:
                 x, y = np.add(frame.p, session.scenario.origin).tolist()
                 self.target.position = (x, y, 0.052)
@@ -319,10 +298,9 @@ class Page:
             removed = f"removed {1e6 * self.stage.removal.volume:.2f} cm\u00b3"
             self.status.content, self.verdict.content = f"{status}  \n{removed}", banner
 
-    def _point_arrow(self, frame: Frame, q: Any) -> None:
+    def _point_arrow(self, frame: Frame) -> None:
         """Shows the force of yielding clay."""
         stage = self.stage
-        stage.pose(q)
         stage.push(frame.fe, all(frame.held))
         if stage.arrow is not None:
             points = np.stack((stage.arrow.begin, stage.arrow.end))[None]
@@ -331,26 +309,14 @@ class Page:
         self._arrow.visible = stage.arrow is not None
 
     def _status(self) -> str:
-        session, frame = self.session, self.session.frames[-1]
-        state = "ended" if session.ended else "paused" if session.paused else "playing"
-        slow = ", this machine is too slow" if session.clock.slow else ""
-        if still := held_words(frame.held):
-            state += f", {still},"
-        clay = clay_here(session.scenario, frame.p, session.b)
-        return (
-            f"**{state}** {frame.t:.1f} s, {session.clock.factor:.2f} x real "
-            f"time{slow}  \n{clay}, hand {math.hypot(*frame.fh):.2f} N"
-        )
+        line = status(self.session)
+        clay = unit_text(line["clay"])
+        return f"**{line['state']}** {line['time']}  \n{clay}, hand {line['fh']}"
 
     def _banner(self) -> str:
-        verdict, ended = self.session.verdict(), self.session.ended
-        text = f"{ended}: press Reset to start again" if ended else verdict.text
-        style = f"background:{verdict_color(text, verdict.unstable)};{BANNER_STYLE}"
+        text, unstable = banner(self.session, "press Reset to start again")
+        style = f"background:{verdict_color(text, unstable)};{BANNER_STYLE}"
         return f'<div style="{style}">{html.escape(text)}</div>'
-
-
-def _about_z(angle: float) -> tuple[float, float, float, float]:
-    return math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle)
 
 
 def _clay_sheet(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""The path of the handle over a map of the clay."""
+"""The path of the handle over a map of the clay, and over clay that stays cut."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from ..model.clay import Clay
 from ..simulation.record import Record
 from .captions import clay_text, scenario_parts
-from .palette import CLAY_ALPHA, GREY, clay_color, clay_share
+from .palette import CLAY_ALPHA, CLAY_DEEP, CLAY_PALE, GREY, WHITE, clay_color, clay_share
 from .panels import add_legend, draw_path, map_axes, set_title
 from .run_axes import MOST_BORDERS
 from .style import figure_style, map_size, points, stroke
@@ -79,3 +80,37 @@ def _clay_image(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None
     share = clay_share(clay, middle[0], middle[1][:, None])
     colors = np.concatenate((clay_color(share), CLAY_ALPHA * (share > 0.0)[..., None]), axis=2)
     ax.imshow(colors, extent=(x[0], x[-1], y[0], y[-1]), origin="lower", zorder=0)
+
+
+@figure_style()
+def ground_plot(record: Record) -> Figure:
+    """Plots the remaining clay after a run, and the path of the tool."""
+    ground, p, block = record.ground, 100.0 * record.p, ground_of(record)
+    assert ground is not None
+    x, y = (100.0 * e for e in block.edges)
+    corners = np.array(((x[0], y[0]), (x[-1], y[-1])))
+    low = np.minimum(corners[0], p.min(axis=0)) - 0.3
+    high = np.maximum(corners[1], p.max(axis=0)) + 0.3
+    breadth, depth = (high - low).tolist()
+    figure = Figure(figsize=map_size(4.7, 1.2, depth / breadth))
+    ax = figure.add_subplot()
+    colors = LinearSegmentedColormap.from_list("clay", [WHITE, CLAY_PALE, CLAY_DEEP])
+    look: Any = dict(cmap=colors, vmin=0.0, vmax=1e3 * block.highest or 1.0, rasterized=True)
+    image = ax.pcolormesh(x, y, 1e3 * ground.T, **look)
+    draw_path(ax, p, "path of the tool", 1.0)
+    edge: Any = dict(fill=False, color=GREY, lw=stroke(0.6))
+    ax.add_patch(Rectangle(tuple(corners[0]), *(corners[1] - corners[0]), **edge))
+    bar = ax.inset_axes((1.03, 0.0, 0.03, 1.0))
+    bar.grid(False)
+    figure.colorbar(image, cax=bar, label="clay left [mm]")
+    map_axes(ax, low, high)
+    add_legend(figure)
+    set_title(ax, *scenario_parts(record.scenario))
+    return figure
+
+
+def ground_of(record: Record) -> Any:
+    """The cells cut in a run: see `Clay.ground`."""
+    clay = record.scenario.clay
+    assert clay is not None
+    return clay.ground

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import io
+from typing import Literal
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..errors import ParameterError, choice
-from ..model.constants import AXES
+from ..arguments import checked
+from ..errors import ParameterError
 from ..simulation.record import Record, port_energy
 from . import path_plots, run_axes, run_figures, run_plots
 from .palette import BLUE, GREEN, ORANGE, VERMILION
 from .panels import add_legend, set_title, single
 from .style import figure_style, stroke
-
-AXIS_CHOICES = (*AXES, "xy")
-OVER_CHOICES = ("time", "position")
 
 
 class RecordPlots:
@@ -44,13 +42,19 @@ class RecordPlots:
         figures = run_figures.figures(self._sampled())
         return {name: _with_picture(figure) for name, figure in figures.items()}
 
-    def velocity(self, axis: str | None = None) -> Figure:
+    @checked
+    def velocity(self, axis: Literal["x", "y", "xy"] | None = None) -> Figure:
         """Velocity over position, with the expected steady speeds (Fig. 8, top; Fig. 10)."""
         record = self._sampled()
-        axis = axis or run_figures.shown_axes(record.scenario)
-        return _with_picture(run_plots.velocity_plot(record, choice("axis", axis, AXIS_CHOICES)))
+        axes = axis or run_figures.shown_axes(record.scenario)
+        return _with_picture(run_plots.velocity_plot(record, axes))
 
-    def force(self, axis: str | None = None, over: str | None = None) -> Figure:
+    @checked
+    def force(
+        self,
+        axis: Literal["x", "y"] | None = None,
+        over: Literal["time", "position"] | None = None,
+    ) -> Figure:
         """The forces of hand and clay: their ratio to the velocity over position (Fig. 8, bottom).
 
         In a maneuver, in clay that is not viscous, and if `over` is given, it shows the forces
@@ -58,11 +62,10 @@ class RecordPlots:
         """
         record = self._sampled()
         s = record.scenario
-        axis = choice("axis", axis or run_axes.main_axis(s), AXES)
+        along = axis or run_axes.main_axis(s)
         if over or s.muscle is not None or (s.clay and not s.clay.viscous):
-            over = choice("over", over or "time", OVER_CHOICES)
-            return _with_picture(run_plots.maneuver_plot([record], axis, over))
-        return _with_picture(run_plots.force_ratio_plot(record, axis))
+            return _with_picture(run_plots.maneuver_plot([record], along, over or "time"))
+        return _with_picture(run_plots.force_ratio_plot(record, along))
 
     def path(self) -> Figure:
         """The path of the handle over a map of the clay (Figs. 7, 9)."""

@@ -16,8 +16,7 @@ from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from . import figure as shown
 from .flow_plots import force_velocity_plot
-from .ground_plots import ground_of, ground_plot
-from .path_plots import path_plot
+from .path_plots import ground_of, ground_plot, path_plot
 from .run_axes import is_viscous, main_axis
 from .run_plots import force_ratio_plot, maneuver_plot, velocity_plot
 

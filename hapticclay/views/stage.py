@@ -6,8 +6,6 @@ The model is for drawing only: `Stage.pose` copies the joint angles of the run i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +21,7 @@ CAMERAS = ("room", "top", "close")
 HIDDEN = (0.0, 0.0, -5.0)  # position of the hand's target without a pull [m]
 GROUND = -0.06  # height of the table, the plane of the arm at 0 [m], as in room.xml
 THICKNESS = 0.03  # of a block of clay [m]
+SUNK = 3e-4  # [m] of the block under the table, which hides it where no clay is
 GRAIN = 0.03  # rms of the brightness of clay, as a share
 KNOB = (0.0, 0.0, 0.052)  # of the handle, from the tip of link 2 [m]
 TARGET_ALPHA = 0.45
@@ -40,20 +39,8 @@ def hardest(scenario: Scenario) -> float:
     return scenario.clay.largest if scenario.clay else 0.0
 
 
-def held_words(held: Sequence[bool]) -> str:
-    """Text if yielding clay holds the handle: "held", "held along x", or nothing."""
-    names = [f" along {a}" for a, still in zip(AXES, held, strict=True) if still]
-    return f"held{names[0] if len(names) == 1 else ''}" if names else ""
-
-
 class Arrow(NamedTuple):
-    """The force of yielding clay on the handle.
-
-    Attributes:
-        begin: at the knob [m], (3,).
-        end: tip [m], (3,).
-        held: whether the clay holds the handle.
-    """
+    """The force of yielding clay on the handle, from the knob to the tip [m]."""
 
     begin: np.ndarray
     end: np.ndarray
@@ -66,18 +53,10 @@ class Arrow(NamedTuple):
 
 
 class Stage:
-    """The scene of one scenario.
+    """The scene of one scenario: `model` and `data` for a renderer, `removal` the map of its clay.
 
-    Attributes:
-        scenario: what is shown.
-        tool: at the handle.
-        removal: map of the clay, changed by `carve`.
-        model: for the engine's renderers.
-        data: for the engine's renderers.
-        field: id of the heightfield; -1 without clay.
-        place: where the tool last cut [m], None before its first cut.
-        stale: whether the heightfield lags behind the map.
-        arrow: force of the clay, where clay yields; None for none.
+    `field` is the id of the heightfield, -1 without clay; `stale` tells whether it lags behind the
+    map; `place` is where the tool last cut [m]; `arrow` the force of clay that yields, or None.
     """
 
     def __init__(self, scenario: Scenario, tool: Tool = TOOL):
@@ -86,13 +65,10 @@ class Stage:
         tool = next((block.tool for block in blocks if block.tool), tool)
         self.scenario, self.tool = scenario, tool
         self.removal = Removal(scenario, tool)
-        grid, origin = self.removal, np.array(scenario.origin)
-        block = None
+        grid, block = self.removal, None
         if scenario.clay is not None:
-            low = origin + (grid.x[0], grid.y[0])
-            high = origin + (grid.x[-1], grid.y[-1])
-            rows, columns = len(grid.y), len(grid.x)
-            block = Block(low, high, rows, columns, THICKNESS, self._colors())
+            low, high = (np.add(scenario.origin, (grid.x[k], grid.y[k])) for k in (0, -1))
+            block = Block(low, high, len(grid.y), len(grid.x), THICKNESS, self._colors())
         self.model = picture(scenario.arm, block, (tool.width, tool.depth))
         self.data = mujoco.MjData(self.model)
         self.field = 0 if block else -1
@@ -167,25 +143,15 @@ class Stage:
         return np.clip(colors, 0, 255)[::-1]  # images start at the top
 
 
-@dataclass(frozen=True)
-class Block:
-    """The block of clay in a picture.
+class Block(NamedTuple):
+    """The block of clay in a picture."""
 
-    Attributes:
-        low: lowest corner in the world [m], (2,).
-        high: highest corner in the world [m], (2,).
-        rows: of its map of heights.
-        columns: of its map of heights.
-        thickness: of the block [m].
-        colors: image over the block, shape (n, m, 3) of bytes, row 0 at the +y edge.
-    """
-
-    low: Any
-    high: Any
-    rows: int
+    low: Any  # lowest corner in the world [m], (2,)
+    high: Any  # highest corner [m], (2,)
+    rows: int  # of its map of heights
     columns: int
-    thickness: float
-    colors: np.ndarray
+    thickness: float  # [m]
+    colors: np.ndarray  # image over the block, shape (n, m, 3) of bytes, row 0 at the +y edge
 
 
 def picture(arm: Arm, clay: Block | None, tool: tuple[float, float]) -> mujoco.MjModel:
@@ -264,18 +230,16 @@ def _skin(body: Any, shape: str, begin: Any, end: Any, radius: float, material: 
 
 
 def _block(spec: mujoco.MjSpec, clay: Block) -> None:
-    low, high = np.array(clay.low), np.array(clay.high)
-    image = clay.colors.astype(np.uint8)
-    height, width = image.shape[:2]
-    size: Any = dict(width=width, height=height, nchannel=3)
+    height, width = clay.colors.shape[:2]
     flat = mujoco.mjtTexture.mjTEXTURE_2D
-    spec.add_texture(name="block", type=flat, data=image.ravel().tolist(), **size)
+    data = clay.colors.astype(np.uint8).ravel().tolist()
+    spec.add_texture(name="block", type=flat, data=data, width=width, height=height, nchannel=3)
     textures = [""] * int(mujoco.mjtTextureRole.mjNTEXROLE)
     textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "block"
     spec.add_material(name="block", textures=textures, specular=0.12, shininess=0.15)
+    size = (*0.5 * np.subtract(clay.high, clay.low), clay.thickness, 1e-3)
     whole = np.ones(clay.rows * clay.columns)
-    size = dict(nrow=clay.rows, ncol=clay.columns, size=(*0.5 * (high - low), clay.thickness, 1e-3))
-    spec.add_hfield(name="clay", userdata=whole, **size)
-    kind: Any = dict(type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="clay", material="block")
-    middle = (*0.5 * (high + low), GROUND)
-    spec.worldbody.add_geom(name="clay", pos=middle, contype=0, conaffinity=0, **kind)
+    spec.add_hfield(name="clay", userdata=whole, nrow=clay.rows, ncol=clay.columns, size=size)
+    look: Any = dict(type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="clay", material="block")
+    middle = (*0.5 * np.add(clay.high, clay.low), GROUND - SUNK)
+    spec.worldbody.add_geom(name="clay", pos=middle, contype=0, conaffinity=0, **look)

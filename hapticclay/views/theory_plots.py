@@ -14,7 +14,7 @@ from numpy.polynomial import Polynomial
 from ..model.compensator import Compensator
 from ..theory import linear_loop, stability_margins
 from ..theory.controller_loop import ControllerStability
-from ..theory.design import DESIGN_BAND
+from ..theory.design import DESIGN_BAND, Design
 from ..theory.loops import Loop, of_loop
 from .captions import loop_parts
 from .palette import BLACK, BLUE, GREEN, MID_GREY, PALE_GREY, VERMILION
@@ -23,6 +23,7 @@ from .style import figure_style, narrow, points, stroke
 
 BREAK_NAMES = {"force": "at the net force", "compensator": "at the compensator"}
 OMEGA_LABEL = "angular frequency [rad/s]"
+DESIGN_OMEGA = np.geomspace(0.1, 1000.0, 500)  # [rad/s]
 
 
 @of_loop("K", "b")
@@ -166,6 +167,21 @@ def growth_plot(found: ControllerStability) -> Figure:
         ax.set_ylim(1.3 * least, -1.3 * least)
     add_legend(figure, 2)
     set_title(ax, "controller of one's own", f"Ts = {1e3 * found.Ts:g} ms")
+    return figure
+
+
+@figure_style()
+def design_plot(design: Design) -> Figure:
+    """Plots magnitude and phase of the compensator K C."""
+    s, c = 1j * DESIGN_OMEGA, design.compensator
+    response = design.K * np.polyval(c.num, s) / np.polyval(c.den, s)
+    figure, (top, low) = stacked(2, 4.4)
+    top.loglog(DESIGN_OMEGA, np.abs(response), color=BLUE)
+    low.semilogx(DESIGN_OMEGA, np.degrees(np.unwrap(np.angle(response))), color=BLUE)
+    level(low, -180.0)
+    top.set_ylabel("magnitude of K C [m/N]")
+    low.set(xlabel=OMEGA_LABEL, ylabel="phase of K C [degrees]")
+    set_title(top, design.headline())
     return figure
 
 

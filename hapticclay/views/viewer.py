@@ -16,9 +16,8 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,7 +30,7 @@ from ..scene.scenario import Scenario
 from ..studies.removal import Tool
 from .motion import resolved
 from .palette import BLACK, COLOR_NAMES, FORCE_COLORS, PALE_GREY, WHITE, rgb, verdict_color
-from .stage import Stage, plotted_axes
+from .stage import Stage, plotted_axes, room_scale
 
 Rows = tuple[tuple[str, str], ...]
 PLOTS_WIDTH = 0.32  # of the window's
@@ -39,53 +38,27 @@ BANNER_HEIGHT = 0.05, 36  # of the window's, and at least [pixels]
 TEXT_WIDTH = 0.24, 290  # of the window's, and at least [pixels]
 
 
-@dataclass(frozen=True)
-class Writing:
-    """Texts of the window.
+class Writing(NamedTuple):
+    """Texts of the window."""
 
-    Attributes:
-        rows: name and value of each line beside the picture.
-        keys: key and effect of each line of help; empty for no help.
-        verdict: on the loop, above the picture.
-        unstable: whether the arm swings with growing amplitude.
-    """
-
-    rows: Rows
-    keys: Rows
-    verdict: str
-    unstable: bool
+    rows: Rows  # name and value of each line beside the picture
+    keys: Rows  # key and effect of each line of help; empty for no help
+    verdict: str  # on the loop, above the picture
+    unstable: bool  # whether the arm swings with growing amplitude
 
 
-@dataclass(frozen=True)
-class Sight:
-    """The next content of the window.
+class Sight(NamedTuple):
+    """The next content of the window."""
 
-    Attributes:
-        frames: frames of the session since the last one shown.
-        anew: whether they restart, with uncut clay.
-        angles: of the arm [rad].
-        target: target point of the hand [m]; None if it does not pull.
-        writing: texts; None to keep the old ones.
-    """
-
-    frames: list[Frame]
-    anew: bool
-    angles: list[float]
-    target: tuple[float, float] | None
-    writing: Writing | None
+    frames: list[Frame]  # of the session since the last one shown
+    anew: bool  # whether they restart, with uncut clay
+    angles: list[float]  # of the arm [rad]
+    target: tuple[float, float] | None  # target point of the hand [m]; None if it does not pull
+    writing: Writing | None  # None to keep the old texts
 
 
 class Pane:
-    """The picture of one scenario and the plots beside it.
-
-    Attributes:
-        stage: the picture.
-        plots: beside it.
-        frames: of the session so far.
-        banner: above the picture.
-        rows: lines beside the picture.
-        keys: lines of help.
-    """
+    """The picture of one scenario and the plots beside it."""
 
     def __init__(self, scenario: Scenario, tool: Tool):
         """Prepares the picture."""
@@ -122,8 +95,13 @@ class Pane:
         """Shows answers until the process ends."""
         body = self.stage.model.body("tool").id
         with viewer.lock():
-            viewer.cam.lookat[:] = (0.33, 0.19, -0.03)  # the plots cover the right
-            viewer.cam.distance, viewer.cam.azimuth, viewer.cam.elevation = 0.80, 90.0, -55.0
+            scale = room_scale(self.stage.scenario.arm)  # texts cover the left, plots the right
+            viewer.cam.lookat[:] = (0.252 * scale, 0.17 * scale, -0.03)
+            viewer.cam.distance, viewer.cam.azimuth, viewer.cam.elevation = (
+                1.05 * scale,
+                90.0,
+                -55.0,
+            )
             viewer.opt.sitegroup[:] = 0
             for flag in ("PERTOBJ", "PERTFORCE", "SELECT"):  # our own ball shows the target
                 viewer.opt.flags[getattr(mujoco.mjtVisFlag, f"mjVIS_{flag}")] = 0
@@ -264,9 +242,12 @@ def _banner() -> mujoco.MjvFigure:
     return figure
 
 
-def _ratio(force: float, v: float) -> float:
-    """force/v [N.s/m], NaN where the handle is at rest."""
-    return force / v if abs(v) > 1e-4 else math.nan
+Point = Callable[[Frame, int], tuple[float, float]]  # x and y of a curve at a frame, of an axis
+
+
+def _ratio_point(f: Frame, i: int) -> tuple[float, float]:
+    """Position [cm] and fe/v [N.s/m], NaN where the handle is at rest."""
+    return 100.0 * f.p[i], f.fe[i] / f.v[i] if abs(f.v[i]) > 1e-4 else math.nan
 
 
 def _law_point(f: Frame, i: int, clay: Clay) -> tuple[float, float]:
@@ -279,84 +260,50 @@ def _plots(axes: tuple[int, ...], clay: Clay | None = None) -> tuple[LivePlot, .
     """Velocity over position, the clay's law, and forces over time, along these axes.
 
     The law of viscous clay is shown as fe/v over position. Otherwise fe is shown, over velocity
-    where velocity determines it; in isotropic clay along the motion.
+    where velocity determines it; in clay that resists along the motion, along the motion.
     """
     hands, clays = ({i: FORCE_COLORS[who, i] for i in axes} for who in ("hand", "clay"))
+
+    def curves(colors: dict[int, str], point: Point) -> list[tuple[str, Any]]:
+        return [(color, lambda f, i=i: point(f, i)) for i, color in colors.items()]
+
     place, named = f"{AXES[axes[0]]} [cm]", ""
     if len(axes) > 1:
         place = "position [cm]"
         named = ": " + ", ".join(f"{AXES[i]} {COLOR_NAMES[clays[i]]}" for i in axes)
-    velocities, forces = [], []
-    for i in axes:
-        velocities.append(LiveCurve(clays[i], lambda f, i=i: (100 * f.p[i], 100 * f.v[i])))
-        forces.append(LiveCurve(hands[i], lambda f, i=i: (f.t, f.fh[i])))
-        forces.append(LiveCurve(clays[i], lambda f, i=i: (f.t, f.fe[i])))
-    both = (
+    if clay is None or clay.viscous:
+        ratios = curves(clays, _ratio_point)
+        law = LivePlot(f"clay, fe/v [N.s/m]{named}", place, ratios, 10.0)
+    elif not clay.of_velocity:
+        forces = curves(clays, lambda f, i: (100.0 * f.p[i], f.fe[i]))
+        law = LivePlot(f"clay, fe [N]{named}", place, forces, 0.1)
+    else:
+        one = dict(list(clays.items())[:1]) if clay.along_motion else clays
+        along = " along the motion" if clay.along_motion else named
+        points = curves(one, functools.partial(_law_point, clay=clay))
+        law = LivePlot(f"clay, fe [N]{along}", "velocity [cm/s]", points, 0.1)
+    velocities = curves(clays, lambda f, i: (100.0 * f.p[i], 100.0 * f.v[i]))
+    both = curves(hands, lambda f, i: (f.t, f.fh[i])) + curves(clays, lambda f, i: (f.t, f.fe[i]))
+    whose = "; ".join(
         f"{who} {', '.join(COLOR_NAMES[color] for color in colors.values())}"
         for who, colors in (("hand", hands), ("clay", clays))
     )
     return (
-        LivePlot(f"velocity [cm/s]{named}", place, tuple(velocities), 0.1),
-        _law_plot(clays, clay, place, named),
-        LivePlot(f"force [N]: {'; '.join(both)}", "time [s]", tuple(forces), 0.1),
+        LivePlot(f"velocity [cm/s]{named}", place, velocities, 0.1),
+        law,
+        LivePlot(f"force [N]: {whose}", "time [s]", both, 0.1),
     )
 
 
-def _law_plot(colors: dict[int, str], clay: Clay | None, place: str, named: str) -> LivePlot:
-    """Plot of the clay's law: see `_plots`."""
-
-    def plot(title: str, over: str, point: Any, span: float, axes: Iterable[int]) -> LivePlot:
-        curves = [LiveCurve(colors[i], lambda f, i=i: point(f, i)) for i in axes]
-        return LivePlot(title, over, tuple(curves), span)
-
-    if clay is None or clay.viscous:
-
-        def ratio(f: Frame, i: int) -> tuple[float, float]:
-            return 100.0 * f.p[i], _ratio(f.fe[i], f.v[i])
-
-        return plot(f"clay, fe/v [N.s/m]{named}", place, ratio, 10.0, colors)
-    if not clay.of_velocity:
-        return plot(
-            f"clay, fe [N]{named}", place, lambda f, i: (100.0 * f.p[i], f.fe[i]), 0.1, colors
-        )
-    axes, told = (list(colors)[:1], " along the motion") if clay.along_motion else (colors, named)
-    law = functools.partial(_law_point, clay=clay)
-    return plot(f"clay, fe [N]{told}", "velocity [cm/s]", law, 0.1, axes)
-
-
-@dataclass(frozen=True)
-class LiveCurve:
-    """A curve of a live plot.
-
-    Attributes:
-        color: of the curve.
-        point: x and y of a frame of the session.
-    """
-
-    color: str
-    point: Callable[[Frame], tuple[float, float]]
-
-
-@dataclass
 class LivePlot:
-    """A plot that grows with the session, drawn by the engine up to its number of points.
+    """A plot that grows with the session, drawn by the engine up to its number of points."""
 
-    Attributes:
-        title: over the plot.
-        xlabel: under it.
-        curves: of the plot.
-        least: smallest range of y.
-    """
-
-    title: str
-    xlabel: str
-    curves: tuple[LiveCurve, ...]
-    least: float
-
-    def __post_init__(self):
+    def __init__(self, title: str, xlabel: str, curves: list[tuple[str, Any]], least: float):
+        """Takes the colour of each curve and its x and y at a frame, and a least range of y."""
+        self.curves, self.least = curves, least
         figure = self.figure = mujoco.MjvFigure()
         mujoco.mjv_defaultFigure(figure)
-        figure.title, figure.xlabel = self.title, self.xlabel
+        figure.title, figure.xlabel = title, xlabel
         figure.flg_extend = figure.flg_legend = 0
         figure.flg_ticklabel[:] = 1
         figure.xformat, figure.yformat = "%.3g", "%.3g"
@@ -364,21 +311,21 @@ class LivePlot:
         figure.gridrgb[:] = rgb(PALE_GREY)
         figure.textrgb[:] = rgb(BLACK)
         figure.linewidth = 2.0
-        for j, curve in enumerate(self.curves):
-            figure.linergb[j] = rgb(curve.color)
+        for j, (color, _) in enumerate(curves):
+            figure.linergb[j] = rgb(color)
         self.clear()
 
     def clear(self) -> None:
         """Forgets all points."""
         self.points: list[list[tuple[float, float]]] = []
-        self.seen, self.stride = 0, 1
+        self.frames_read, self.stride = 0, 1
         self.figure.linepnt[:] = 0
 
     def extend(self, frames: list[Frame]) -> None:
         """Adds the new frames."""
-        new = (frames[k] for k in range(self.seen, len(frames)) if k % self.stride == 0)
-        self.points += [[curve.point(frame) for curve in self.curves] for frame in new]
-        self.seen = len(frames)
+        new = (frames[k] for k in range(self.frames_read, len(frames)) if k % self.stride == 0)
+        self.points += [[point(frame) for _, point in self.curves] for frame in new]
+        self.frames_read = len(frames)
         while len(self.points) >= mujoco.mjMAXLINEPNT - 1:
             self.points, self.stride = self.points[::2], 2 * self.stride
         if not self.points:

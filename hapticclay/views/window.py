@@ -19,9 +19,8 @@ from ..errors import ParameterError
 from ..live.player import Player
 from ..live.replay import Replay
 from ..live.session import Session
-from ..live.verdict import clay_here
+from ..live.status import banner, status
 from ..scene.experiments import SCENARIOS
-from .stage import held_words
 from .viewer import Rows, Sight, Writing
 
 SPACE, BACKSPACE, RIGHT, LEFT, DOWN, UP = 32, 259, 262, 263, 264, 265  # GLFW's numbers
@@ -51,24 +50,17 @@ class Window:
 
     The viewer draws in another process (see `viewer`) and requests the content for each picture.
     When requests stop, the window counts as closed.
-
-    Attributes:
-        play: session or record to show.
-        help: whether the keys are listed.
-        other: whether a key has chosen another scenario.
-        held: position of the handle when the mouse grabbed it [m]; None if it does not.
-        shown: number of frames sent to the viewer.
-        written: time of the last texts sent [s].
     """
 
     def __init__(self, play: Session | Replay):
         """Prepares the window; call `show` to open it."""
-        self.play, self.help, self.other = play, True, False
-        self.held: tuple[float, float] | None = None
+        self.play, self.help = play, True  # whether the keys are listed
+        self.other = False  # whether a key has chosen another scenario
+        self.held: tuple[float, float] | None = None  # the handle when the mouse grabbed it [m]
         self._anew()
 
     def _anew(self) -> None:
-        self.shown, self.written = 0, -math.inf
+        self.shown, self.written = 0, -math.inf  # frames sent, time of the last texts [s]
 
     def show(self, until: Callable[[], bool] | None = None) -> None:
         """Shows the window until it is closed; raises the error that ended the player, if any."""
@@ -116,18 +108,16 @@ class Window:
         """Handles keys and mouse and returns the content; the caller holds the player's lock."""
         for key in keys:
             self._key(key)
-        play, target = self.play, None
+        play = self.play
         if isinstance(play, Session):
             play.pull(self._mouse(hand))
-            target = play.point
+        target = play.point
         frames, anew = play.frames[max(self.shown - 1, 0) :], self.shown == 0
         self.shown = len(play.frames)
-        live = isinstance(play, Session)
-        angles = list(play.run.q) if live else play.source.q[play.n].tolist()
         writing, now = None, time.perf_counter()
         if now - self.written >= WRITE_TIME:
             self.written, writing = now, self._writing()
-        return Sight(frames, anew, angles, target, writing)
+        return Sight(frames, anew, play.angles, target, writing)
 
     def _mouse(self, hand: tuple[float, float] | None) -> tuple[float, float] | None:
         """Target point of the hand [m] while the mouse drags."""
@@ -147,37 +137,24 @@ class Window:
         elif key == ord("H"):
             self.help = not self.help
         elif isinstance(play, Session):
-            s = play.scenario
+            x, y = play.gain
+            scale = KEY_FACTOR if key in (UP, RIGHT) else 1.0 / KEY_FACTOR
             if key == ord("R"):
                 play.recording = not play.recording
             elif key in (UP, DOWN):
-                scale = KEY_FACTOR if key == UP else 1.0 / KEY_FACTOR
-                play.change(gain=(s.gain[0] * scale, s.gain[1] * scale))
+                play.change(gain=(x * scale, y * scale))
             elif key in (LEFT, RIGHT):
-                scale = KEY_FACTOR if key == RIGHT else 1.0 / KEY_FACTOR
                 play.change(b=play.damping * scale)
             elif key in EXPERIMENT_KEYS:
                 play.start(SCENARIOS[EXPERIMENT_KEYS[key]]())
                 self.other = True
 
     def _writing(self) -> Writing:
-        play = self.play
-        frame, clock = play.frames[-1], play.clock
-        state = "paused" if play.paused else "ended" if play.ended else "replaying"
-        if isinstance(play, Session) and not (play.paused or play.ended):
-            state = "recording" if play.recording else "not recording"
-        slow = ", machine too slow" if clock.slow else ""
-        gain, still = play.gain, held_words(frame.held)
-        rows: Rows = (
-            ("time", f"{frame.t:.1f} s, {clock.factor:.2f} x real time{slow}"),
-            ("state", f"{state}, {still}" if still else state),
-            ("K", f"{gain[0]:.3g}, {gain[1]:.3g}"),
-            ("clay", clay_here(play.scenario, frame.p, play.b)),
-            ("fh", f"{math.hypot(*frame.fh):.2f} N"),
+        keys = LIVE_KEYS if isinstance(self.play, Session) else REPLAY_KEYS
+        rows: Rows = tuple(status(self.play).items())
+        return Writing(
+            rows, keys if self.help else (), *banner(self.play, "press backspace to restart")
         )
-        keys, verdict = LIVE_KEYS if isinstance(play, Session) else REPLAY_KEYS, play.verdict()
-        text = f"{play.ended}: press backspace to restart" if play.ended else verdict.text
-        return Writing(rows, keys if self.help else (), text, verdict.unstable)
 
 
 @contextlib.contextmanager

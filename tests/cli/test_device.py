@@ -78,7 +78,7 @@ def test_nobody_came(capsys, tmp_path):
         (["serve", "--duration", "inf"], "duration"),
         (["serve", "--period", "nan", "--clock", "tick"], "period"),
         (["serve", "--period", "0.01"], "tick"),
-        (["serve", "--largest-force", "nan"], "largest_force"),
+        (["serve", "--largest-force", "nan"], "--largest-force"),
         (["serve", "--hand", "nan", "0"], "hand"),
         (["serve", "--hand", "0", "0", "1", "0", "1e-320"], "speed"),
         (["serve", "--hand", "0", "0", "1", "0", "1e300"], "speed"),

@@ -1,6 +1,7 @@
 """Units in every option, and options that would do nothing."""
 
 import json
+import math
 import re
 import shlex
 from decimal import Decimal
@@ -13,8 +14,9 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay import units
 from hapticclay.cli import app
-from hapticclay.cli import words as cli_words
+from hapticclay.cli.commands import COMMANDS, load_command
 from hapticclay.cli.fields import field_list
+from hapticclay.cli.options import Several, options_of
 from hapticclay.errors import ParameterError
 from hapticclay.fields import leaves
 from hapticclay.scene.changes import named_values
@@ -67,26 +69,35 @@ def test_an_error_of_another_kind_is_refused(text):
         parse_error(text)
 
 
-def test_every_option_with_units_takes_them(monkeypatch):
-    """Each number of each option of each command in a smaller unit: the number itself."""
-    tried = 0
-    for command in app.COMMANDS:
-        kinds, told = cli_words.options([command]), cli_words._option_units([command])
-        for name, kind in kinds.items():
-            own = [] if not told.get(name) else told[name].split(", ")
-            if float not in cli_words._members(kind) or not all(x in SMALLER for x in own):
-                continue
-            if not own:
-                continue
-            count = cli_words._most(kind)
-            count = len(own) if count == float("inf") else int(count)
-            each = [own[min(i, len(own) - 1)] for i in range(count)]
-            words = [f"3.25 {SMALLER[u][0]}" for u in each]
-            exact = [float(Decimal("3.25") * Decimal(SMALLER[u][1])) for u in each]
-            found = cli_words.with_units([command, f"--{name}", *words])
-            assert [float(x) for x in found[2:]] == exact, (command, name)
-            tried += 1
-    assert tried > 30
+def unit_of(node, place):
+    """Unit of a number of an option; "" for none."""
+    if isinstance(node, Several):
+        return node.items[0 if node.many else place].bound.unit
+    return node.bound.unit
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_option_with_units_takes_them(command):
+    """Each number of each option in a smaller unit: the number itself."""
+    for option in options_of(load_command(command)).values():
+        count = 2 if option.node.arity == math.inf else int(option.node.arity)
+        own = [unit_of(option.node, i) for i in range(count)]
+        if not option.node.takes_numbers or not all(unit in SMALLER for unit in own):
+            assert not any(own), (option.name, own)
+            continue
+        words = [f"3.25 {SMALLER[unit][0]}" for unit in own]
+        exact = tuple(float(Decimal("3.25") * Decimal(SMALLER[unit][1])) for unit in own)
+        assert option.value(words) == (exact if count > 1 else exact[0]), option.name
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_an_option_whose_help_names_a_unit_takes_it(command):
+    for option in options_of(load_command(command)).values():
+        shown = [x for unit in re.findall(r"\[([^]]*)\]", option.about) for x in unit.split(", ")]
+        if option.node.takes_numbers and all(unit in SMALLER for unit in shown):
+            count = 1 if option.node.arity == math.inf else int(option.node.arity)
+            own = [unit_of(option.node, i) for i in range(count)]
+            assert set(own) == set(shown) or own == [""] * count and not shown, option.name
 
 
 @given(st.floats(1e-6, 1e6), st.sampled_from(["kg", "s", "s^2"]), st.sampled_from(["", " "]))
@@ -182,7 +193,7 @@ def test_one_number_for_two_quantities_is_refused(capsys):
         ("run constant --error 1e-6 --integrator accurate", "integrator = 'accurate': is chosen"),
         (
             "run constant --control sampled --Ts 1ms --dt 0.1ms --error 1e-6",
-            "dt = '0.0001': is chosen by --error",
+            "dt = '0.1ms': is chosen by --error",
         ),
         (
             "run constant --no-plots --format svg",

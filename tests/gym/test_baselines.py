@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import hapticclay as hc
+from benchmarks import gym_scores
 from hapticclay.cli import app
 from hapticclay.gym import adaptive_gain, baselines, probe_clay, scores
 
@@ -23,7 +24,7 @@ def test_the_robust_gain_is_below_that_of_each_published_hand():
 SEARCHED = json.loads((Path(__file__).parents[2] / "docs" / "gym_scores.json").read_text())
 
 
-@pytest.mark.parametrize("family", scores.FAMILIES)
+@pytest.mark.parametrize("family", gym_scores.FAMILIES)
 def test_scores_0_and_1_are_the_best_of_all_shares_that_were_searched(family):
     """By the returns of each episode, not by the means that the search kept."""
     found = SEARCHED["families"][family]
@@ -32,17 +33,17 @@ def test_scores_0_and_1_are_the_best_of_all_shares_that_were_searched(family):
     }
     best = max(means, key=means.__getitem__)
     policy = baselines.BASELINES[scores.ID][family]
-    assert policy == scores.FAMILIES[family](best) and found["share"] == best
+    assert policy == gym_scores.FAMILIES[family](best) and found["share"] == best
     assert {round(best + 0.01 * k, 2) for k in (-2, -1, 1, 2)} <= means.keys()
     assert min(means) < 0.75 < 1.15 < max(means)  # no end of the search is near the best
-    assert all(len(r) == len(scores.SEEDS) == SEARCHED["seeds"] for r in found["returns"])
+    assert all(len(r) == len(gym_scores.SEEDS) == SEARCHED["seeds"] for r in found["returns"])
 
 
 @pytest.mark.parametrize("family, share", [("best fixed gain", 1.08), ("best oracle", 0.84)])
 def test_returns_of_the_search_are_those_of_its_episodes(family, share):
     """Of one seed, in Python; the file holds four decimals, so half of the last."""
     found = SEARCHED["families"][family]
-    again = scores.search(family, [share], [3], around=0, engine="python")
+    again = gym_scores.search(family, [share], [3], around=0, engine="python")
     told = found["returns"][found["shares"].index(share)][3]
     assert again.totals == pytest.approx(told, abs=5.1e-5) and again.best == share
 
@@ -70,7 +71,7 @@ def test_scores_need_the_returns_of_both_anchors():
         scores.scores_of(scores.ID, {"best fixed gain": -10.0})
     assert scores.scores_of("CutLine-v0", {"random": 1.0}) == {}
     with pytest.raises(hc.ParameterError, match="best oracle"):
-        scores.search("oracle")
+        gym_scores.search("oracle")
 
 
 def test_a_hand_is_identified_from_its_own_equation():

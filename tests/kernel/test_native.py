@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.kernel import engine
 from hapticclay.kernel import native as compiled
-from hapticclay.simulation import batch, engines, monitor, record, run
+from hapticclay.simulation import batch, engines, monitor, run
 from hapticclay.simulation.record import Record
 from tests.kernel import test_engines
-from tests.kernel.test_engines import MORE, WAVE, native
+from tests.kernel.test_engines import MORE, WAVE, native, summary_of
 from tests.kernel.test_kick import CASES
 
 ALL = CASES | MORE
@@ -38,13 +38,12 @@ def test_a_run_that_ceases_to_be_calm_is_looked_at_from_its_start():
         start=(0.05, 0.0),
         force=(0.5, 0.0),
     )
-    late, watched = (run.Run(s, 1, "native") for _ in range(2))
-    watched.calm = False
-    for made in (late, watched):
+    late, monitored = run.Run(s, 1, "native"), run.Run(s, 1, "native", keep_for_monitor=True)
+    for made in (late, monitored):
         made.go(None)
-    assert late.looked > 3 * 4095 and late.outcome.code == "diverged"
-    same(Record.of(late, 0.0), Record.of(watched, 0.0))
-    assert late.watch.seen == watched.watch.seen >= late.looked
+    assert late.judged > 3 * 4095 and late.outcome.code == "diverged"
+    same(Record.of(late, 0.0), Record.of(monitored, 0.0))
+    assert late.watch.seen == monitored.watch.seen >= late.judged
     thin = hc.simulate(s, every=7, engine="python")
     same(hc.simulate(s, every=7, engine="native"), thin)
     same(hc.simulate_batch([s], every=7)[0], thin)
@@ -81,10 +80,7 @@ def test_summaries_are_those_of_the_records():
     short = hc.simulate_batch(ALL.values(), keep="summaries")
     assert short.dtype == batch.SUMMARY
     for i, r in enumerate(records):
-        assert (
-            short[i].tobytes()
-            == np.array([batch.summary_entry(*record.brief(r))], batch.SUMMARY)[0].tobytes()
-        ), list(ALL)[i]
+        assert short[i].tobytes() == summary_of(r).tobytes(), list(ALL)[i]
         assert short["code"][i] == r.outcome.code and short["residual"][i] == r.energy["residual"]
         np.testing.assert_array_equal(short["p"][i], r.p[-1])
 
@@ -218,7 +214,7 @@ def test_native_is_faster():
 
 
 numbers = st.floats(-25.0, 25.0) | st.sampled_from([0.0, math.nan, math.inf, 1e-12, 1e-6])
-PLACE = run.Place()
+WORKSPACE = run.Workspace()
 
 
 @pytest.mark.parametrize("engine", ["python", pytest.param("native", marks=native)])
@@ -239,8 +235,8 @@ def test_what_the_quick_test_passes_the_monitor_passes(engine, data):
     if data.draw(st.booleans(), "bent"):
         rows[data.draw(st.integers(0, n - 1)), 1] = data.draw(st.floats(-3.2, 0.0))
     s = hc.constant_cut(gain=(data.draw(st.sampled_from([0.1, 30.0])), 0.2))
-    watch, row = monitor.StabilityMonitor(s), run.Run(s, 1, engine, PLACE).row
-    PLACE.buffers.rows[:n] = rows
+    watch, row = monitor.StabilityMonitor(s), run.Run(s, 1, engine, WORKSPACE).row
+    WORKSPACE.buffers.rows[:n] = rows
     parts = sorted({0, n, data.draw(st.integers(0, n), "cut")})
     for first, last in zip(parts, parts[1:], strict=False):
         if not row.is_quiet(first, last):

@@ -163,9 +163,9 @@ def slices(session, n):
     """What a player does, by the clock of the device."""
     for _ in range(n):
         session.partner.exchange()
-        session.partner.lead(session)
+        session.partner.before_slice(session)
         session.advance(PERIOD)
-        session.partner.follow(session)
+        session.partner.after_slice(session)
 
 
 def test_the_device_pulls_the_handle_through_the_clay_and_feels_it(device_hand):

@@ -125,6 +125,18 @@ def test_pause_restart_and_record_switch():
         session.record()
 
 
+def test_a_gap_in_the_record_of_clay_that_yields_leaves_out_its_forces_too():
+    layer = hc.Profile((), (20.0,), Fy=(0.3,))
+    scene = dataclasses.replace(hc.constant_cut(dt=1e-3), clay=hc.Clay(layer, layer))
+    session = Session(scene, stiffness=10.0)
+    for session.recording in (True, False, True):
+        drag(session, 0.5)
+    r = session.record()
+    assert len(r.fe) == len(r.t) and np.diff(r.t).max() > 0.4
+    moving = r.v[:, 0] > 1e-3
+    assert moving.any() and (r.fe[moving, 0] > 20.0 * r.v[moving, 0] + 0.29).all()
+
+
 @functools.cache
 def cut_through():
     """A session that cut the slab from end to end; nothing is to change it."""

@@ -459,6 +459,15 @@ def test_an_experiment_takes_parameters_and_fields_at_once():
     assert s == dataclasses.replace(hc.variable_cut("none"), name="mine")
 
 
+@pytest.mark.parametrize("none", [False, 0.0, "none", None])
+def test_a_hand_that_is_there_by_default_can_be_taken_away(none):
+    """`--set operator=false` put the hand of the paper there."""
+    kind = EXPERIMENTS["stability"]
+    assert kind.of({}, {}).operator == hc.Operator()
+    assert kind.of({}, {"operator": none}).operator is None
+    assert hc.Scenario.of({"experiment": "stability", "operator": none}).operator is None
+
+
 def test_units_of_names():
     for name, unit in (
         ("b", "N.s/m"),
@@ -628,7 +637,7 @@ def test_another_kind_of_unit_is_refused(text, unit):
 def test_every_unit_of_a_bound_is_known():
     for kind in (hc.Scenario, *EXPERIMENTS.values()):
         for field in leaves(kind):
-            unit = field.bound.unit
+            unit = field.unit
             if unit.endswith("^n"):  # of a consistency, which depends on n
                 assert units.parse_unit(unit) is None
                 continue
@@ -741,6 +750,7 @@ def test_a_step_that_is_given_stays_and_the_nearest_sample_is_named(dt):
         ({"operator.mass": 0.3}, "operator.mass"),
         ({"operator": {"mass": 0.3, "spring": 2.0}}, "operator.mass"),
         ({"operator.y.damper": 1.0}, "operator.y.damper"),
+        ({"operator": "none", "operator.mass": 0.3}, "operator.mass"),
     ],
 )
 def test_a_hand_is_added_whole_or_not_at_all(given, path, tmp_path):

@@ -15,9 +15,10 @@ import hapticclay as hc
 from hapticclay.kernel import native, records
 from hapticclay.kernel.row import NativeRow
 from hapticclay.model.controller import SERVO, Servo
-from hapticclay.simulation import batch, many, record
-from hapticclay.simulation.run import Place
+from hapticclay.simulation import batch, many
+from hapticclay.simulation.run import Workspace
 from tests.kernel.test_engines import ALL as ALL_HARDWARE
+from tests.kernel.test_engines import summary_of
 from tests.simulation.test_column_batch import GUARDED, RICH
 
 pytestmark = pytest.mark.skipif(not native.is_there(), reason="needs the compiled kernel")
@@ -77,8 +78,7 @@ def kinds(rng):
 
 def entry(s):
     """The summary of a run alone, in Python."""
-    brief = record.brief(hc.simulate(s, engine="python"))
-    return np.array([batch.summary_entry(*brief)], batch.SUMMARY)
+    return summary_of(hc.simulate(s, engine="python")).reshape(1)
 
 
 @functools.cache
@@ -123,7 +123,7 @@ def test_runs_of_one_kind_are_made_together_and_others_are_left():
     scenes = [next(source) for _ in range(20 * 8)]
     keys = [many.kind_key(s) for s in scenes]
     assert {i % 20 for i, key in enumerate(keys) if key is None} == {16, 17, 18, 19}
-    done, left = batch.BatchPool(1).many(scenes, keys)
+    done, left = many.Lane(Workspace()).make(scenes, keys)
     places = sorted([*left, *(i for at, _ in done for i in at.tolist())])
     assert places == list(range(160))
     few = {i for i, key in enumerate(keys) if keys.count(key) < many.FEWEST}
@@ -147,9 +147,9 @@ def arrays_of(models, name, sizes):
 
 def columns(jobs):
     """Models and tables of runs of one kind, and of each alone."""
-    place = Place()
-    together, kept = many.Pattern(jobs[0], place).models(many.draws_of(jobs))
-    alone = [NativeRow(s, place.movers.of(s), Place().buffers) for s in jobs]
+    place = Workspace()
+    together, kept = many.Pattern(jobs[0], place).models(many.differences_of(jobs))
+    alone = [NativeRow(s, place.movers.of(s), Workspace().buffers) for s in jobs]
     tables = [x.arrays["table"].ravel() for x in alone]
     found = arrays_of(together, "table", map(len, tables)) if jobs[0].clay else tables
     del kept
@@ -176,7 +176,7 @@ def test_compensators_of_another_shape_are_never_made_together():
     jobs = [dataclasses.replace(shaped, gain=(0.2 + 0.1 * i, 0.2)) for i in range(many.FEWEST)]
     keys = [many.kind_key(s) for s in jobs]
     assert len(set(keys)) == 1 and keys[0] is not None
-    done, left = batch.BatchPool(1).many(jobs, keys)
+    done, left = many.Lane(Workspace()).make(jobs, keys)
     assert not done and left == list(range(len(jobs)))
 
 

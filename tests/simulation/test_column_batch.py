@@ -61,7 +61,7 @@ def test_clay_that_is_stiffer_for_some_rows():
     b = np.concatenate([np.geomspace(90.0, 2e3, N // 2), np.geomspace(4e3, 1e5, N - N // 2)])
     given = {"clay.x.values.1": b, "clay.y.values.1": np.where(np.arange(N) % 7, 90.0, b)}
     drawn = column_batch.Columns(base, given)
-    good = drawn.of_kind(drawn.draws(0, N))
+    good = drawn.of_kind(drawn.differences(0, N))
     assert 0 < good.sum() < N
     assert_same(hc.simulate_columns(base, given), by_objects(base, given))
 

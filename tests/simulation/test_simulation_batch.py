@@ -79,7 +79,7 @@ def test_a_batch_is_compiled_where_there_is_a_kernel(there, monkeypatch):
     scenes = KINDS["operator"]
     single = [hc.Simulation(s, engine="python") for s in scenes]
     with hc.SimulationBatch(scenes) as batch:
-        assert {run.row.engine for run in batch._runs.runs} == {"native" if there else "python"}
+        assert {run.row.engine for run in batch._run.runs} == {"native" if there else "python"}
         go_on(batch, single, 3, 9, 1200)
 
 

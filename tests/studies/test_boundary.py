@@ -368,7 +368,7 @@ def test_command_prints_verdicts_and_writes_them(tmp_path, capsys, monkeypatch):
     out = capsys.readouterr().out
     assert (
         "sampled every 0.36 ms" in out
-        and f" {hc.theory.gain_limit('x', 90.0, TH):.4g}    largest stable K" in out
+        and f" {hc.theory.gain_limit('x', 90.0, TH):.4g}  largest stable K" in out
     )
     assert "1 ms late" in out and "pose-dependent Lambda" in out and "Eq. 13" in out
     assert max(len(line) for line in out.partition("boundary found")[0].splitlines()) <= 80

@@ -74,7 +74,7 @@ def test_the_command_prints_and_writes(tmp_path, capsys, monkeypatch):
     assert "dynamic range" in capsys.readouterr().out
     assert json.loads((tmp_path / "mbk.json").read_text())["gap"] < CLOSE
     assert app.main([*words, "--arm", "x", "--Ts", "1e-3"]) == 0
-    assert "least M, hand box" in capsys.readouterr().out
+    assert "hand box: least M" in capsys.readouterr().out
     names = {f.name for f in tmp_path.iterdir()}
     assert {"mbk.json", "mbk.png", "range.png", "mass.png"} <= names
 

@@ -283,7 +283,7 @@ def test_the_command_writes_what_it_found(tmp_path, capsys, monkeypatch):
     words = ["robustness", "--out", str(tmp_path), "--runs", "3", "--grid", "K=2:6:3 b=50,200"]
     assert app.main([*words, "--band", "3", "--workers", "1", "--data"]) == 0
     told = capsys.readouterr()
-    assert "unstable:" in told.out and "18 runs: about" in told.err
+    assert "of 18 runs unstable" in told.out and "18 runs: about" in told.err
     names = {"instability.png", "gain_band.png", "robustness.json", "instability-cells.csv"}
     assert names <= {f.name for f in tmp_path.iterdir()}
     assert app.main(["robustness", "--list"]) == 0

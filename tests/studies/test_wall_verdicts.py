@@ -3,7 +3,6 @@
 import pytest
 
 import hapticclay as hc
-from hapticclay.cli.zwidth import zwidth_table
 
 DEVICE = dict(mass=0.1, damper=0.5)
 
@@ -45,4 +44,4 @@ def test_the_largest_K_of_a_region_says_between_which_B_it_lies():
         hc.walls.stiffness_band(hc.VirtualWall(B=B, device=wall.device))[1] for B in (70.0, 80.0)
     ]
     assert max(more) > region.largest_K
-    assert f"between B = {low:.4g} and {high:.4g}, of 4 tried" in zwidth_table(found)
+    assert f"between B = {low:.4g} and {high:.4g}, of 4 tried" in found.text()

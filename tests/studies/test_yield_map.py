@@ -13,7 +13,7 @@ from hapticclay.studies import yield_map as study
 from hapticclay.studies.boundary import PushedLoop
 from hapticclay.studies.yield_map import measured_cycle, yielding_run
 from hapticclay.theory.relay_cycle import critical_push
-from hapticclay.views.yield_map_plots import yield_map_plot
+from hapticclay.views.stability_map_plots import yield_map_plot
 from tests.hunt import some
 
 Y = PushedLoop("y", K=1.0, inertia_shaping=True)
@@ -109,7 +109,7 @@ def test_runs_of_the_map_do_what_theory_says(small_map):
         assert c.simulated == c.expected
         if c.expected == "limit cycle":
             assert c.speed == pytest.approx(c.exact, rel=0.02)  # settled to 1 % a quarter
-    assert "0 of 16 runs" in stability.yield_differences(small_map)
+    assert "0 of 16 runs" in small_map.text()
 
 
 def test_the_map_is_drawn(small_map):
@@ -117,7 +117,7 @@ def test_the_map_is_drawn(small_map):
     assert ax.get_xlabel() == "yield force Fy [N]" and ax.get_ylabel() == "gain K [1/kg]"
     assert "[mm/s]" in bar.get_ylabel()
     wrong = replace(small_map.cells[0], simulated="grows")
-    text = stability.yield_differences(replace(small_map, cells=(wrong,)))
+    text = replace(small_map, cells=(wrong,)).text()
     assert "1 of 1 runs end otherwise" in text
     labels = yield_map_plot(replace(small_map, cells=(wrong, *small_map.cells[1:]))).axes[0]
     assert "unlike theory" in labels.get_legend_handles_labels()[1]

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 import hapticclay as hc
-from hapticclay.cli import app
-from hapticclay.cli.words import check_words, ordered, with_units
+from hapticclay.cli import app, parser
 from hapticclay.kernel import engine
 from hapticclay.model import constants
 from hapticclay.simulation import record
@@ -310,8 +309,7 @@ def test_a_command_can_be_copied_as_it_stands(page):
     """A shell ends it at its remark; the command line takes its words, and ignores none."""
     for line in commands_in(page.read_text()):
         assert line.isascii(), line
-        words = with_units(ordered(shlex.split(line, comments=True)))
-        check_words(words)
+        parser.read(shlex.split(line, comments=True))
 
 
 @pytest.mark.parametrize("page", TEXTS, ids=[page.stem for page in TEXTS])

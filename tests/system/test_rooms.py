@@ -15,7 +15,7 @@ HEAVY = (
     "imageio",
     "viser",
     "dask",
-    "tyro",
+    "cyclopts",
     "tqdm",
     "scipy",
     "mujoco.viewer",
@@ -39,7 +39,7 @@ def loaded(code, names):
         ("import hapticclay as hc; hc.simulate(hc.constant_cut(t_max=0.01))", HEAVY),
         (
             "import hapticclay as hc; hc.theory.gain_limit('x', 90.0)",
-            ("matplotlib", "mujoco", "tyro"),
+            ("matplotlib", "mujoco", "cyclopts"),
         ),
     ],
 )

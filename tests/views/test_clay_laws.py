@@ -9,7 +9,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.cli.run import run_table
-from hapticclay.live.verdict import clay_here
+from hapticclay.live.status import clay_here
 from hapticclay.model import clay as clay_module
 from hapticclay.model.clay import LAWS
 from hapticclay.model.traits import Column, Hold, Law, Told

@@ -46,7 +46,6 @@ from hapticclay.views import (
     theory_plots,
     wall_plots,
     workspace_plots,
-    yield_map_plots,
 )
 from hapticclay.views.style import LEAST_TEXT
 from tests.hunt import HUNTS, some
@@ -314,7 +313,7 @@ CASES = {
         )
         for kind in ("gain-damping", "delay-damping", "gain-pose")
     },
-    "map gain-yield": lambda: yield_map_plots.yield_map_plot(yield_chart()),
+    "map gain-yield": lambda: stability_map_plots.yield_map_plot(yield_chart()),
     "accuracy": lambda: accuracy_plots.accuracy_plot(ladder()),
     "identified G": lambda: identification_plots.identification_plot(
         [identified("G", "x"), identified("G", "y")]

@@ -1,4 +1,4 @@
-"""The block of finite elements: it keeps its dent, and nothing but its script knows of it."""
+"""The block of finite elements: it keeps its dent, and no run or picture opens a file of it."""
 
 import subprocess
 import sys

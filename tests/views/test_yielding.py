@@ -13,6 +13,7 @@ from hapticclay.live.clock import FRAME_TIME
 from hapticclay.live.frame import Frame
 from hapticclay.live.replay import Replay
 from hapticclay.live.session import Session
+from hapticclay.live.status import held_words
 from hapticclay.theory import linear_loop
 from hapticclay.views import (
     captions,
@@ -23,7 +24,7 @@ from hapticclay.views import (
     run_plots,
     running_plots,
 )
-from hapticclay.views.stage import Stage, held_words
+from hapticclay.views.stage import Stage
 from hapticclay.views.viewer import _law_point
 from hapticclay.views.window import Window
 

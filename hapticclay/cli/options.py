@@ -1,0 +1,154 @@
+"""The options of a command, as the fields of its dataclass, of its parts and of its experiment."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import types
+from collections.abc import Sequence
+from dataclasses import dataclass, is_dataclass
+from pathlib import Path
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+from ..fields import UNSET, Node, field_descriptions, node_of, of_words
+
+if TYPE_CHECKING:
+    from ..scene.experiments import Experiment
+
+T = TypeVar("T")
+LOOSE, SCENARIO, RECORD = "loose", "scenario", "record"
+Loose = Annotated[T, LOOSE]  # a word without a name
+ScenarioWord = Annotated[Any, SCENARIO]  # an experiment, or a scenario file
+RecordWord = Annotated[Any, RECORD]  # or a saved record
+SET = "set"  # the option for the fields of a scenario
+SET_HELP = (
+    "Any field of the scenario, part by part, as in --set arm.l1=0.3 servo.x.G.damping=50 "
+    "compensator.den=1,40,0 operator=true operator.mass=500g; hapticclay fields lists the names."
+)
+
+
+class Verbatim(Node):
+    """A text or a path as it was given."""
+
+    def __init__(self, kind: type):
+        self.kind = kind
+
+    def wants(self) -> str:
+        return "a path" if self.kind is Path else "a word"
+
+    def check(self, field: str, value: Any, owner: Any = None) -> Any:
+        return self.kind(value)
+
+
+class Several(Node):
+    """Values with a type each, or any number of values of one type."""
+
+    def __init__(self, items: Sequence[Node], many: bool):
+        self.items, self.many, self.takes_numbers = items, many, items[0].takes_numbers
+        self.arity = math.inf if many else len(items)
+
+    def wants(self) -> str:
+        one = self.items[0].wants()
+        return f"one or more, each {one}" if self.many else f"{len(self.items)} numbers"
+
+    def check(self, field: str, value: Any, owner: Any = None) -> Any:
+        values = value if isinstance(value, list) else [value]
+        nodes = [*self.items] * len(values) if self.many else self.items
+        pairs = zip(nodes, values, strict=True)
+        return tuple(node.check(field, node.read(x, field)) for node, x in pairs)
+
+
+@dataclass(frozen=True, eq=False)
+class Option:
+    """A word, or words behind a name, that a command takes.
+
+    Attributes:
+        part: field of the command in which the option lies; SCENARIO for those of an experiment, ""
+            for the command's own.
+        note: LOOSE, SCENARIO or RECORD for a word without a name; "" for others.
+    """
+
+    name: str
+    node: Node
+    about: str
+    default: Any
+    part: str = ""
+    note: str = ""
+
+    @property
+    def word(self) -> str:
+        """The name on the command line."""
+        return self.name.replace("_", "-")
+
+    @property
+    def label(self) -> str:
+        """The name as an error shows it."""
+        return self.name if self.note else f"--{self.word}"
+
+    def value(self, texts: Sequence[str]) -> Any:
+        """The value that words stand for."""
+        return of_words(self.node, self.label, texts)
+
+
+def parts_of(kind: type) -> dict[str, type]:
+    """The dataclasses among the fields of a command, by the names of the fields."""
+    return {name: hint for name, hint in get_type_hints(kind).items() if is_dataclass(hint)}
+
+
+def options_of(kind: type, part: str = "") -> dict[str, Option]:
+    """The options of a dataclass, and of dataclasses among its fields, by name."""
+    hints, about = get_type_hints(kind, include_extras=True), field_descriptions(kind)
+    out: dict[str, Option] = {}
+    for field in dataclasses.fields(kind):
+        name, hint = field.name, hints[field.name]
+        if is_dataclass(hint):
+            out |= options_of(hint, name)  # type: ignore[arg-type]
+            continue
+        made = field.default_factory
+        default = field.default if made is UNSET else made()
+        notes = getattr(hint, "__metadata__", ())
+        note = next((x for x in (LOOSE, SCENARIO, RECORD) if x in notes), "")
+        node = _option_node(get_args(hint)[0] if note else hint)
+        out[name] = Option(name, node, about[name], default, part, note)
+    return out
+
+
+def _option_node(hint: Any) -> Node:
+    """The type of an option, as a node of the field tree."""
+    node = _node_for(hint)
+    node.hint = hint
+    if "none" in node.words:  # a word here, not the lack of a value
+        node.none = False
+    return node
+
+
+def _node_for(hint: Any) -> Node:
+    bare, *notes = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+    members = get_args(bare) if get_origin(bare) in (Union, types.UnionType) else (bare,)
+    kind, *others = (x for x in members if x is not type(None))
+    items = get_args(kind) if get_origin(kind) is tuple else ()
+    if kind in (str, Path) and not others:
+        return Verbatim(kind)
+    if items[1:] == (...,) or (items and get_origin(items[0]) is Annotated):
+        each = [Annotated[(x, *notes)] if notes else x for x in items if x is not ...]
+        return Several([_option_node(x) for x in each], items[-1] is ...)
+    return node_of(hint)
+
+
+def experiment_options(kind: type[Experiment]) -> dict[str, Option]:
+    """The parameters of an experiment, as options."""
+    from ..scene.experiments import parameters
+
+    return {
+        name: Option(name, f.node, f.about, f.default, SCENARIO)
+        for name, f in parameters(kind).items()
+    }
