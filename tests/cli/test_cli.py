@@ -544,7 +544,7 @@ def test_no_color_is_heeded(tmp_path, env, coloured):
     with (
         open(terminal, "rb", buffering=0) as screen,
         subprocess.Popen(
-            [sys.executable, "-m", "hapticclay", "version", "--help"],
+            [sys.executable, "-m", "hapticclay", "lab", "--help"],
             cwd=tmp_path,
             env=env,
             stdout=end,
