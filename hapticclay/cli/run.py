@@ -72,7 +72,7 @@ class RunCommand:
             print(f"hapticclay: {line}", file=sys.stderr)
         with console.ctrl_c() as stop:
             record = simulate_with_progress(self.scenario, self.every, stop.is_set, self.error)
-        deliver(record, out, self.figures if self.plots else None)
+        deliver_record(record, out, self.figures if self.plots else None)
         return 130 if record.outcome.code == "interrupted" else 0
 
 
@@ -114,7 +114,7 @@ def simulate_with_progress(
         return simulate(scenario, every=every, progress=progress, error=error)
 
 
-def deliver(
+def deliver_record(
     record: Record, folder: Path, figures: console.FigureOptions | None, paced: bool = False
 ) -> None:
     """Writes a record and its plots, prints its table, and removes plots of an earlier record."""
