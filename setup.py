@@ -1,7 +1,8 @@
 """Builds the compiled kernel, hapticclay.native; pyproject.toml has all else.
 
-Cython compiles the modules of `formulas` and `kernel` that have a .pxd file beside them, unchanged.
-A mirror of them in build/ is what it sees, as a package of its own. Without a C compiler, Python's
+Cython compiles the modules of `formulas` and `kernel` that have a .pxd file beside them. In build/
+they are merged into one, so that the C compiler inlines across them: each function and constant is
+prefixed with the name of its module, and nothing else is changed. Without a C compiler, Python's
 headers or Cython the installation goes on, and CPython makes the steps of runs.
 
     python setup.py build_ext --inplace     for a checkout: as `make` does
@@ -10,8 +11,10 @@ HAPTICCLAY_CFLAGS, HAPTICCLAY_LDFLAGS: options for the compiler and the linker b
 HAPTICCLAY_NATIVE=no: build nothing.
 """
 
+import ast
 import importlib
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -114,25 +117,105 @@ def records_texts():
     yield layout.declarations(records.RECORDS, records.TYPES)
 
 
+class Prefixed(ast.NodeTransformer):
+    """A module whose functions and constants, and those it uses of others, are named in full."""
+
+    def __init__(self, name, tree):
+        self.name, self.own, self.others, self.local = name, set(), {}, set()
+        for node in tree.body:
+            if isinstance(node, ast.FunctionDef):
+                self.own.add(node.name)
+            elif isinstance(node, ast.Assign):
+                self.own |= stored(node)
+            elif isinstance(node, ast.ImportFrom):
+                room = node.module or name.split("/")[0]
+                self.others |= {x.asname or x.name: f"{room}/{x.name}" for x in node.names}
+
+    def visit_FunctionDef(self, node):
+        self.local = {x.arg for x in node.args.args} | stored(node)
+        self.generic_visit(node)
+        self.local, node.name = set(), full_name(self.name, node.name)
+        return node
+
+    def visit_Name(self, node):
+        if node.id in self.own - self.local:
+            node.id = full_name(self.name, node.id)
+        return node
+
+    def visit_Attribute(self, node):
+        of = node.value.id if isinstance(node.value, ast.Name) else ""
+        if of not in self.others or of in self.local:
+            return self.generic_visit(node)
+        other = self.others[of]
+        if other in native.IN_C:
+            node.value.id = other.split("/")[1]
+            return node
+        return ast.Name(full_name(other, node.attr), node.ctx)
+
+
+def stored(node):
+    """Names that are assigned within a node."""
+    names = (x for x in ast.walk(node) if isinstance(x, ast.Name))
+    return {x.id for x in names if isinstance(x.ctx, ast.Store)}
+
+
+def full_name(module, name):
+    """Name in the merged module of what stands in a module, such as kernel/path."""
+    return f"{module.replace('/', '_')}_{name}"
+
+
+def merged():
+    """The text of all modules as one, and of their types."""
+    constants, functions, types = [], [], [HEAD]
+    for name in native.compiled():
+        tree = ast.parse((PACKAGE / f"{name}.py").read_text())
+        prefixed = Prefixed(name, tree)
+        for node in tree.body:
+            if isinstance(node, ast.FunctionDef):
+                functions.append(ast.unparse(prefixed.visit(node)))
+            elif isinstance(node, ast.Assign):
+                constants.append(ast.unparse(prefixed.visit(node)))
+        types += merged_types(name)
+    return "\n\n".join(["import math", *constants, *functions, ""]), "\n".join([*types, ""])
+
+
+HEAD = """\
+cimport cython
+from .records cimport *
+from . cimport memory
+from ..formulas cimport cmath as math
+from ..formulas cimport numbers
+"""
+
+
+def merged_types(name):
+    """The lines of a .pxd file, with full names."""
+    for line in (PACKAGE / f"{name}.pxd").read_text().splitlines():
+        if line.startswith("@"):
+            yield line
+        elif found := re.match(r"(cdef .*?[ *])(\w+)(\(.*)", line):
+            yield found[1] + full_name(name, found[2]) + found[3]
+        elif found := re.match(r"(cdef \w+) (.*)", line):
+            yield f"{found[1]} " + ", ".join(full_name(name, x) for x in found[2].split(", "))
+
+
 def mirror(package):
     """Writes the package that Cython compiles; the source of each module by its name."""
     for folder in (package.parent, package, *(package / x for x in native.ROOMS)):
         write(folder / "__init__.py", "")
-    for room in native.ROOMS:
-        for file in (PACKAGE / room).glob("*.pxd"):
-            write(package / room / file.name, file.read_text())
+    for name in (*native.IN_C, "formulas/cmath"):
+        write(package / f"{name}.pxd", (PACKAGE / f"{name}.pxd").read_text())
     for suffix, text in zip(("h", "pxd"), records_texts(), strict=True):
         write(package / f"kernel/records.{suffix}", text)
-    found = {}
-    for name in native.compiled():
-        file = f"{name}.pyx" if name == native.WAY_IN else f"{name}.py"
-        write(package / file, (PACKAGE / file).read_text())
-        found[module_name(name)] = package / file
-    return found
+    for suffix, text in zip(("py", "pxd"), merged(), strict=True):
+        write(package / f"kernel/loop.{suffix}", text)
+    write(package / "kernel/machine.pyx", (PACKAGE / "kernel/machine.pyx").read_text())
+    files = (package / x for x in ("kernel/loop.py", "kernel/machine.pyx"))
+    return dict(zip(map(module_name, native.MODULES), files, strict=True))
 
 
 def module_name(name):
-    """Name of the compiled module of a source, such as kernel/path."""
+    """Name of a compiled module, such as kernel/loop."""
     return "hapticclay.native." + name.replace("/", ".")
 
 
@@ -148,7 +231,7 @@ def extensions():
             py_limited_api=IS_LIMITED,
             optional=True,  # a failure is a warning
         )
-        for name in native.compiled()
+        for name in native.MODULES
     ]
 
 
@@ -217,14 +300,7 @@ class BuildNative(build_ext):
 
 
 def lay_out(folder, files, lacks, known):
-    """Makes the package of compiled modules; built.py comes last.
-
-    Args:
-        folder: of the package.
-        files: the modules; empty if there are none.
-        lacks: why there are none.
-        known: checksums of the sources.
-    """
+    """Makes the package of compiled modules, or of why there are none; built.py comes last."""
     modules = {f"{x.parent.name}/{x.name}": x for x in files}
     sums = {name: native.checksum(file) for name, file in modules.items()}
     text = "# Written by setup.py: see hapticclay/kernel/native.py\n"

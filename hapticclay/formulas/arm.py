@@ -4,29 +4,19 @@ import math
 
 
 def jacobian(q1, q2, links):
-    """Columns of the Jacobian in absolute angles, u_i = dp/dtheta_i (Eq. 14).
+    """Columns of the Jacobian in absolute angles, u_i = dp/dtheta_i (Eq. 14) [m].
 
-    Args:
-        q1: angle of link 1 [rad].
-        q2: angle of link 2 against link 1 [rad].
-        links: of the arm, as `Arm.links`.
-
-    Returns:
-        (u1x, u1y, u2x, u2y) [m]. The handle lies at (u1y + u2y, -u1x - u2x) in the world.
+    q1: angle of link 1, q2: of link 2 against link 1 [rad]; `links` as `Arm.links`. The handle lies
+    at (u1y + u2y, -u1x - u2x) in the world.
     """
     l1, l2, a = links[0], links[1], q1 + q2
     return -l1 * math.sin(q1), l1 * math.cos(q1), -l2 * math.sin(a), l2 * math.cos(a)
 
 
 def mobility(u, links):
-    """Inverse operational-space inertia W = Lambda^-1 = J M^-1 J' (Khatib 1987).
+    """Inverse operational-space inertia W = Lambda^-1 = J M^-1 J' (Khatib 1987) [1/kg].
 
-    Args:
-        u: from `jacobian` or `jacobians` [m].
-        links: of the arm, as `Arm.links`.
-
-    Returns:
-        (Wxx, Wxy, Wyy) [1/kg].
+    u: from `jacobian` or `jacobians`. (Wxx, Wxy, Wyy).
     """
     u1x, u1y, u2x, u2y = u[0], u[1], u[2], u[3]
     a = u1x / links[2]
@@ -36,31 +26,13 @@ def mobility(u, links):
 
 
 def handle_velocity(r1, r2, u):
-    """Handle velocity from the absolute link rates.
-
-    Args:
-        r1: rate of link 1 [rad/s].
-        r2: rate of link 2 [rad/s].
-        u: from `jacobian` or `jacobians` [m].
-
-    Returns:
-        (vx, vy) [m/s].
-    """
+    """Handle velocity from the absolute link rates r1, r2 [rad/s]: (vx, vy) [m/s]."""
     u1x, u1y, u2x, u2y = u[0], u[1], u[2], u[3]
     return u1x * r1 + u2x * r2, u1y * r1 + u2y * r2
 
 
 def centripetal(r1, r2, u):
-    """Centripetal acceleration of the handle, c = -J' q', towards the joints.
-
-    Args:
-        r1: rate of link 1 [rad/s].
-        r2: rate of link 2 [rad/s].
-        u: from `jacobian` [m].
-
-    Returns:
-        (cx, cy) [m/s^2].
-    """
+    """Centripetal acceleration of the handle, c = -J' q', towards the joints: (cx, cy) [m/s^2]."""
     u1x, u1y, u2x, u2y = u[0], u[1], u[2], u[3]
     s1 = r1 * r1
     s2 = r2 * r2
@@ -70,16 +42,7 @@ def centripetal(r1, r2, u):
 def centripetal_about_sample(L, cx, cy, vx, vy, u):
     """Mean of `centripetal` over a kick in which the handle velocity jumps at the sample.
 
-    Args:
-        L: share of the kick before the sample.
-        cx: centripetal acceleration before the sample, x [m/s^2].
-        cy: centripetal acceleration before the sample, y [m/s^2].
-        vx: handle velocity after the sample, x [m/s].
-        vy: handle velocity after the sample, y [m/s].
-        u: from `jacobian` [m].
-
-    Returns:
-        (cx, cy) [m/s^2].
+    L: share of the kick before it; c: before it [m/s^2]; v: velocity after it [m/s].
     """
     r1, r2 = joint_velocity(vx, vy, u, 1.0)
     x, y = centripetal(r1, r2, u)
@@ -87,35 +50,16 @@ def centripetal_about_sample(L, cx, cy, vx, vy, u):
 
 
 def joint_torques(fx, fy, u):
-    """Joint torques J' f of a force at the handle.
-
-    Args:
-        fx: force, x [N].
-        fy: force, y [N].
-        u: from `jacobian` [m].
-
-    Returns:
-        (tau1, tau2) [N.m].
-    """
+    """Joint torques J' f of a force at the handle: (tau1, tau2) [N.m]."""
     u1x, u1y, u2x, u2y = u[0], u[1], u[2], u[3]
     t2 = u2x * fx + u2y * fy
     return u1x * fx + u1y * fy + t2, t2
 
 
 def joint_velocity(vx, vy, u, n):
-    """Absolute link rates of a handle velocity, divided by n.
+    """Absolute link rates of a handle velocity, divided by n: 1, or a time for accelerations.
 
-    Args:
-        vx: handle velocity, or another handle vector, x.
-        vy: the same, y.
-        u: from `jacobian` or `jacobians` [m].
-        n: divisor; 1 for rates, a time for accelerations.
-
-    Returns:
-        (r1, r2) [rad/s for m/s and n = 1].
-
-    Raises:
-        ZeroDivisionError: the arm is stretched or folded.
+    A stretched or folded arm divides by zero.
     """
     u1x, u1y, u2x, u2y = u[0], u[1], u[2], u[3]
     det = n * (u1x * u2y - u2x * u1y)
@@ -123,15 +67,9 @@ def joint_velocity(vx, vy, u, n):
 
 
 def inverse_kinematics(x, y, links):
-    """Joint angles that put the handle at a world position, elbow to the left (q2 < 0).
+    """Joint angles of the handle at a world position within reach, elbow to the left (q2 < 0).
 
-    Args:
-        x: world position [m], within the reach.
-        y: world position [m].
-        links: of the arm, as `Arm.links`.
-
-    Returns:
-        (q1, q2) [rad]; q1 in (-pi, pi].
+    (q1, q2) [rad]; q1 in (-pi, pi].
     """
     l1, l2 = links[0], links[1]
     c = (x * x + y * y - l1 * l1 - l2 * l2) / (2.0 * l1 * l2)

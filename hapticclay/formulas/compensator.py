@@ -8,17 +8,11 @@ TERMS = 16  # of a series for exp(x) at |x| <= 1/2: the next is below 1e-19
 
 
 def exponential(form, n, i, h, e, at):
-    """State of one axis after a time under a held force, z+ = Phi z + Gamma f.
+    """State of one axis after a time h under a held force, z+ = Phi z + Gamma f.
 
     The series of exp(A h), scaled and squared (Moler, Van Loan, SIAM Review 45, 2003, method 3).
-
-    Args:
-        form: `form_numbers` of both axes.
-        n: highest order of the two.
-        i: axis, 0 for x, 1 for y.
-        h: time [s], >= 0.
-        e: shape (WORK,); receives Phi, row by row, and Gamma; its end is working space.
-        at: index at which they begin.
+    form: `form_numbers` of both axes, n: highest order of the two. e, shape (WORK,), receives Phi,
+    row by row, and Gamma from index `at` on; its end is working space.
     """
     a, b, gamma = FORM * i, FORM * i + 16, at + 16
     size, halvings = 0.0, 0
@@ -51,13 +45,7 @@ def exponential(form, n, i, h, e, at):
 
 
 def double_time(n, e, at):
-    """Doubles the time of `exponential`: Gamma += Phi Gamma, then Phi = Phi Phi.
-
-    Args:
-        n: highest order of the two axes.
-        e: as in `exponential`.
-        at: index at which Phi begins in e, followed by Gamma.
-    """
+    """Doubles the time of `exponential`: Gamma += Phi Gamma, then Phi = Phi Phi."""
     gamma = at + 16
     for c in range(n + 1):
         for r in range(n):
@@ -80,14 +68,7 @@ def form_kick(form, n, i, before, after, e, out):
     each end, so a force held over an uneven kick would have a timing error of first order. delta
     then counts the impulse by the share of the kick after the sample.
 
-    Args:
-        form: `form_numbers` of both axes.
-        n: highest order of the two.
-        i: axis, 0 for x, 1 for y.
-        before: length of the step before the sample [s].
-        after: length of the step after the sample [s].
-        e: working space, shape (WORK,).
-        out: receives row (4), feed, Phi (16) and Gamma (4) of each axis, shape (2 KICK,).
+    e: as in `exponential`; out receives row (4), feed, Phi (16) and Gamma (4) of each axis.
     """
     exponential(form, n, i, 0.5 * before, e, 0)
     exponential(form, n, i, 0.5 * after, e, 20)

@@ -4,32 +4,19 @@
 def feedback_law(servo, delta, y, yd, p, v, c):
     """Servo acceleration of one axis at an instant, without forces; see `feedback_vector`.
 
-    Args:
-        servo: numbers of the axis, see `Servo.numbers`.
-        delta: compensator output [m].
-        y: reference position [m].
-        yd: reference velocity [m/s].
-        p: handle position [m].
-        v: handle velocity [m/s].
-        c: centripetal acceleration, towards the centre [m/s^2].
-
-    Returns:
-        (acceleration of the handle, acceleration of the reference) [m/s^2].
+    servo: `Servo.numbers`; delta: compensator output, y, yd: reference, p, v: handle, c:
+    centripetal acceleration. Accelerations of the handle and of the reference [m/s^2].
     """
     ydd = servo[2] * (servo[0] * delta - y) - servo[1] * yd
     return ydd - servo[4] * (v - yd) + servo[5] * (y - p) + c, ydd
 
 
 def velocity_per_force(n, W, d):
-    """Velocity lost in a kick per unit of additional force, (n + W d)^-1 W.
+    """Velocity lost in a kick per unit of force, (n + W d)^-1 W: (xx, xy, yx, yy) [m/(N.s)].
 
-    Args:
-        n: weight of u in the servo's law, (x, y) [1/s].
-        W: acceleration per unit of net hand force, (xx, xy, yy) [1/kg].
-        d: resisting force per unit of the velocity after the kick, (xx, yy, xy) [N.s/m].
-
-    Returns:
-        (xx, xy, yx, yy) [m/(N.s)].
+    n: weight of u in the servo's law, (x, y) [1/s]; W: acceleration per unit of net hand force,
+    (xx, xy, yy) [1/kg]; d: resisting force per unit of the velocity after the kick, (xx, yy, xy)
+    [N.s/m].
     """
     a, b = n[0] + W[0] * d[0] + W[1] * d[2], W[0] * d[2] + W[1] * d[1]
     c, e = W[1] * d[0] + W[2] * d[2], n[1] + W[1] * d[2] + W[2] * d[1]
@@ -43,15 +30,5 @@ def velocity_per_force(n, W, d):
 
 
 def along_axes(c, s, x, y):
-    """Components of a vector along rotated axes.
-
-    Args:
-        c: cosine of the angle of rotation.
-        s: sine of that angle.
-        x: component along x.
-        y: component along y.
-
-    Returns:
-        (along the first axis, along the second).
-    """
+    """Components of a vector along axes rotated by an angle of cosine c and sine s."""
     return c * x + s * y, c * y - s * x

@@ -6,14 +6,7 @@ from . import constants
 def halved_damping(b0, b1, L, R):
     """Damping in a kick of clay soft enough not to overshoot: half of each step's damping.
 
-    Args:
-        b0: damping before the sample, (x, y) [N.s/m].
-        b1: damping after the sample, (x, y) [N.s/m].
-        L: share of the kick before the sample.
-        R: share of the kick after the sample.
-
-    Returns:
-        Damping on the velocity before the kick, and on that after it, (x, y) each [N.s/m].
+    On the velocity before the kick, and on that after it, (x, y) each [N.s/m].
     """
     return (L * b0[0], L * b0[1]), (R * b1[0], R * b1[1])
 
@@ -23,25 +16,17 @@ def split_damping(b0, b1, H, L, R, W, damperx, dampery):
 
     A step gives half of its damping to the kick before it and half to the kick after it:
     Crank-Nicolson, second order. If the half that acts on the velocity before the kick would
-    overshoot, b h W > 2, it is reduced to the value that just stops the handle. The kick before
-    the step takes the rest. The two parts sum to b h, so the impulse of a step is exactly b times
-    its distance. `slow_force` corrects the effect of the uneven split on slow motion.
+    overshoot, b h W > 2, it is reduced to the value that just stops the handle. The kick before the
+    step takes the rest. The two parts sum to b h, so the impulse of a step is exactly b times its
+    distance. `slow_force` corrects the effect of the uneven split on slow motion.
 
-    Args:
-        b0: damping before the sample, (x, y) [N.s/m].
-        b1: damping after the sample, (x, y) [N.s/m].
-        H: length of the kick [s].
-        L: share of the kick before the sample.
-        R: share of the kick after the sample.
-        W: largest acceleration per unit of force over all directions [1/kg].
-        damperx: damping of the operator's arm, in addition to the clay, x [N.s/m].
-        dampery: the same, y [N.s/m].
+    b0, b1: damping before and after the sample, (x, y) [N.s/m]; H: length of the kick [s]; L, R:
+    its shares before and after the sample; W: largest acceleration per unit of force over all
+    directions [1/kg]; damperx, dampery: of the operator's arm [N.s/m].
 
-    Returns:
-        (x0, x1, y0, y1, stiff, sharex, sharey, softx, softy): fe = x0 v- + x1 v+ on x, y0 and y1 on
-        y [N.s/m]; in stiff clay, fe is less by share times `slow_force`, which the next kick
-        returns.
-        stiff: 1.0 if any part is reduced, else 0.0. soft: 1/b [m/(N.s)] where both steps are stiff.
+    (x0, x1, y0, y1, stiff, sharex, sharey, softx, softy): fe = x0 v- + x1 v+ on x, y0 and y1 on y
+    [N.s/m]; in stiff clay, fe is less by share times `slow_force`, which the next kick returns.
+    stiff: 1.0 if any part is reduced, else 0.0. soft: 1/b [m/(N.s)] where both steps are stiff.
     """
     most = 1.0 / (H * W)
     before, after = halved_damping(b0, b1, L, R)
@@ -63,16 +48,10 @@ def split_damping(b0, b1, H, L, R, W, damperx, dampery):
 
 
 def slow_force(g, W, share, f):
-    """Force of stiff clay on a handle in slow motion, when only the clay supports it.
+    """Force of stiff clay on a handle in slow motion, when only the clay supports it, (x, y) [N].
 
-    Args:
-        g: acceleration of the handle without clay, (x, y) [m/s^2].
-        W: acceleration per unit of force, (xx, xy, yy) [1/kg].
-        share: from `split_damping`, (x, y); nonzero where the clay is stiff.
-        f: force of the clay where it is not stiff, (x, y) [N].
-
-    Returns:
-        (x, y) [N].
+    g: acceleration of the handle without clay [m/s^2]; W: (xx, xy, yy) [1/kg]; share: from
+    `split_damping`, nonzero where the clay is stiff; f: force where it is not [N].
     """
     gx, gy = g
     xx, xy, yy = W
@@ -87,49 +66,18 @@ def slow_force(g, W, share, f):
 
 
 def rotated_force(c, s, bx, by, vx, vy):
-    """Force of clay with rotated axes, fe = R diag(bx, by) R' v.
-
-    Args:
-        c: cosine of the angle by which its axes are rotated.
-        s: sine of that angle.
-        bx: damping along its first axis [N.s/m].
-        by: damping along its second axis [N.s/m].
-        vx: velocity, x [m/s].
-        vy: velocity, y [m/s].
-
-    Returns:
-        (fex, fey) [N].
-    """
+    """Force of clay with rotated axes, fe = R diag(bx, by) R' v, (x, y) [N]."""
     first, second = bx * (c * vx + s * vy), by * (c * vy - s * vx)
     return c * first - s * second, s * first + c * second
 
 
 def rotated_damping(c, s, bx, by):
-    """The damping tensor of clay with rotated axes, R diag(bx, by) R'.
-
-    Args:
-        c: cosine of the angle by which its axes are rotated.
-        s: sine of that angle.
-        bx: damping along its first axis [N.s/m].
-        by: damping along its second axis [N.s/m].
-
-    Returns:
-        (xx, yy, xy) [N.s/m].
-    """
+    """The damping tensor of clay with rotated axes, R diag(bx, by) R': (xx, yy, xy) [N.s/m]."""
     return c * c * bx + s * s * by, s * s * bx + c * c * by, c * s * (bx - by)
 
 
 def damping_at(base, rate, t):
-    """Damping at a time, b = base + rate t, at most B_MAX.
-
-    Args:
-        base: damping at t = 0, (x, y) [N.s/m].
-        rate: growth, (x, y) [N.s/m per s].
-        t: time [s].
-
-    Returns:
-        (x, y) [N.s/m].
-    """
+    """Damping at a time t [s], b = base + rate t, at most B_MAX, (x, y) [N.s/m]."""
     x, y = base
     if rate[0] or rate[1]:
         x, y = min(x + rate[0] * t, constants.B_MAX), min(y + rate[1] * t, constants.B_MAX)

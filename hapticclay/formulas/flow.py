@@ -8,28 +8,15 @@ CLOSE = 1e-15  # tolerance of that agreement
 
 
 def moving_force(Fy, K, n, speed):
-    """Force of yielding clay on a moving tool, without its damping, Fy + K v^n [N].
-
-    Args:
-        Fy: yield force [N].
-        K: consistency [N/(m/s)^n].
-        n: flow index.
-        speed: speed of the tool, >= 0 [m/s].
-    """
+    """Force of yielding clay on a tool of a speed >= 0, without its damping, Fy + K v^n [N]."""
     return Fy + K * speed**n if K > 0.0 else Fy
 
 
 def motion_force(law, along, vx, vy):
-    """Force of yielding clay on a moving tool; 0 at rest, where any up to Fy may act.
+    """Force of yielding clay on a moving tool, (x, y) [N]; 0 at rest, where any up to Fy may act.
 
-    Args:
-        law: Fy, K, n of x, then of y.
-        along: whether it acts along the motion, by the law of x; else on each axis by itself.
-        vx: velocity, x [m/s].
-        vy: the same, y [m/s].
-
-    Returns:
-        (x, y) [N].
+    law: Fy, K, n of x, then of y; `along` the motion it acts by the law of x, else on each axis by
+    itself.
     """
     Fyx, Kx, nx, Fyy, Ky, ny = law
     x, y = abs(vx), abs(vy)
@@ -43,15 +30,10 @@ def motion_force(law, along, vx, vy):
 
 
 def thinned(q, k, n):
-    """Solves m + k m^n = q for m >= 0, to rounding, by Newton's method.
+    """Solves m + k m^n = q for m >= 0, to rounding, by Newton's method; q, k >= 0, n > 0.
 
     The start is chosen so that the tangent does not overshoot the root: below the root where m^n is
     concave, above it where m^n is convex.
-
-    Args:
-        q: >= 0.
-        k: >= 0.
-        n: > 0.
     """
     if k <= 0.0 or q <= 0.0:
         return q
@@ -72,28 +54,19 @@ def thinned(q, k, n):
 def implicit_share(z):
     """Weight of the velocity at the end of a step in the velocity at which a force is evaluated.
 
-    One half, second order, unless the force would overshoot: as in `damping.split_damping`.
-
-    Args:
-        z: velocity lost to the force by the end, per unit of velocity.
+    One half, second order, unless the force would overshoot: as in `damping.split_damping`. z:
+    velocity lost to the force by the end, per unit of velocity.
     """
     return 0.5 if z <= 2.0 else 1.0 - 1.0 / z
 
 
 def sliding_force(a, end, slope, Fy, K, n):
-    """Mean force of yielding clay on one sliding axis over a part of a kick.
+    """Mean force of yielding clay on one sliding axis over a part of a kick [N].
 
-    Args:
-        a: velocity at the begin [m/s].
-        end: velocity at the end without this force [m/s].
-        slope: velocity lost by the end per unit of this force [m/(N.s)].
-        Fy: yield force [N].
-        K: consistency [N/(m/s)^n].
-        n: flow index.
-
-    Returns:
-        [N], positive for motion in the direction of a, or of end if a is 0. If the force stops the
-        axis before the end, it is the force at half the initial speed.
+    a: velocity at the begin, end: that at the end without this force [m/s]; slope: velocity lost by
+    the end per unit of this force [m/(N.s)]. Positive for motion in the direction of a, or of end
+    if a is 0. If the force stops the axis before the end, it is the force at half the initial
+    speed.
     """
     sign = -1.0 if a < 0.0 or (a == 0.0 and end < 0.0) else 1.0
     if K <= 0.0:
@@ -117,17 +90,11 @@ def resist_axes(B, v, end, law, sample):
     Other forces count as constant in the kick. The kick is divided where an axis comes to rest. An
     axis stays at rest while no more than its yield force is needed to hold it.
 
-    Args:
-        B: velocity lost in the kick per unit of force, (xx, xy, yx, yy) [m/(N.s)].
-        v: velocity at the begin, (x, y) [m/s].
-        end: velocity at the end without this force, (x, y) [m/s].
-        law: Fy, K, n of x, then of y.
-        sample: share of the kick before the sample.
-
-    Returns:
-        Mean force (x, y) [N]; velocity at the end (x, y) [m/s], 0.0 at rest; velocity and force at
-        the sample (x, y) each; shares of the kick at which x and y came to rest, -1.0 where they
-        did not or were.
+    B: velocity lost in the kick per unit of force, (xx, xy, yx, yy) [m/(N.s)]; v, end: velocity at
+    the begin, and at the end without this force [m/s]; law: Fy, K, n of x, then of y; sample: share
+    of the kick before the sample. Mean force [N]; velocity at the end [m/s], 0.0 at rest; velocity
+    and force at the sample, (x, y) each; shares of the kick at which x and y came to rest, -1.0
+    where they did not or were.
     """
     xx, xy, yx, yy = B
     vx, vy = v
@@ -169,15 +136,8 @@ def resist_axes(B, v, end, law, sample):
 def forces_on_axes(B, v, d, left, law):
     """Mean forces over a part of a kick, each axis by itself, iterated until they agree.
 
-    Args:
-        B: velocity lost in a kick per unit of force, (xx, xy, yx, yy) [m/(N.s)].
-        v: velocity at the begin, (x, y) [m/s].
-        d: velocity gained in a kick without this force, (x, y) [m/s].
-        left: remaining share of the kick.
-        law: Fy, K, n of x, then of y.
-
-    Returns:
-        Forces of x and of y [N]; whether x and y stay at rest.
+    d: velocity gained in a kick without this force [m/s]; left: remaining share of the kick; the
+    rest as in `resist_axes`. Forces of x and of y [N]; whether x and y stay at rest.
     """
     xx, xy, yx, yy = B
     Fyx, Kx, nx, Fyy, Ky, ny = law
@@ -210,18 +170,7 @@ def forces_on_axes(B, v, d, left, law):
 
 
 def resist_along(B, v, end, law, sample):
-    """As `resist_axes`, with a force along the motion, (Fy + K |v|^n) v/|v|.
-
-    Args:
-        B: velocity lost in the kick per unit of force, (xx, xy, yx, yy) [m/(N.s)].
-        v: velocity at the begin, (x, y) [m/s].
-        end: velocity at the end without this force, (x, y) [m/s].
-        law: begins with Fy, K, n.
-        sample: share of the kick before the sample.
-
-    Returns:
-        As `resist_axes`.
-    """
+    """As `resist_axes`, with a force along the motion, (Fy + K |v|^n) v/|v|, by the law of x."""
     xx, xy, yx, yy = B
     Fy, K, n = law[0], law[1], law[2]
     vx, vy = v
@@ -260,21 +209,11 @@ def resist_along(B, v, end, law, sample):
 
 
 def force_along(B, v, d, hold, left, Fy, K, n):
-    """Mean force along the motion on a sliding tool over a part of a kick.
+    """Mean force along the motion on a sliding tool over a part of a kick, (x, y) [N].
 
-    Args:
-        B: velocity lost in a kick per unit of force, (xx, xy, yx, yy) [m/(N.s)].
-        v: velocity at the begin, (x, y) [m/s].
-        d: velocity gained in a kick without this force, (x, y) [m/s].
-        hold: force that would cancel all of d, (x, y) [N].
-        left: remaining share of the kick.
-        Fy: yield force [N].
-        K: consistency [N/(m/s)^n].
-        n: flow index.
-
-    Returns:
-        Force (x, y) [N]; share of the kick for which it acts, less than left if the tool then comes
-        to rest.
+    d: as in `forces_on_axes`; hold: force that would cancel all of d [N]; left: remaining share of
+    the kick. The last value is the share for which the force acts, less than left if the tool then
+    comes to rest.
     """
     qx, qy = v[0] + left * d[0], v[1] + left * d[1]
     endx, endy = slowed(B, qx, qy, left, Fy, K, n)
@@ -313,17 +252,8 @@ def force_along(B, v, d, hold, left, Fy, K, n):
 def slowed(B, qx, qy, k, Fy, K, n):
     """Solves m + k B (Fy + K |m|^n) m/|m| = q, by Newton's method on the length of m.
 
-    Args:
-        B: (xx, xy, yx, yy) [m/(N.s)].
-        qx: x of q [m/s].
-        qy: y of q [m/s].
-        k: share of a kick.
-        Fy: yield force [N].
-        K: consistency [N/(m/s)^n].
-        n: flow index.
-
-    Returns:
-        m, (x, y) [m/s]; (0.0, 0.0) where the yield force holds.
+    B: (xx, xy, yx, yy) [m/(N.s)]; q [m/s]; k: share of a kick. (0.0, 0.0) where the yield force
+    holds.
     """
     xx, xy, yx, yy = k * B[0], k * B[1], k * B[2], k * B[3]
     most = math.sqrt(qx * qx + qy * qy)

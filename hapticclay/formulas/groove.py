@@ -18,15 +18,10 @@ RIM = 4 * 4 * SECTORS  # numbers of the rim: four per sector, see `cut`
 
 
 def outside(u):
-    """Share of a cell that the tool leaves: 0 inside the tool, 1 outside.
+    """Share of a cell that the tool leaves, 0 inside the tool and 1 outside, and its slope.
 
-    Its slope is the cubic B-spline over the cells, which sums to 1 over any row of cells.
-
-    Args:
-        u: distance of the cell's centre from the edge of the tool, in cells, positive outside.
-
-    Returns:
-        The share, and its slope.
+    u: distance of the cell's centre from the edge of the tool, in cells, positive outside. The
+    slope is the cubic B-spline over the cells, which sums to 1 over any row of cells.
     """
     t = abs(u)
     if t >= SOFT:
@@ -42,18 +37,12 @@ def outside(u):
 
 
 def cut(grid, left, relief, x, y, disc, rim, removed):
-    """Removes the clay under the tool, and records the clay that touches it.
+    """Removes the clay under the tool at (x, y) [m], and records the clay that touches it.
 
-    Args:
-        grid: Groove.numbers.
-        left: remaining share of each cell, row by row, n m numbers.
-        relief: height of each cell before the first cut [m], as left.
-        x: x of the tool [m].
-        y: y of the tool [m].
-        disc: 1 to cut the whole disc; 0 for its edge only, after a motion of less than a cell.
-        rim: receives the clay in contact, four numbers per sector: sum of area x normal, x and y;
-            area [m^2]; area x pressure [N].
-        removed: volume removed so far, and its rounding error [m^3].
+    grid: Groove.numbers; left: remaining share, relief: height before the first cut [m] of each
+    cell, row by row; disc: 1 to cut the whole disc, 0 for its edge only, after a motion of less
+    than a cell. rim receives the clay in contact, four numbers per sector: sum of area x normal, x
+    and y; area [m^2]; area x pressure [N]. removed: volume so far, and its rounding error [m^3].
     """
     x0, y0, wx, wy, nx, ny = grid[0], grid[1], grid[2], grid[3], grid[4], grid[5]
     r, cell, pressure, gradient, m = grid[6], grid[7], grid[8], grid[9], numbers.whole(grid[5])
@@ -106,12 +95,7 @@ def cut(grid, left, relief, x, y, disc, rim, removed):
 
 
 def add(removed, volume):
-    """Adds to a compensated sum (Neumaier).
-
-    Args:
-        removed: the sum, and its rounding error.
-        volume: volume to add, >= 0.
-    """
+    """Adds a volume >= 0 to a compensated sum and its rounding error (Neumaier)."""
     total = removed[0] + volume
     if removed[0] >= volume:
         removed[1] += removed[0] - total + volume
@@ -121,27 +105,16 @@ def add(removed, volume):
 
 
 def sector(x, y):
-    """Number of the sector in which a direction lies.
-
-    Args:
-        x: x of the direction, not 0 if y is 0.
-        y: y of the direction.
-    """
+    """Number of the sector in which a direction other than (0, 0) lies."""
     ax, ay = abs(x), abs(y)
     k = min(numbers.whole(SECTORS * ay / (ax + ay)), SECTORS - 1)
     return k + (2 * SECTORS if x < 0.0 else 0) + (SECTORS if y < 0.0 else 0)
 
 
 def resistance(rim, x, y):
-    """Resistance to a motion: the clay in front of the tool, projected on the direction.
+    """Resistance to a motion in a direction of any length: force [N], engaged cross-section [m^2].
 
-    Args:
-        rim: from `cut`.
-        x: direction of the motion, x, of any length.
-        y: the same, y.
-
-    Returns:
-        Force [N], engaged cross-section [m^2]; zeros for no direction.
+    It is that of the clay in front of the tool, projected on the direction; rim: from `cut`.
     """
     length = math.sqrt(x * x + y * y)
     force, area = 0.0, 0.0

@@ -6,37 +6,19 @@ from . import flow, numbers
 
 
 def slide(case):
-    """Direction in which a joint slides, 0 at rest.
-
-    Args:
-        case: 0 at rest, 1 forwards, 2 backwards.
-    """
+    """Direction in which a joint slides: case 0 at rest, 1 forwards, 2 backwards."""
     return 0.0 if case == 0 else 1.0 if case == 1 else -1.0
 
 
 def round_to_even(x, step):
-    """The multiple of step nearest to x; of two equally near, the even one.
-
-    Args:
-        x: value, in any unit.
-        step: in the unit of x.
-
-    Returns:
-        The multiple; x itself if it is infinite or NaN.
-    """
+    """The multiple of step nearest to x, of two the even one; x itself if infinite or NaN."""
     return numbers.nearest(x / step) * step
 
 
 def quantize(x, bits, span):
     """Output of a converter: 2^bits levels from -span to span, with zero in the middle.
 
-    Args:
-        x: input, in any unit.
-        bits: resolution; 0 for an ideal converter without limits.
-        span: full scale, in the unit of x.
-
-    Returns:
-        The output, in the unit of x; NaN for NaN, with which a run ends.
+    0 bits are an ideal converter without limits. NaN stays NaN, with which a run ends.
     """
     if not bits or x != x:
         return x
@@ -48,83 +30,37 @@ def quantize(x, bits, span):
 
 
 def encode(q, counts):
-    """Joint angle as an encoder reads it.
-
-    Args:
-        q: joint angle [rad].
-        counts: counts per turn; 0 for an exact reading.
-
-    Returns:
-        The reading [rad].
-    """
+    """Joint angle as an encoder reads it [rad]; 0 counts per turn for an exact reading."""
     return round_to_even(q, math.tau / counts) if counts else q
 
 
 def velocity_difference(then, old, k, q, Ts):
-    """Mean rates of both joints since an earlier sample.
-
-    Args:
-        then: index of the earlier sample.
-        old: joint angles of the earlier sample [rad].
-        k: index of the present sample.
-        q: joint angles of the present sample [rad].
-        Ts: control sample [s].
-
-    Returns:
-        Rates of both joints [rad/s].
-    """
+    """Mean rates of both joints from sample `then` with angles `old` to sample k [rad/s]."""
     span = (k - then) * Ts
     return (q[0] - old[0]) / span, (q[1] - old[1]) / span
 
 
 def low_pass(y, mean, cutoff, span):
-    """First-order low-pass filter over one interval; exact for a constant signal.
+    """Output of a first-order low-pass filter after a span [s]; exact for a constant signal.
 
-    Args:
-        y: output before, in any unit.
-        mean: mean of the signal over the interval, in the unit of y.
-        cutoff: corner frequency [Hz].
-        span: length of the interval [s].
-
-    Returns:
-        Output after the interval.
+    y: output before; mean: of the signal over the span; cutoff: corner frequency [Hz].
     """
     keep = math.exp(-math.tau * cutoff * span)
     return keep * y + (1.0 - keep) * mean
 
 
 def filter_step(f, x0, x1, u):
-    """State of a filter after one sample.
-
-    Args:
-        f: from `butterworth`.
-        x0: first state before the sample, which is the output.
-        x1: second state before the sample.
-        u: input.
-
-    Returns:
-        The state after the sample.
-    """
+    """State of a filter from `butterworth` after one sample of input u; its first is the output."""
     return f[0] * x0 + f[1] * x1 + f[4] * u, f[2] * x0 + f[3] * x1 + f[5] * u
 
 
 def coulomb_friction(w, a11, a12, a22, limit):
-    """Coulomb friction of two joints in one kick, implicit.
+    """Coulomb friction of two joints in one kick, implicit: torques on both joints [N.m].
 
     After the kick, each joint either rests under a torque within its limit or slides against the
     limit. The rates after the kick are w + a phi; with a positive definite, one of the nine cases
     fits (a linear complementarity problem; Stewart, Trinkle, Int. J. Numerical Methods in
-    Engineering 39, 1996).
-
-    Args:
-        w: rates after the kick without friction [rad/s].
-        a11: rate of joint 1 per torque on joint 1 [rad/s per N.m].
-        a12: rate of joint 1 per torque on joint 2 [rad/s per N.m].
-        a22: rate of joint 2 per torque on joint 2 [rad/s per N.m].
-        limit: Coulomb torques of both joints [N.m].
-
-    Returns:
-        Torques on both joints [N.m].
+    Engineering 39, 1996). w: rates without friction [rad/s]; a: rate per torque [rad/s per N.m].
     """
     best1, best2, least = 0.0, 0.0, math.inf
     for case in range(9):
@@ -155,7 +91,7 @@ def coulomb_friction(w, a11, a12, a22, limit):
 
 
 def passivity_controller(energy, f, v, Ts, W):
-    """Passivity controller of one axis: changes the resisting force if the clay would be active.
+    """Passivity controller of one axis: another force if the clay would be active [N].
 
     Hannaford, Ryu (IEEE Trans. Robotics and Automation 18, 2002), including the motion that the
     held force causes: over a sample the clay takes Ts f (v - Ts W f/2). The controller recovers a
@@ -164,15 +100,7 @@ def passivity_controller(energy, f, v, Ts, W):
     energy, v/(Ts W), which stops the handle. So is a force that cannot recover the deficit within a
     sample. Energy taken earlier is not returned: clay stores none.
 
-    Args:
-        energy: energy that the clay has taken [J].
-        f: requested force [N].
-        v: handle velocity [m/s].
-        Ts: hold [s].
-        W: mobility of the handle [1/kg].
-
-    Returns:
-        The force [N].
+    energy: that the clay has taken [J]; f: requested force [N]; W: mobility of the handle [1/kg].
     """
     most, lack = v / (Ts * W), min(energy, 0.0)
     left = v * v + 2.0 * W * lack
@@ -189,19 +117,8 @@ def virtual_coupling(tool, p, v, b, coupling, Ts):
     """Spring and damper between handle and massless tool in clay, implicit over a sample.
 
     b v_t = spring (p - tool+) + damper (v - v_t), tool+ = tool + Ts v_t (Colgate, Stanley, Brown,
-    IROS 1995).
-
-    Args:
-        tool: position of the tool before the sample [m].
-        p: position of the handle [m].
-        v: velocity of the handle [m/s].
-        b: clay at the tool [N.s/m].
-        coupling: its stiffness [N/m] and damping [N.s/m].
-        Ts: control sample [s].
-
-    Returns:
-        (position of the tool after the sample [m], its velocity [m/s]); b times the velocity is the
-        resisting force.
+    IROS 1995). Position of the tool after the sample [m], and its velocity [m/s]; b times the
+    velocity is the resisting force. coupling: stiffness [N/m] and damping [N.s/m].
     """
     spring, damper = coupling
     u = (spring * (p - tool) + damper * v) / (b + damper + spring * Ts)
@@ -212,19 +129,8 @@ def tool_that_yields(tool, p, v, b, law, along, coupling, Ts):
     """As `virtual_coupling`, for both axes in yielding clay: below the yield force the tool rests.
 
     (b + damper + spring Ts) v_t + (Fy + K |v_t|^n) v_t/|v_t| = spring (p - tool) + damper v.
-
-    Args:
-        tool: position of the tool before the sample, (x, y) [m].
-        p: position of the handle, (x, y) [m].
-        v: velocity of the handle, (x, y) [m/s].
-        b: clay at the tool, (x, y) [N.s/m].
-        law: Fy, K, n of x, then of y.
-        along: whether the clay yields along the motion, by the law of x; else each axis by itself.
-        coupling: its stiffness [N/m] and damping [N.s/m].
-        Ts: control sample [s].
-
-    Returns:
-        Velocity of the tool (x, y) [m/s]; resisting force (x, y) [N].
+    Velocity of the tool (x, y) [m/s]; resisting force (x, y) [N]. law, along: as in
+    `flow.motion_force`.
     """
     spring, damper = coupling
     qx, qy = spring * (p[0] - tool[0]) + damper * v[0], spring * (p[1] - tool[1]) + damper * v[1]

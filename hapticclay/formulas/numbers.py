@@ -4,11 +4,7 @@ MOST = 9.0e15  # below 2^53: floats of this size still are whole numbers of thei
 
 
 def whole(x):
-    """The whole number of a float, towards zero; 0 for what has none.
-
-    Args:
-        x: the float.
-    """
+    """The whole number of a float, towards zero; 0 for what has none."""
     return int(x) if -MOST < x < MOST else 0
 
 
@@ -16,8 +12,5 @@ def nearest(x):
     """The whole number nearest to x, as a float; of two equally near, the even one.
 
     A float without a fraction, an infinity and a NaN are returned as they are.
-
-    Args:
-        x: the float.
     """
     return float(round(x)) if -MOST < x < MOST else x

@@ -8,16 +8,7 @@ PIECE = 9  # numbers of a row
 
 
 def mean_of_lines(table, t, h):
-    """Mean of the multisines of a table over [t - h, t + h], line by line.
-
-    Args:
-        table: see above.
-        t: centre of the interval [s].
-        h: half its length [s].
-
-    Returns:
-        (x, y).
-    """
+    """Mean of the multisines of a table over [t - h, t + h], (x, y), line by line."""
     x, y = 0.0, 0.0
     for j in range(1, 1 + numbers.whole(table[0])):
         a = table[PIECE * j] * h
@@ -28,21 +19,12 @@ def mean_of_lines(table, t, h):
 
 
 def has_pieces(table):
-    """Whether a table has pieces.
-
-    Args:
-        table: see above.
-    """
+    """Whether a table has pieces."""
     return numbers.whole(table[2]) > 1 + numbers.whole(table[0])
 
 
 def piece_at(table, t):
-    """Row of the piece that is valid at a time.
-
-    Args:
-        table: see above, with pieces.
-        t: time [s].
-    """
+    """Row of the piece that is valid at a time."""
     low, high = 1 + numbers.whole(table[0]), numbers.whole(table[2])
     while high - low > 1:
         middle = (low + high) // 2
@@ -54,17 +36,7 @@ def piece_at(table, t):
 
 
 def mean_of_piece(table, j, t, h):
-    """Mean of one cubic over [t - h, t + h].
-
-    Args:
-        table: see above.
-        j: row of the piece.
-        t: centre of the interval [s].
-        h: half its length [s].
-
-    Returns:
-        (x, y).
-    """
+    """Mean of the cubic in row j over [t - h, t + h], (x, y)."""
     u, k = t - table[PIECE * j], h * h
     x = table[PIECE * j + 1] + u * (
         table[PIECE * j + 2] + u * (table[PIECE * j + 3] + u * table[PIECE * j + 4])
@@ -78,30 +50,12 @@ def mean_of_piece(table, j, t, h):
 
 
 def value_of_pieces(table, t, near):
-    """Value of the pieces of a table at a time; at a jump, the limit from one side.
-
-    Args:
-        table: see above, with pieces.
-        t: the time [s].
-        near: a time on the wanted side; the piece valid there is used [s].
-
-    Returns:
-        (x, y).
-    """
+    """Value of the pieces of a table at a time, (x, y), by the piece valid at a time near it."""
     return mean_of_piece(table, piece_at(table, near), t, 0.0)
 
 
 def mean_of_pieces(table, t, h):
-    """Mean of the pieces of a table over [t - h, t + h]; for h = 0 the value from t on.
-
-    Args:
-        table: see above, with pieces.
-        t: centre of the interval [s].
-        h: half its length [s].
-
-    Returns:
-        (x, y).
-    """
+    """Mean of the pieces of a table over [t - h, t + h], (x, y); for h = 0 the value from t on."""
     if h == 0.0:
         return value_of_pieces(table, t, t + table[1])
     begin, end, n = t - h, t + h, numbers.whole(table[2])
@@ -121,16 +75,7 @@ def mean_of_pieces(table, t, h):
 
 
 def mean_of_table(table, t, h):
-    """Mean of a signal over [t - h, t + h]; for h = 0 the value from t on.
-
-    Args:
-        table: see above.
-        t: centre of the interval [s].
-        h: half its length [s].
-
-    Returns:
-        (x, y).
-    """
+    """Mean of a signal over [t - h, t + h], (x, y); for h = 0 the value from t on."""
     x, y = mean_of_lines(table, t, h)
     if has_pieces(table):
         ax, ay = mean_of_pieces(table, t, h)
@@ -140,16 +85,7 @@ def mean_of_table(table, t, h):
 
 
 def value_of_table(table, t, near):
-    """Value of a signal at a time; at a jump, the limit from one side.
-
-    Args:
-        table: see above.
-        t: the time [s].
-        near: a time on the wanted side [s].
-
-    Returns:
-        (x, y).
-    """
+    """Value of a signal at a time, (x, y); at a jump, the limit from the side of `near`."""
     x, y = mean_of_lines(table, t, 0.0)
     if has_pieces(table):
         ax, ay = value_of_pieces(table, t, near)

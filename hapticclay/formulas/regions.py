@@ -17,15 +17,7 @@ FLOWS, SPRINGS, HEAD, SPRING = 17, 19, 21, 6
 
 
 def region_of(table, p):
-    """Indices along x and y of the region that contains a place; on a border, of that beyond.
-
-    Args:
-        table: from `region_table`.
-        p: the place, (x, y) [m].
-
-    Returns:
-        Indices (x, y).
-    """
+    """Indices along x and y of the region that contains a place; on a border, of that beyond."""
     return _region_along(table, 0, p[0]), _region_along(table, 1, p[1])
 
 
@@ -43,16 +35,10 @@ def _region_along(table, i, at):
 
 
 def enter_region(table, ix, iy, t):
-    """The region that the handle enters.
+    """The region that the handle enters at a time t [s]: borders and clay, a pair (x, y) each.
 
-    Args:
-        table: from `region_table`; records the time of first entry where the clay grows.
-        ix: index of the region along x.
-        iy: index of the region along y.
-        t: time of entry [s].
-
-    Returns:
-        (low, high, base, rate), a pair (x, y) each: borders [m] and clay, see damping.damping_at.
+    (low, high, base, rate): borders [m] and clay as in damping.damping_at. The table records the
+    time of first entry where the clay grows.
     """
     basex, ratex = _cell_law(table, 0, ix, iy, t)
     basey, ratey = _cell_law(table, 1, ix, iy, t)
@@ -61,46 +47,21 @@ def enter_region(table, ix, iy, t):
 
 
 def enter_flow(table, axis, ix, iy):
-    """Yield law of an axis in a region, for clay that yields somewhere.
-
-    Args:
-        table: from `region_table`.
-        axis: 0 for x, 1 for y.
-        ix: index of the region along x.
-        iy: index of the region along y.
-
-    Returns:
-        (Fy [N], K [N/(m/s)^n], n).
-    """
+    """Fy [N], K [N/(m/s)^n] and n of an axis in a region, for clay that yields somewhere."""
     at = numbers.whole(table[FLOWS + axis]) + 3 * _cell(table, axis, ix, iy)
     return table[at], table[at + 1], table[at + 2]
 
 
 def spring_place(table, axis, ix, iy):
-    """Index of the spring of a region in the table, for clay that springs back somewhere.
-
-    Args:
-        table: from `region_table`.
-        axis: 0 for x, 1 for y.
-        ix: index of the region along x.
-        iy: index of the region along y.
-    """
+    """Index in the table of the spring of a region, for clay that springs back somewhere."""
     return numbers.whole(table[SPRINGS + axis]) + SPRING * _cell(table, axis, ix, iy)
 
 
 def smooth_clay(table, which, x, y, bx, by):
-    """Damping at a place in smooth clay.
+    """Damping at a place in smooth clay, (x, y) [N.s/m].
 
-    Args:
-        table: from `region_table`.
-        which: axes with such clay, see `Clay.smooth`.
-        x: the place, x [m].
-        y: the place, y [m].
-        bx: damping of x if its clay is not smooth [N.s/m].
-        by: the same, y [N.s/m].
-
-    Returns:
-        Damping (x, y) [N.s/m].
+    which: axes with such clay, see `Clay.smooth`; bx, by: damping of an axis whose clay is not
+    smooth.
     """
     first, second = numbers.whole(table[SMOOTH]), numbers.whole(table[SMOOTH + 1])
     if which != 2:
@@ -110,15 +71,11 @@ def smooth_clay(table, which, x, y, bx, by):
     return bx, by
 
 
-def is_alike(table, ix, iy, i, up):
+def is_identical(table, ix, iy, i, up):
     """Whether both sides of a border have the same clay, so that no step need end on it.
 
-    Args:
-        table: from `region_table`.
-        ix: index of the region on this side along x.
-        iy: index of the region on this side along y.
-        i: coordinate of the border, 0 for x, 1 for y.
-        up: 1 for the region's upper border, -1 for its lower one.
+    i: coordinate of the border, 0 for x, 1 for y; up: 1 for the region's upper border, -1 for its
+    lower one.
     """
     jx, jy = ix if i else ix + up, iy + up if i else iy
     if table[numbers.whole(table[LANDED + i]) + max(iy if i else ix, jy if i else jx)]:

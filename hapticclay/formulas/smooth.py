@@ -4,18 +4,10 @@ from . import numbers
 
 
 def smooth_damping(table, at, x, y):
-    """Damping at a place by a cubic B-spline in each coordinate; its tangents are continuous.
+    """Damping at a place by a cubic B-spline in each coordinate [N.s/m]; its slope is continuous.
 
-    The value stays between the least and the largest control point.
-
-    Args:
-        table: from `regions.region_table`; holds `Smooth.numbers` at index `at`.
-        at: that index.
-        x: place, x [m].
-        y: place, y [m].
-
-    Returns:
-        [N.s/m].
+    The value stays between the least and the largest control point. table: from
+    `regions.region_table`; holds `Smooth.numbers` at index `at`.
     """
     most, rows = table[at + 2], table[at + 5]
     u = (x - table[at]) * table[at + 1]

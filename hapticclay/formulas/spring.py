@@ -4,17 +4,11 @@ import math
 
 
 def spring_step(k, limit, way, rest, p):
-    """Advances a spring that gives way, after a motion of the handle.
+    """Advances a spring that gives way after a motion of the handle to p [m].
 
-    Args:
-        k: stiffness [N/m].
-        limit: force at which it gives way [N].
-        way: direction of the push on a surface, 1.0 or -1.0; 0.0 if it is no surface.
-        rest: rest position before [m].
-        p: position of the handle [m].
-
-    Returns:
-        (rest [m], force [N], energy stored, energy lost since [J]).
+    k: stiffness [N/m]; limit: force at which it gives way [N]; way: direction of the push on a
+    surface, 1.0 or -1.0, or 0.0 if it is no surface; rest: rest position before [m]. Rest position,
+    force [N], energy stored, energy lost since [J].
     """
     if k <= 0.0:
         return rest, 0.0, 0.0, 0.0
@@ -31,18 +25,10 @@ def spring_step(k, limit, way, rest, p):
 
 
 def relaxing_step(k, tau, way, z, dp, h):
-    """Advances a spring in series with a damper (Maxwell) over a uniform motion: exact.
+    """Advances a spring in series with a damper (Maxwell) over a uniform motion dp [m]: exact.
 
-    Args:
-        k: stiffness [N/m].
-        tau: relaxation time [s].
-        way: as in `spring_step`.
-        z: elongation before [m].
-        dp: motion of the handle [m].
-        h: duration of the motion [s].
-
-    Returns:
-        (elongation [m], force [N], energy stored, energy lost since [J]).
+    tau: relaxation time [s]; way: as in `spring_step`; z: elongation before [m]; h: duration [s].
+    Elongation, force [N], energy stored, energy lost since [J].
     """
     if k <= 0.0:
         return 0.0, 0.0, 0.0, 0.0

@@ -18,7 +18,7 @@ def place_of(s, i, up):
 
 def is_identical_beyond(m, s, i, up):
     """Whether the clay beyond a border of the region is the same."""
-    return regions.is_alike(m.table, s.x.index, s.y.index, i, up)
+    return regions.is_identical(m.table, s.x.index, s.y.index, i, up)
 
 
 def border_at_handle(s, herex, herey, sx, sy):

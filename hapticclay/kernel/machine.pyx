@@ -3,7 +3,7 @@
 Records are given by the address of an array of them; `which` is that of the indices of n rows.
 """
 
-from . cimport arm, begin, path, probe, rows, summary, watch
+from . cimport loop
 from .records cimport Engine_s, Model_s, State_s, Summary_s
 
 SIZES = {
@@ -14,22 +14,22 @@ SIZES = {
 
 def compute_probe(size_t links, size_t out):
     """Computes the numbers that are compared with CPython's before this is used."""
-    probe.fill(<double *>links, <double *>out)
+    loop.kernel_probe_fill(<double *>links, <double *>out)
 
 
 def begin_run(size_t model, size_t state, double px, double py, double vx, double vy):
     """Puts a state to the start of a run, the handle at p with velocity v."""
-    begin.begin(<Model_s *>model, <State_s *>state, px, py, vx, vy)
+    loop.kernel_begin_begin(<Model_s *>model, <State_s *>state, px, py, vx, vy)
 
 
 def change(size_t model, size_t state):
     """Continues a run in a changed scene with the same borders."""
-    begin.change(<Model_s *>model, <State_s *>state)
+    loop.kernel_begin_change(<Model_s *>model, <State_s *>state)
 
 
 def look(size_t model, size_t state, long first, long n):
     """Whether the monitor can have nothing to report on rows, nor had it before."""
-    watch.look(<Model_s *>model, <State_s *>state, first, n)
+    loop.kernel_watch_look(<Model_s *>model, <State_s *>state, first, n)
     return bool((<State_s *>state).watch.quiet)
 
 
@@ -48,10 +48,10 @@ def advance(size_t models, size_t states, size_t which, Py_ssize_t n, size_t roo
         for j in range(n):
             k = w[j]
             first = s[k].row
-            arm.put(&m[k], &s[k])
-            path.advance(&m[k], &s[k], room[k])
+            loop.kernel_arm_put(&m[k], &s[k])
+            loop.kernel_path_advance(&m[k], &s[k], room[k])
             if tests:
-                watch.look(&m[k], &s[k], first, s[k].row)
+                loop.kernel_watch_look(&m[k], &s[k], first, s[k].row)
 
 
 def peek(size_t models, size_t states, size_t which, Py_ssize_t n, size_t spare, size_t shown):
@@ -70,8 +70,8 @@ def peek(size_t models, size_t states, size_t which, Py_ssize_t n, size_t spare,
         for j in range(n):
             k = w[j]
             at = s[k].row
-            arm.put(&m[k], &s[k])
-            path.peek(&m[k], &s[k], <State_s *>spare)
+            loop.kernel_arm_put(&m[k], &s[k])
+            loop.kernel_path_peek(&m[k], &s[k], <State_s *>spare)
             for i in range(16):
                 out[18 * k + i] = m[k].rows[16 * at + i]
             if m[k].records_clay_force:
@@ -87,6 +87,6 @@ def finish(size_t models, size_t states, size_t outs, Py_ssize_t n, size_t start
     cdef Py_ssize_t k
     with nogil:
         for k in range(n):
-            summary.finish(
+            loop.kernel_summary_finish(
                 &m[k], &s[k], &out[k], z[4 * k], z[4 * k + 1], z[4 * k + 2], z[4 * k + 3], room
             )

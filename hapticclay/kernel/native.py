@@ -1,8 +1,8 @@
 """The compiled kernel: whether it is there, whole, and built from these sources.
 
-setup.py builds the package `hapticclay.native` of the modules that have a .pxd file, and writes
-`native/built.py`: a checksum of each source and of each module, or why there are none. Nothing is
-loaded that was built from other sources or is damaged.
+setup.py merges the modules that have a .pxd file, compiles them as the package `hapticclay.native`
+and writes `native/built.py`: a checksum of each source and of each compiled module, or why there
+are none. Nothing is loaded that was built from other sources or is damaged.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ PACKAGE = Path(__file__).parents[1]
 ROOMS = ("formulas", "kernel")
 IN_C = ("formulas/numbers", "kernel/memory")  # their .pxd files are all that is compiled
 DECLARATIONS = ("kernel/layout.py", "kernel/records.py")
-WAY_IN = "kernel/machine"
+MODULES = ("kernel/loop", "kernel/machine")  # all of them merged, and the way in
 
 
 def compiled() -> list[str]:
@@ -32,12 +32,12 @@ def compiled() -> list[str]:
         there = set(os.listdir(PACKAGE / room))
         stems = sorted(x[:-4] for x in there if x.endswith(".pxd"))
         names += [f"{room}/{x}" for x in stems if f"{x}.py" in there]
-    return [x for x in names if x not in IN_C] + [WAY_IN]
+    return [x for x in names if x not in IN_C]
 
 
 def sources() -> list[str]:
     """Files that make the compiled kernel what it is, such as kernel/path.py."""
-    files = [f"{x}.py" for x in compiled()[:-1]]
+    files = [f"{x}.py" for x in compiled()]
     for room in ROOMS:
         there = sorted(os.listdir(PACKAGE / room))
         files += [f"{room}/{x}" for x in there if x.endswith((".pxd", ".pyx"))]

@@ -26,21 +26,13 @@ NOISE_AHEAD = 16384  # control samples whose random effects are drawn at once
 
 
 class Compiled(NamedTuple):
-    """A scene, ready to run.
-
-    Attributes:
-        m: its Model; fields that name arrays are empty.
-        arrays: these arrays, by name of the field.
-        written: names of those that steps write.
-        caller: of the user's own controller, None without any.
-        laws: of the user, each a UserLaw.
-    """
+    """A scene, ready to run: its Model, and the arrays that its empty fields are to name."""
 
     m: Any
     arrays: dict[str, np.ndarray]
-    written: tuple[str, ...]
-    caller: LawCaller | None
-    laws: tuple[Any, ...]
+    written: tuple[str, ...]  # names of those that steps write
+    caller: LawCaller | None  # of the user's own controller
+    laws: tuple[Any, ...]  # of the user, each a UserLaw
 
 
 def compile_scene(s: Scenario, own: Controller | None = None) -> Compiled:

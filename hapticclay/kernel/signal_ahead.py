@@ -98,17 +98,9 @@ def stage_times(row: Any, dt: float, i: int, n: int) -> np.ndarray:
 
 
 class Drive:
-    """A signal, and its pieces over the next part of a run.
+    """A signal, and its pieces over the next part of a run; `table`: both, see model.pieces.
 
-    Args:
-        signal: the signal.
-        dt: step of the run [s].
-        from_start: count the pieces from their value at t = 0.
-
-    Attributes:
-        signal: the signal.
-        cosines: number of its multisines' lines.
-        table: for the loops, see model.pieces.
+    `from_start`: the pieces count from their value at t = 0.
     """
 
     def __init__(self, signal: Signal, dt: float, from_start: bool):

@@ -25,19 +25,12 @@ TABLE: list[ModuleType] = []
 
 
 class UserLaw(NamedTuple):
-    """A law in a scene.
-
-    Attributes:
-        module: its functions.
-        z: parameters and state.
-        first: index of the state.
-        start: parameters and state at the start of a run.
-    """
+    """A law in a scene: its functions, and its numbers, parameters and then state."""
 
     module: Any
     z: np.ndarray
-    first: int
-    start: np.ndarray
+    first: int  # index of the state
+    start: np.ndarray  # the numbers at the start of a run
 
 
 def of_scene(scenario: Scenario) -> tuple[UserLaw, ...]:
@@ -47,13 +40,15 @@ def of_scene(scenario: Scenario) -> tuple[UserLaw, ...]:
         numbers = module.numbers(scenario)
         if numbers is None:
             continue
-        told = module.refuses(scenario)
+        refusal = module.refuses(scenario)
         if scenario.hardware is not None and scenario.hardware.coupling is not None:
-            told = told or "must be without a coupling, which renders viscous clay and its yielding"
-        if not told and len(laws) == records.LAWS:
-            told = f"must have at most {records.LAWS} laws of a user"
-        if told:
-            raise ParameterError("clay", scenario.clay, told)
+            refusal = (
+                refusal or "must be without a coupling, which renders viscous clay and its yielding"
+            )
+        if not refusal and len(laws) == records.LAWS:
+            refusal = f"must have at most {records.LAWS} laws of a user"
+        if refusal:
+            raise ParameterError("clay", scenario.clay, refusal)
         p = tuple(map(float, scenario.start))
         z = np.array([*numbers, *module.start(numbers, p)], float)
         laws.append(UserLaw(module, z, len(numbers), z.copy()))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +21,7 @@ from .accuracy import Accuracy
 from .columns import ARRAYS
 from .one_run import run_once
 from .record import Record
+from .run import Progress
 from .step_comparison import Comparison, Trace, compare_positions, compare_times, hides_events
 
 UNITS = ("s", "m")
@@ -32,21 +32,16 @@ RATIO = 4  # coarsest step of a comparison over the finest
 ROUNDS = 9  # comparisons at most, each at a step at least two times finer
 MARGIN = 0.75  # share of the requested error to keep: in 2 %, estimates are low by this much
 DOUBTS = 4  # comparisons that may fail to confirm the order before a plain bound is taken
+INTERRUPTED = Comparison(None, None, False, "interrupted", True)
 LEAST_SAMPLES = 2000  # of a run to t_max at which positions are compared, however few are kept
 
 
 class IntegratorFacts(NamedTuple):
-    """What is known of an integrator before any run.
+    """What is known of an integrator before any run."""
 
-    Attributes:
-        order: of its error in the step.
-        constants: error over step to the power of the order, by unit.
-        cost: run time of a step, over that of the fast integrator.
-    """
-
-    order: int
-    constants: dict[str, float]
-    cost: float
+    order: int  # of its error in the step
+    constants: dict[str, float]  # error over step to the power of the order, by unit
+    cost: float  # run time of a step, over that of the fast integrator
 
 
 # Medians over 120 cuts and hits like those of tests/simulation/test_accuracy.py, against their
@@ -78,7 +73,7 @@ def simulate_within(
     error: float | str,
     *,
     every: int = 1,
-    progress: Callable[[float, float], bool | None] | None = None,
+    progress: Progress | None = None,
     engine: str = "auto",
 ) -> Record:
     """Runs a scenario with the integrator and the step that keep a requested error."""
@@ -88,8 +83,7 @@ def simulate_within(
         raise ParameterError("error", error, bound)
     if scenario.control == "sampled":
         scenario = dataclasses.replace(scenario, Ts=scenario.Ts or scenario.dt)
-    trial = Trial(scenario, unit, every)
-    trial.progress, trial.engine = progress, engine
+    trial = Trial(scenario, unit, every, engine, progress)
     *others, last = choices(scenario, asked, unit)
     integrator, dt = next((x for x in others if _is_taken(scenario, *x)), last)
     trial.scenario = dataclasses.replace(scenario, integrator=integrator)
@@ -101,12 +95,13 @@ def simulate_within(
         sure = found.confirmed or doubts > DOUBTS
         if found.final or (sure and found.estimate is not None and found.estimate <= most):
             break
-        if rounds == ROUNDS or _finer(dt, found, most, order) < SMALLEST:
+        finer = _finer(dt, found, most, order)
+        if rounds == ROUNDS or finer < SMALLEST:
             limit = f"{ROUNDS} steps were tried" if rounds == ROUNDS else "no step is smaller"
             found = found._replace(note=found.note or limit)
             break
         try:
-            dt = _finer(dt, found, most, order)
+            dt = finer
             record, found = trial.compare(dt)
         except ParameterError as refusal:  # memory is short: keep the results so far
             found = found._replace(note=f"the next step was refused, {refusal}")
@@ -191,27 +186,18 @@ def _divided(Ts: float, dt: float) -> float:
     return Ts / n
 
 
+@dataclasses.dataclass
 class Trial:
-    """Runs of one scenario at several steps, and their comparison.
+    """Runs of one scenario at several steps, and their comparison; arguments as in simulate."""
 
-    Args:
-        scenario: what to run, at any step.
-        unit: of the error, "s" or "m".
-        every: samples kept of the record, as in simulate.
-
-    Attributes:
-        progress: as in simulate.
-        engine: as in simulate.
-        runs: number of runs so far.
-        wall: total run time [s].
-    """
-
-    def __init__(self, scenario: Scenario, unit: str, every: int = 1):
-        self.scenario, self.unit, self.every = scenario, unit, every
-        self.progress: Callable[[float, float], bool | None] | None = None
-        self.engine = "auto"
-        self.runs, self.wall = 0, 0.0
-        self.traces: dict[float, Trace] = {}
+    scenario: Scenario
+    unit: str  # of the error, "s" or "m"
+    every: int
+    engine: str
+    progress: Progress | None
+    runs: int = 0
+    wall: float = 0.0  # total run time [s]
+    traces: dict[float, Trace] = dataclasses.field(default_factory=dict)  # by step
 
     def compare(self, dt: float) -> tuple[Record, Comparison]:
         """Runs at 4 dt, 2 dt and dt, unless done already, and compares."""
@@ -224,7 +210,7 @@ class Trial:
                 continue
             r = self._run(step, kept)
             if r.outcome.code == "interrupted":
-                return r, Comparison(None, None, False, "interrupted", True)
+                return r, INTERRUPTED
             record = r if step == kept else record
             traces[step] = Trace(step, r.outcome.code, r.crossings, r.t, r.p)
         assert record is not None
@@ -242,7 +228,7 @@ class Trial:
         """The record of the finest run, in place of the coarsest."""
         r = self._run(dt, dt)
         if r.outcome.code == "interrupted":
-            return r, Comparison(None, None, False, "interrupted", True)
+            return r, INTERRUPTED
         return self._thinned(r), found._replace(estimate=found.finest)
 
     def _run(self, dt: float, kept: float) -> Record:

@@ -8,12 +8,12 @@ import os
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
-from typing import Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 
 from ..arguments import checked
-from ..errors import ParameterError, choice, integer
+from ..errors import Bound, ParameterError
 from ..kernel.engine import warnings_caught
 from ..scene.plausible import warn_implausible
 from ..scene.scenario import Scenario
@@ -24,7 +24,6 @@ from .one_run import check_memory
 from .run import Run, Workspace, completed
 from .summaries import SUMMARY, Summaries, of_run, put_fields
 
-KEEP = ("records", "summaries")
 MANY = 32  # batches of so many runs or more make the runs of one kind together
 PART_STEPS = 20_000.0  # steps in a part of such a batch: 50 ms, after which Ctrl-C takes effect
 LAST_ONLY = 1_000_000_000  # value of `every` that keeps only the first sample and the last
@@ -35,9 +34,9 @@ WARNED = 200  # kinds of scene per batch that are checked for implausible values
 def simulate_batch(
     scenarios: Iterable[Scenario],
     *,
-    threads: int | None = None,
-    every: int = 1,
-    keep: str = "records",
+    threads: Annotated[int | None, Bound(1, 1024)] = None,
+    every: Annotated[int, Bound(1, 1_000_000)] = 1,
+    keep: Literal["records", "summaries"] = "records",
 ) -> Any:
     """Runs scenarios in parallel; each gives the record of `simulate`, bit for bit.
 
@@ -58,10 +57,7 @@ def simulate_batch(
     Raises:
         ParameterError: a scenario, or another argument, is of the wrong kind.
     """
-    threads = integer("threads", cores() if threads is None else threads, 1, 1024)
-    every = integer("every", every, 1, 1_000_000)
-    summaries = choice("keep", keep, KEEP) == "summaries"
-    seen: set[Any] = set()
+    summaries, seen = keep == "summaries", set[Any]()
     if isinstance(scenarios, Sequence):  # refuse before the first run where possible
         for _ in checked_scenarios(scenarios, seen):
             pass
@@ -82,7 +78,7 @@ def simulate_batch(
     with warnings_caught():
         parts = _in_parts(itertools.chain(first, todo), together)
         # in Python one after the other: side by side they would wait for each other
-        count = max(min(threads, len(first)), 1) if engine == "native" else 0
+        count = max(min(threads or cores(), len(first)), 1) if engine == "native" else 0
         on_threads(parts, make, out.put if summaries else put, count, pool.stop)
     return out.all() if summaries else [records[i] for i in range(len(records))]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..arguments import checked
-from ..errors import ParameterError, array_of, integer, number
+from ..errors import Bound, ParameterError, array_of, number
 from ..fields import nodes_of
 from ..kernel import scene
 from ..kernel.engine import warnings_caught
@@ -29,7 +29,10 @@ Entry = tuple[str, tuple[int, ...]]
 
 @checked
 def simulate_columns(
-    base: Scenario, columns: Mapping[str, Any], *, threads: int | None = None
+    base: Scenario,
+    columns: Mapping[str, Any],
+    *,
+    threads: Annotated[int | None, Bound(1, 1024)] = None,
 ) -> np.ndarray:
     """Runs a scenario with columns of numbers in place of some of its fields.
 
@@ -52,7 +55,6 @@ def simulate_columns(
         ParameterError: there is no such field, a column has another length, or a value was
             refused; the error names column and row.
     """
-    threads = integer("threads", batch.cores() if threads is None else threads, 1, 1024)
     runs = Columns(base, columns)
     many = len(runs) >= batch.MANY and runs.is_plain
     if not many or engine_for("auto", math.inf) == "python":
@@ -66,7 +68,9 @@ def simulate_columns(
         return _summaries_of(pool, runs, rows)
 
     with warnings_caught():
-        batch.on_threads(parts, make, out.put, min(threads, -(-n // size)), pool.stop)
+        batch.on_threads(
+            parts, make, out.put, min(threads or batch.cores(), -(-n // size)), pool.stop
+        )
     return out.all()
 
 

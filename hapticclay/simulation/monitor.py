@@ -42,9 +42,6 @@ class StabilityMonitor:
     is above the limit of its loop in some clay that it has visited. Under a muscle force or a
     command that varies, growth counts only above that limit: the handle may swing as it is driven.
     Below the limit, the axis must grow beyond what the other axis may have passed to it.
-
-    Args:
-        scenario: the scenario of the run.
     """
 
     def __init__(self, scenario: Scenario):
@@ -67,17 +64,8 @@ class StabilityMonitor:
         self._limits = PoseLimits(scenario)
 
     def look(self, rows: np.ndarray, first: int) -> tuple[int, Outcome | None]:
-        """Judges the next rows."""
-        dt = self.scenario.dt
-        v, q2 = rows[4:6], rows[1]
-        good = rows.shape[1]
-        # first a cheap test: is anything wrong at all?
-        bend = np.abs(np.sin(q2))
-        if good and not (
-            np.isfinite(rows.sum()) and np.abs(v).max() <= SPEED and bend.min() >= FOLD
-        ):
-            bad = ~np.isfinite(rows).all(axis=0) | (np.abs(v) > SPEED).any(axis=0) | (bend < FOLD)
-            good = int(bad.argmax()) if bad.any() else good
+        """Judges the next rows, shape (12, n): number of good ones, and an outcome if any."""
+        good = _good_rows(rows)
         if good:
             for i in (0, 1):
                 self.least[i] = min(self.least[i], float(rows[2 + i, :good].min()))
@@ -85,33 +73,35 @@ class StabilityMonitor:
         found = self._unstable(rows[:, :good])
         if found is not None:
             n, axis, cause = found
-            step = first + n - 1
             code = "limit cycle" if cause == LIMITS else "diverged"
-            verdict = Outcome(code, step * dt, step, axis, cause, self._advice(axis))
+            verdict = self._outcome(code, first + n - 1, axis, cause)
             if self.scenario.stop_when_unstable:
                 return n, verdict
             self.onset = self.onset or verdict
         if good == rows.shape[1]:
             return good, None
-        step = max(first + good - 1, 0)
-        count = [len(x) for x in self.swings]
+        return good, self._lost(rows[:, good], max(first + good - 1, 0))
+
+    def _lost(self, row: np.ndarray, step: int) -> Outcome:
+        """Outcome of a run whose next row is not good."""
+        v, q2, count = row[4:6], float(row[1]), [len(x) for x in self.swings]
         above = [i for i in (0, 1) if count[i] and self._above_limit(i)]
         axis = self._blame(above) if max(count) >= 3 or any(count[i] >= 2 for i in above) else ""
         if axis:
-            return good, Outcome(
-                "diverged", step * dt, step, axis, "oscillation out of reach", self._advice(axis)
-            )
-        if abs(math.sin(q2[good])) < FOLD:
-            stretched = math.cos(q2[good]) > 0.0
+            return self._outcome("diverged", step, axis, "oscillation out of reach")
+        if abs(math.sin(q2)) < FOLD:
+            stretched = math.cos(q2) > 0.0
             code, where = ("out of reach", "stretched") if stretched else ("singular", "folded")
             low, high = self.scenario.arm.reach
             reach = f"within {low:.3g} to {high:.3g} m of the shoulder"
             advice = f"choose a force, start or origin that keeps the handle {reach}"
-            return good, Outcome(code, step * dt, step, "", f"the arm is {where}", advice)
-        axis = AXES[int(np.argmax(np.nan_to_num(np.abs(v[:, good]), nan=np.inf)))]
-        return good, Outcome(
-            "diverged", step * dt, step, axis, f"faster than {SPEED:g} m/s", self._advice(axis)
-        )
+            return Outcome(code, step * self.scenario.dt, step, "", f"the arm is {where}", advice)
+        axis = AXES[int(np.argmax(np.nan_to_num(np.abs(v), nan=np.inf)))]
+        return self._outcome("diverged", step, axis, f"faster than {SPEED:g} m/s")
+
+    def _outcome(self, code: str, step: int, axis: str, cause: str) -> Outcome:
+        """Outcome of an unstable axis."""
+        return Outcome(code, step * self.scenario.dt, step, axis, cause, self._advice(axis))
 
     def end(self, outcome: Outcome) -> Outcome:
         """The final outcome of a run, after all its rows."""
@@ -120,33 +110,24 @@ class StabilityMonitor:
             since = self.onset
             return replace(outcome, cause=f"{since.axis} axis: {since.cause}") if since else outcome
         if self.onset is not None:
-            cycles = self.bound.sum() > OFTEN * len(self.bound)
-            cause = (
-                f"{self.onset.cause}, bounded by the torque limits" if cycles else self.onset.cause
-            )
-            return replace(self.onset, code="limit cycle" if cycles else "diverged", cause=cause)
+            if self.bound.sum() <= OFTEN * len(self.bound):
+                return replace(self.onset, code="diverged")
+            cause = f"{self.onset.cause}, bounded by the torque limits"
+            return replace(self.onset, code="limit cycle", cause=cause)
         if outcome.code == "unresolved":
             return outcome
-        if outcome.code == "time limit":
-            saturated, stalled = at_rest(self.seen, self.moved, self.unbound, s.dt)
-            if saturated:
-                least = "rms" if isinstance(s.muscle, Multisine) else "the force"
-                advice = f"{self._raise_limit()}, or lower {least}"
-                return replace(
-                    outcome, code="saturated", cause="a motor stays in its limit", advice=advice
-                )
-            if stalled:
-                return replace(
-                    outcome,
-                    code="stalled",
-                    cause=f"slower than {STILL:g} m/s",
-                    advice=self._why_still(),
-                )
+        saturated, stalled = at_rest(self.seen, self.moved, self.unbound, s.dt)
+        if outcome.code == "time limit" and saturated:
+            least = "rms" if isinstance(s.muscle, Multisine) else "the force"
+            cause, advice = "a motor stays in its limit", f"{self._raise_limit()}, or lower {least}"
+            return replace(outcome, code="saturated", cause=cause, advice=advice)
+        if outcome.code == "time limit" and stalled:
+            cause, advice = f"slower than {STILL:g} m/s", self._why_still()
+            return replace(outcome, code="stalled", cause=cause, advice=advice)
         share = self.often / max(self.seen, 1)
         if share >= 0.01:
-            return replace(
-                outcome, cause=f"motors in their limits for {100.0 * share:.0f} % of the time"
-            )
+            cause = f"motors in their limits for {100.0 * share:.0f} % of the time"
+            return replace(outcome, cause=cause)
         return outcome
 
     def _why_still(self) -> str:
@@ -284,6 +265,16 @@ class StabilityMonitor:
             changes = "the arm's inertia changes along the path"
             return f"turn shaping on: the loop is stable at the nominal pose, {changes}"
         return f"lower dt from {s.dt:g} s, or gain[{axis}] from {s.gain[i]:g}"
+
+
+def _good_rows(rows: np.ndarray) -> int:
+    """Number of rows before the first that is not finite, too fast, or of a straight arm."""
+    v, bend = np.abs(rows[4:6]), np.abs(np.sin(rows[1]))
+    # first a cheap test: is anything wrong at all?
+    if not bend.size or (np.isfinite(rows.sum()) and v.max() <= SPEED and bend.min() >= FOLD):
+        return rows.shape[1]
+    bad = ~np.isfinite(rows).all(axis=0) | (v > SPEED).any(axis=0) | (bend < FOLD)
+    return int(bad.argmax()) if bad.any() else rows.shape[1]
 
 
 class RangeMonitor(StabilityMonitor):

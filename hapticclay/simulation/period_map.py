@@ -30,18 +30,12 @@ class PeriodMap(NamedTuple):
     """The linear map of small motions over one period: z(k+1) = matrix z(k).
 
     It has the coordinates of one axis, or of both where the other one acts on it.
-
-    Attributes:
-        matrix: shape (n, n).
-        period: its length [s].
-        pushed: z for a unit velocity of the handle along the axis, shape (n,).
-        seen: velocity of the handle along the axis per unit of z, shape (n,).
     """
 
-    matrix: np.ndarray
-    period: float
-    pushed: np.ndarray
-    seen: np.ndarray
+    matrix: np.ndarray  # shape (n, n)
+    period: float  # [s]
+    pushed: np.ndarray  # z for a unit velocity of the handle along the axis, shape (n,)
+    seen: np.ndarray  # velocity of the handle along the axis per unit of z, shape (n,)
 
 
 class PeriodMaps:
@@ -103,21 +97,13 @@ def number_of(*names: Any) -> int:
 
 
 class Ring(NamedTuple):
-    """Numbers of past samples on which the next ones depend.
+    """Numbers of past samples on which the next ones depend."""
 
-    Attributes:
-        name: of the array.
-        first: field of the machine that gives its first row; "" for a fixed one.
-        filled: field that gives the number of its rows; "" where all count.
-        width: numbers of a row.
-        columns: those of them that are coordinates of x, and of y.
-    """
-
-    name: str
-    first: str
-    filled: str
-    width: int
-    columns: tuple[tuple[int, ...], tuple[int, ...]]
+    name: str  # of the array
+    first: str  # field of the machine with its first row; "" for a fixed one
+    filled: str  # field with the number of its rows; "" where all count
+    width: int  # numbers of a row
+    columns: tuple[tuple[int, ...], tuple[int, ...]]  # coordinates of x, and of y, among them
 
     def places(self, machine: Any, size: int, i: int) -> np.ndarray:
         """Where the coordinates of an axis lie."""
@@ -172,15 +158,10 @@ def rings_of(m: Any) -> list[Ring]:
 
 
 class Copies(NamedTuple):
-    """Copies of a run.
-
-    Attributes:
-        states: of the copies.
-        rings: numbers of each, shape (copies, size).
-    """
+    """Copies of a run."""
 
     states: np.ndarray
-    rings: list[np.ndarray]
+    rings: list[np.ndarray]  # shape (copies, size) each
 
     def repeated(self, n: int) -> Copies:
         """Each copy several times."""
@@ -196,12 +177,7 @@ class Copies(NamedTuple):
 
 
 class Map:
-    """Makes the map of a scene.
-
-    Args:
-        row: its row.
-        coupled: whether one axis acts on the other in such scenes.
-    """
+    """Makes the map of a scene; `coupled`: one axis acts on the other in such scenes."""
 
     def __init__(self, row: Row, coupled: bool):
         self.row, self.coupled, self.rings = row, coupled, rings_of(row.m)
@@ -249,11 +225,10 @@ class Map:
         self._advance(x, n)
         before = [coordinates_at(rest, places) for places in kicked]
         after = [coordinates_at(x, self._places(x, i)) for i in axes]
-        if (x.states["code"] != path.OPEN).any():
+        pairs = list(zip(before, after, strict=True))
+        is_over = (x.states["code"] != path.OPEN).any()
+        if is_over or any(a.shape[1] != b.shape[1] for a, b in pairs):
             return None
-        if any(a.shape[1] != b.shape[1] for a, b in zip(before, after, strict=True)):
-            return None
-        pairs = zip(before, after, strict=True)
         return linear_map(np.concatenate([b - a for a, b in pairs], axis=1) / KICK)
 
     def _advance(self, x: Copies, n: int) -> None:

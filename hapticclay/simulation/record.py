@@ -10,13 +10,13 @@ import os
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from ..arguments import checked, named
 from ..display import html_table, one_line
-from ..errors import ParameterError, choice
+from ..errors import ParameterError
 from ..fields import make_part, plain_data
 from ..files import DAMAGED, atomic, check_regular, parse_json, versions
 from ..model.clay import Clay
@@ -28,7 +28,7 @@ from ..scene.text import scenario_rows
 from ..theory import linear_loop
 from ..theory.stability_margins import Verdict
 from .accuracy import Accuracy
-from .columns import ARRAYS, EXTRA, SCALAR
+from .columns import ARRAYS, COLUMNS, EXTRA
 from .monitor import Outcome
 from .run import Crossing, Run, Stop
 from .stored import check_head, check_headers, check_times
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 VIEWS = "hapticclay.views.record_plots"  # draws the figures; imported on demand
 RECORD_SCHEMA, RECORD_SCHEMA_0_2 = "hapticclay-record-2", "hapticclay-record-1"
+UNITS = {"energy": "J", "crossings": "m, s, m/s", "regions": "m, N.s/m, m/s"}  # of a summary
 STEADY = 1e-2  # a speed is steady if it would change by less than 1 % in 1 s ...
 STEADY_SPAN = 0.05  # ... and has done so for so long before and after [s]
 
@@ -154,8 +155,8 @@ class Record:
 
     def _units(self) -> dict[str, str]:
         """Unit of each array that the record has."""
-        extra = {name: EXTRA[name] for name in self.extra}
-        return ARRAYS | extra | ({"ground": "m"} if self.ground is not None else {})
+        names = [*ARRAYS, *self.extra, *["ground"] * (self.ground is not None)]
+        return {name: COLUMNS[name].unit for name in names}
 
     @property
     def plot(self) -> Any:
@@ -375,12 +376,7 @@ class Record:
             "simulated_time_s": end,
             "wall_time_s": self.wall_time,
             "real_time_factor": end / self.wall_time if self.wall_time > 0.0 else None,
-            "units": {
-                "energy": "J",
-                "crossings": "m, s, m/s",
-                "regions": "m, N.s/m, m/s",
-                **self._units(),
-            },
+            "units": UNITS | self._units(),
             "versions": self.versions,
             **more,
         }
@@ -457,7 +453,7 @@ class Record:
                     extra=extra,
                     notes=head.get("notes", {}) | ({"left_out": lost} if lost else {}),
                     stops=tuple(Stop(**x) for x in head.get("stops", ())),
-                    error=_accuracy(head.get("error")),
+                    error=Accuracy(**head["error"]) if head.get("error") else None,
                     ground=ground,
                 )
         except DAMAGED as error:
@@ -471,7 +467,7 @@ def _check(arrays: dict[str, np.ndarray]) -> None:
     """Raises ValueError unless arrays are finite and have their shapes."""
     t = arrays["t"]
     for name, x in arrays.items():
-        shape = (t.size,) if name in SCALAR else (t.size, 2)
+        shape = (t.size, 2) if COLUMNS[name].parts else (t.size,)
         if x.shape != shape or x.dtype != np.float64:
             raise ValueError(
                 f"array {name} must be float64 of shape {shape}, is {x.dtype} of shape {x.shape}"
@@ -504,16 +500,6 @@ def _scenario(data: dict[str, Any]) -> tuple[Scenario, list[str]]:
         if error.field != "controller.law":
             raise
     return make_part(Scenario, {**data, "controller": None}), ["controller"]
-
-
-def _accuracy(d: dict[str, Any] | None) -> Accuracy | None:
-    return None if d is None else Accuracy(**d)
-
-
-def brief(r: Record) -> tuple[Outcome, int, tuple[Crossing, ...], list[Any], dict[str, float]]:
-    """The end of a record, without its samples."""
-    last = [x[-1] if len(x) else (np.nan, np.nan) for x in (r.p, r.v, r.fh, r.fe, r.b)]
-    return r.outcome, r.steps, r.crossings, last, r.energy
 
 
 def _mean_and_std(x: np.ndarray) -> dict[str, float] | None:
@@ -560,26 +546,17 @@ def observed_passivity(record: Record) -> Verdict:
         raise ParameterError("record", len(record.t), "must have three samples or more")
     energy = port_energy(record).sum(axis=1)
     power = (record.fh * record.v).sum(axis=1)[::2]
-    coarse = np.concatenate(
-        ([0.0], np.cumsum(0.5 * np.diff(record.t[::2]) * (power[1:] + power[:-1])))
-    )
-    open_ = float(np.max(np.abs(coarse - energy[::2])))
-    i = int(np.argmin(energy))
-    to, at = f"{open_:.1e} J", f"{record.t[i]:.4g} s"
-    how = f"energy observer on the record, trapezoidal, to {to}; least at {at}"
-    assumptions = ("the run started at rest", "this motion only")
-    return Verdict(
-        bool(energy[i] >= -open_),
-        float(energy[i]),
-        math.nan,
-        assumptions,
-        how,
-        "least energy put in [J]",
-    )
+    steps = 0.5 * np.diff(record.t[::2]) * (power[1:] + power[:-1])
+    coarse = np.concatenate(([0.0], np.cumsum(steps)))
+    uncertain, i = float(np.max(np.abs(coarse - energy[::2]))), int(np.argmin(energy))
+    least, at = float(energy[i]), f"{record.t[i]:.4g} s"
+    how = f"energy observer on the record, trapezoidal, to {uncertain:.1e} J; least at {at}"
+    assumptions, what = ("the run started at rest", "this motion only"), "least energy put in [J]"
+    return Verdict(least >= -uncertain, least, math.nan, assumptions, how, what)
 
 
 @checked
-def out_of_band_ratio(record: Record, axis: str = "x") -> float:
+def out_of_band_ratio(record: Record, axis: Literal["x", "y"] = "x") -> float:
     """Share of the rms of the operator's force above the band of the maneuver.
 
     A stable linear loop answers a maneuver within its band and gives 0; white noise gives nearly 1.
@@ -596,7 +573,7 @@ def out_of_band_ratio(record: Record, axis: str = "x") -> float:
         ParameterError: the muscle force of the run is no multisine, or fewer than 32 samples were
             kept.
     """
-    i, muscle = AXES.index(choice("axis", axis, AXES)), record.scenario.muscle
+    i, muscle = AXES.index(axis), record.scenario.muscle
     if not isinstance(muscle, Multisine) or len(record.t) < 32:
         raise ParameterError(
             "record", record.scenario.name, "must be of a run with a multisine as its muscle force"

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import Annotated
 
 from ..arguments import checked
-from ..errors import integer
+from ..errors import Bound
 from ..scene.plausible import warn_implausible
 from ..scene.scenario import Scenario
 from .one_run import run_once
 from .record import Record
+from .run import Progress
 
 
 @checked
 def simulate(
     scenario: Scenario,
     *,
-    every: int = 1,
-    progress: Callable[[float, float], bool | None] | None = None,
+    every: Annotated[int, Bound(1, 1_000_000)] = 1,
+    progress: Progress | None = None,
     engine: str = "auto",
     error: float | str | None = None,
 ) -> Record:
@@ -45,7 +46,6 @@ def simulate(
         RuntimeError: the law of its controller raised an exception (`LawFailed`). Interruptions
             such as Ctrl-C are raised unchanged.
     """
-    every = integer("every", every, 1, 1_000_000)
     warn_implausible(scenario)
     if error is not None:
         from .asked_error import simulate_within  # imported only if an error is requested

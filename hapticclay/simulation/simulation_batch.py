@@ -5,12 +5,12 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..arguments import checked
-from ..errors import ParameterError, array_of, integer, number
+from ..errors import Bound, ParameterError, array_of, integer, number
 from ..kernel.engine import warnings_caught
 from ..model.operator import Operator
 from ..scene.scenario import Scenario
@@ -62,17 +62,16 @@ class SimulationBatch:
         scenarios: Sequence[Scenario],
         *,
         engine: str = "auto",
-        workers: int | None = None,
+        workers: Annotated[int | None, Bound(1, 1024)] = None,
         monitored: bool = True,
     ):
         engine = engine_for(engine)
-        workers = integer("workers", cores() if workers is None else workers, 1, 1024)
         self._warned: set[Any] = set()
         given = list(checked_scenarios(scenarios, self._warned))
         if not given:
             raise ParameterError("scenarios", scenarios, "must hold at least one Scenario")
         self._lock, self._closed = threading.Lock(), False
-        self._run = VectoredRuns(given, engine, workers, monitored)
+        self._run = VectoredRuns(given, engine, workers or cores(), monitored)
 
     def __enter__(self) -> SimulationBatch:
         return self

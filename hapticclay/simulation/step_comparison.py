@@ -12,48 +12,29 @@ from .run import Crossing
 ORDER_GAP = 0.5  # largest deviation of an observed order that confirms that of the integrator
 CLOSER = 0.7  # share of the gap of 4h to h that the gap of 2h to h may have; 0.2 at second order
 ROUNDING_LEFT = 1e-12  # [s], [m] rounding that remains at any step
-FINEST_GAP = (
-    1.5  # share of the gap of 2h to h that is the error at h: a third at second order, or more
-)
-TOLD_APART = 1e-13  # [m] distance beyond a border at which it counts as passed
+FINEST_GAP = 1.5  # gap of 2h to h over the error at h, at least; 3 at second order
+PASSED = 1e-13  # [m] distance beyond a border at which it counts as passed
 
 
 class Trace(NamedTuple):
-    """The data of a run that are compared.
+    """The data of a run that are compared."""
 
-    Attributes:
-        dt: its step [s].
-        code: of its outcome.
-        crossings: of borders.
-        t: time of the samples [s], shape (n,).
-        p: position there [m], shape (n, 2).
-    """
-
-    dt: float
-    code: str
+    dt: float  # [s]
+    code: str  # of the outcome
     crossings: tuple[Crossing, ...]
-    t: np.ndarray
-    p: np.ndarray
+    t: np.ndarray  # of the samples [s], shape (n,)
+    p: np.ndarray  # [m], shape (n, 2)
 
 
 class Comparison(NamedTuple):
-    """Error of the finest of three runs, from their comparison.
+    """Error of the finest of three runs, from their comparison."""
 
-    Attributes:
-        estimate: of its error; None where there is nothing to compare.
-        order: observed; None where it cannot be determined.
-        confirmed: whether the order is that of the integrator, so that the estimate is sharp.
-        note: what is wrong, "" for nothing.
-        final: whether finer steps would not help.
-        finest: error of the finest run, where the estimate is that of a coarser one.
-    """
-
-    estimate: float | None
-    order: float | None
-    confirmed: bool
-    note: str
-    final: bool = False
-    finest: float | None = None
+    estimate: float | None  # None where there is nothing to compare
+    order: float | None  # as observed; None where it cannot be determined
+    confirmed: bool  # the order is that of the integrator, so that the estimate is sharp
+    note: str  # what is wrong, "" for nothing
+    final: bool = False  # finer steps would not help
+    finest: float | None = None  # error of the finest run, where estimate is that of a coarser
 
 
 UNSTABLE = "the loop is unstable: errors grow with time, and nothing bounds them"
@@ -74,8 +55,8 @@ def compare_times(coarse: Trace, middle: Trace, fine: Trace, *, order: int) -> C
     if not fine.crossings:
         return Comparison(None, None, False, "no border was crossed: ask for an error in m", True)
     # a slow handle stays within the rounding of a border for long
-    slowest = max(min(abs(c.speed) for c in fine.crossings), TOLD_APART)
-    floor = ROUNDING_LEFT + TOLD_APART / slowest
+    slowest = max(min(abs(c.speed) for c in fine.crossings), PASSED)
+    floor = ROUNDING_LEFT + PASSED / slowest
     sharp = second / (2.0**order - 1.0)
     if sharp <= floor:
         return Comparison(floor, None, True, AT_ROUNDING, True)

@@ -99,9 +99,6 @@ class Simulation:
         recorded: bool = True,
         monitored: bool = True,
     ):
-        if not isinstance(scenario, Scenario):
-            bound = "must be a Scenario, as constant_cut() returns"
-            raise ParameterError("scenario", scenario, bound)
         self._engine, self._maker = engine, engine_for(engine, scenario.t_max / scenario.dt)
         self._lock, self._workspace = threading.Lock(), Workspace()
         self._closed, self._warned, self._recorded = False, (), recorded
@@ -176,12 +173,7 @@ class Simulation:
         that a step from here would record.
         """
         if self._state is None:
-            run = self._run
-            if run.outcome is None or not self._recorded:
-                self._state = sample_of(run.sample_time(), np.array(self.numbers()))
-            else:
-                last = {name: getattr(self.record(), name)[-1] for name in Sample._fields}
-                self._state = Sample(**last)
+            self._state = sample_of(self._run.sample_time(), np.array(self.numbers()))
         return self._state
 
     def numbers(self) -> list[float]:
@@ -191,9 +183,6 @@ class Simulation:
             Pairs of two each, of shoulder and elbow or of x and y: q, p, v, fh, tau, delta, b, qd,
             fe, as in `Sample`; 18 numbers.
         """
-        if self._run.outcome is not None and self._recorded:
-            x = self.state
-            return [float(a) for name in COLUMNS for a in getattr(x, name)]
         with Alone(self) as run:
             return run.numbers_ahead()
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from hapticclay.errors import ParameterError
 from hapticclay.formulas import damping
-from hapticclay.formulas.regions import END, enter_region, is_alike, region_of, smooth_clay
+from hapticclay.formulas.regions import END, enter_region, is_identical, region_of, smooth_clay
 from hapticclay.model import clay
 from hapticclay.model.cells import Grid, Profile
 from hapticclay.model.clay import Clay
@@ -110,15 +110,15 @@ def test_a_grid_has_its_cells_where_they_belong():
 def test_borders_between_cells_alike_are_none():
     grid = Grid((0.0, 1.0), (0.5,), [[1.0, 2.0], [1.0, 2.0], [1.0, 3.0]])
     table = region_table(Clay(grid, grid), 2.0)
-    assert is_alike(table, 0, 0, 0, 1) and is_alike(table, 1, 0, 0, -1)
-    assert is_alike(table, 1, 0, 0, 1) and not is_alike(table, 1, 1, 0, 1)
-    assert not is_alike(table, 0, 0, 1, 1)  # other clay
-    assert not is_alike(table, 0, 0, 0, -1) and not is_alike(table, 0, 1, 1, 1)  # no end
-    assert not is_alike(table, 2, 0, 0, 1)  # the end of the path
+    assert is_identical(table, 0, 0, 0, 1) and is_identical(table, 1, 0, 0, -1)
+    assert is_identical(table, 1, 0, 0, 1) and not is_identical(table, 1, 1, 0, 1)
+    assert not is_identical(table, 0, 0, 1, 1)  # other clay
+    assert not is_identical(table, 0, 0, 0, -1) and not is_identical(table, 0, 1, 1, 1)  # no end
+    assert not is_identical(table, 2, 0, 0, 1)  # the end of the path
     growing = Grid((0.0,), (), [[1.0], [1.0]], [[2.0], [2.0]])
-    assert not is_alike(region_table(Clay(growing, growing), None), 0, 0, 0, 1)
+    assert not is_identical(region_table(Clay(growing, growing), None), 0, 0, 0, 1)
     layers = Profile((0.0,), (1.0, 1.0))  # whose borders are all reported
-    assert not is_alike(region_table(Clay(layers, layers), None), 0, 0, 0, 1)
+    assert not is_identical(region_table(Clay(layers, layers), None), 0, 0, 0, 1)
 
 
 def test_growth_is_kept_where_the_damping_alone_changes():

@@ -81,7 +81,7 @@ def run(place, engine="auto"):
 def changed(place, what):
     """Spoils a copy; what the line then says."""
     folder = place / "native"
-    path = next((folder / "kernel").glob("path.*.so"), None) or folder / "kernel/path.pyd"
+    module = next((folder / "kernel").glob("loop.*.so"), None) or folder / "kernel/loop.pyd"
     if what == "never built":
         shutil.rmtree(folder)
         return "not built"
@@ -96,18 +96,18 @@ def changed(place, what):
         (place / "formulas/more.pxd").write_text("cdef double x\n")
         return "built from other sources: formulas/more.pxd has changed"
     if what == "truncated":
-        os.truncate(path, path.stat().st_size // 2)
-        return f"damaged: native/kernel/{path.name} is not as it was built"
+        os.truncate(module, module.stat().st_size // 2)
+        return f"damaged: native/kernel/{module.name} is not as it was built"
     if what == "incomplete":
-        path.unlink()
-        return f"incomplete: native/kernel/{path.name} is lacking"
+        module.unlink()
+        return f"incomplete: native/kernel/{module.name} is lacking"
     if what == "two builds":
-        shutil.copy(path, path.with_name(f"path{EXTENSION_SUFFIXES[0]}"))
-        return f"mixed: native/kernel/path{EXTENSION_SUFFIXES[0]} is of another build"
+        shutil.copy(module, module.with_name(f"loop{EXTENSION_SUFFIXES[0]}"))
+        return f"mixed: native/kernel/loop{EXTENSION_SUFFIXES[0]} is of another build"
     if what == "another Python":
-        other = path.with_name("path.cpython-39-x86_64-linux-gnu.so")
-        path.rename(other)
-        text = (folder / "built.py").read_text().replace(path.name, other.name)
+        other = module.with_name("loop.cpython-39-x86_64-linux-gnu.so")
+        module.rename(other)
+        text = (folder / "built.py").read_text().replace(module.name, other.name)
         (folder / "built.py").write_text(text)
         return f"built for another Python: native/kernel/{other.name}"
     machine = next((folder / "kernel").glob("machine.*"))
@@ -138,7 +138,7 @@ def changed(place, what):
     ],
 )
 def test_what_is_not_to_be_trusted_is_one_line_and_the_same_numbers(place, right, what):
-    if what == "two builds" and (place / f"native/kernel/path{EXTENSION_SUFFIXES[0]}").exists():
+    if what == "two builds" and (place / f"native/kernel/loop{EXTENSION_SUFFIXES[0]}").exists():
         pytest.skip("this build has the first name that Python looks for")
     why = changed(place, what)
     out, err = run(place)
