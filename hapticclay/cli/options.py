@@ -90,6 +90,12 @@ class Option:
         return self.name.replace("_", "-")
 
     @property
+    def usage(self) -> str:
+        """What stands for a word without a name in the first line of a help page."""
+        also = {SCENARIO: "EXPERIMENT|FILE", RECORD: "EXPERIMENT|FILE|RECORD"}
+        return also.get(self.note) or self.name.upper()
+
+    @property
     def label(self) -> str:
         """The name as an error shows it."""
         return self.name if self.note else f"--{self.word}"

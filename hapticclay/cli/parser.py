@@ -101,8 +101,11 @@ def read(words: Sequence[str]) -> Line:
         ParameterError: it has a word that its command does not take.
     """
     line, rest = begun([NEGATIVE.sub(r" \g<0>", word) for word in words])
+    quiet: Any = object()  # a console would be imported for an error, which nobody prints there
     try:
-        _, bound, _ = app_of(line).parse_args(rest, exit_on_error=False, print_error=False)
+        _, bound, _ = app_of(line).parse_args(
+            rest, exit_on_error=False, print_error=False, error_console=quiet
+        )
     except cyclopts.CycloptsError as error:
         raise _refusal(error, line) from None
     given = {line.options[name]: texts for name, texts in bound.arguments.items() if texts != ()}
@@ -202,12 +205,8 @@ def _first_loose(options: Mapping[str, Option], words: Sequence[str]) -> int | N
 
 
 def app_of(line: Line) -> cyclopts.App:
-    """The parser of a command, which prints its help too."""
-    about, kind = field_descriptions(line.kind), line.kind
-    if line.origin == EXPERIMENT:
-        from ..scene.experiments import EXPERIMENTS
-
-        kind = EXPERIMENTS[line.source]
+    """The parser of a command, which prints its options too."""
+    about = field_descriptions(line.kind)
     titles = {"": "Options", SCENARIO: f"Options of {line.source}"}
     groups = {
         part: cyclopts.Group.create_ordered(
@@ -222,21 +221,15 @@ def app_of(line: Line) -> cyclopts.App:
     command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
         sorted(parameters, key=lambda p: p.kind)
     )
-    app = new_app(f"hapticclay {line.path}", help_text(kind))
+    app = new_app(line.name)
     app.default(command)
     return app
 
 
-def new_app(name: str, about: str, **look: Any) -> cyclopts.App:
-    """A parser without options for help and version: they are read before it."""
+def new_app(name: str, **look: Any) -> cyclopts.App:
+    """A parser without options for help and version, which are read before it."""
     bare: dict[str, Any] = {"help_flags": (), "version_flags": (), "help_format": "plaintext"}
-    return cyclopts.App(name=name, help=about, end_of_options_delimiter="", **bare, **look)
-
-
-def help_text(kind: type) -> str:
-    """What a command or an experiment is, a line a paragraph."""
-    text = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0]
-    return "\n\n".join(" ".join(part.split()) for part in text.strip().split("\n\n"))
+    return cyclopts.App(name=name, usage="", end_of_options_delimiter="", **bare, **look)
 
 
 def _parameter(option: Option, group: cyclopts.Group) -> inspect.Parameter:

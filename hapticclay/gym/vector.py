@@ -32,7 +32,7 @@ class TaskVectorEnv(VectorEnv):
         autoreset_mode: "NEXT_STEP", "SAME_STEP" or "DISABLED", as a word or a member of
             `AutoresetMode`.
         render_mode: "rgb_array" or None.
-        engine: as in `Simulation`: "auto", "python" or "native".
+        engine: "auto", "python" or "native", as in `Simulation`.
         ranges: ends (low, high) of each number drawn for an episode, by name; None for the task's.
         **options: options of the task.
 
@@ -179,11 +179,10 @@ class TaskVectorEnv(VectorEnv):
         self._count += live
         ended = found.ended & live
         cut_off = (self._count >= self._most) & live
-        self._over = ended | cut_off
-        again, final = ~live, {}  # with NEXT_STEP: the episode ended before this step
-        if self.autoreset_mode is AutoresetMode.SAME_STEP:
-            again = self._over.copy()
-            final = self._final(found, again) if again.any() else {}
+        self._over = over = ended | cut_off
+        again, final = ~live, {}  # the episode ended before this step, or its restart was refused
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and over.any():
+            again, final = again | over, self._final(found, over.copy())
         observations = found.observation
         if again.any():
             self._begin(again)

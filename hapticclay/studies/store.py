@@ -215,6 +215,17 @@ def check_begun(plan: Plan, out: Path) -> None:
         )
 
 
+def save_part(plan: Plan, number: int, rows: list[dict[str, Any]], out: Path) -> None:
+    """Writes rows to their file, whole or not at all, unless the folder is no longer the plan's."""
+    check_begun(plan, out)
+    try:
+        with atomic(part_file(out, number)) as f:
+            write_part(plan, number, rows, f)
+    except ParameterError:
+        check_begun(plan, out)  # it may have been removed meanwhile
+        raise
+
+
 def check_complete(plan: Plan, out: Path) -> None:
     """Checks, after the last run, that the folder still holds all runs."""
     missing = sum(map(len, missing_parts(plan, out)))

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ParameterError
-from ..files import atomic
 from ..simulation.batch import cores
 from . import store
 from .store import P, Plan
@@ -91,9 +90,7 @@ def run_part(
     begin, number, folder = time.perf_counter(), plan.part_number(runs), Path(out)
     store.check_begun(plan, folder)  # before the work, too: a cluster repeats what has failed
     rows = plan.rows(runs, lambda: time.perf_counter() - begin > patience or ended())
-    store.check_begun(plan, folder)
-    with atomic(store.part_file(folder, number)) as f:
-        store.write_part(plan, number, rows, f)
+    store.save_part(plan, number, rows, folder)
     return len(rows), time.perf_counter() - begin
 
 

@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import ParameterError, array_of, integer, number
+from ..errors import Bound, ParameterError, array_of, integer, number
 from ..formulas import arm as arm_law
 from ..formulas.constants import B_MAX
 from ..model import support
@@ -160,9 +161,9 @@ def controller_stability(
     scenario: Scenario,
     *,
     gain: int | None = None,
-    b: float | None = None,
+    b: Annotated[float | None, Bound(0.0, B_MAX, "N.s/m")] = None,
     matrices: LinearLaw | None = None,
-    size: float = 1e-2,
+    size: Annotated[float, Bound(1e-9, 1.0)] = 1e-2,
 ) -> ControllerStability:
     """Stability and largest stable gain of a loop with a sampled controller of one's own.
 
@@ -185,17 +186,16 @@ def controller_stability(
         ParameterError: the scenario has no controller, the law does not rest near the start,
             depends on the time, or is not linear around rest (quantized, saturating or
             discontinuous), or a value is out of its bounds.
-        LawFailed: the law failed.
+        RuntimeError: the law failed (`LawFailed`).
     """
     made = scenario.controller
     if made is None:
         raise ParameterError("controller", None, "must be given: gain_limit is for the paper's own")
     if b is not None:
-        dampings = [number("b", b, 0.0, B_MAX, unit="N.s/m")]
+        dampings = [b]
     else:
         clay = scenario.clay if scenario.render == "physical" else None
         dampings = dampings_of(clay, (0, 1)) or [0.0]
-    size = number("size", size, 1e-9, 1.0)
     own = 1.0 if gain is None else _parameter(made, gain, matrices)
     rest = Rest(scenario, made if matrices is None else None)
     known = matrices or rest.linear_law(size)

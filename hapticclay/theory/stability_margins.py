@@ -21,7 +21,7 @@ from . import exact_roots, gain_crossings, linear_loop, roots
 from .exact_roots import rational
 from .loops import Loop, of_loop
 
-Break = Literal["force", "compensator"]
+Break = Literal["force", "compensator"]  # where a loop is opened
 BREAKS = get_args(Break)
 DIPS = 20  # dips of |1 + L| that are refined, the deepest ones on the grid
 LINEAR = "one axis at the nominal pose, linear, motors within their torque limits"

@@ -151,10 +151,11 @@ def ring(color: str = VERMILION, size: float = 13.0) -> dict[str, Any]:
     return hollow(color, "o", size, mfc="none", mew=stroke(1.5))
 
 
-def mark(ax: Axes, places: Iterable[tuple[float, float]], **look: Any) -> None:
+def mark(ax: Axes, places: Iterable[Any], **look: Any) -> None:
     """Marks places (x, y), if there are any."""
     if places := list(places):
-        ax.plot(*zip(*places, strict=True), **{"ls": "none"} | look)
+        look.setdefault("ls", "none")
+        ax.plot(*zip(*places, strict=True), **look)
 
 
 def cell_edges(values: np.ndarray, log: bool) -> np.ndarray:

@@ -49,7 +49,8 @@ def path_plot(record: Record) -> Figure:
 def _clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
     """Shades each region of the clay and labels its resistance."""
     for block in clay.blocks:
-        _shade(ax, *(100.0 * x for side in (block.x, block.y) for x in side), 1.0)
+        (x0, x1), (y0, y1) = block.x, block.y
+        _shade(ax, 100.0 * x0, 100.0 * x1, 100.0 * y0, 100.0 * y1, 1.0)
     edges = [sorted({-BEYOND, BEYOND, *(100.0 * x for x in e)}) for e in clay.edges]
     if "place" in clay.varies or max(map(len, edges)) > MOST_BORDERS:
         _clay_image(ax, clay, low, high)
@@ -65,7 +66,8 @@ def _clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
         if shown[0] > 0.12 and shown[1] > 0.08:
             place = np.array((right, bottom)) + (-0.01, 0.01) * (high - low)
             text: Any = dict(ha="right", va="bottom", fontsize=points(8), color=GREY)
-            ax.text(*place, "\n".join(clay_text(x.text()) for x in clay.here(middle)), **text)
+            name = "\n".join(clay_text(x.text()) for x in clay.here(middle))
+            ax.text(place[0], place[1], name, **text)
 
 
 def _shade(ax: Axes, x0: float, x1: float, y0: float, y1: float, share: float) -> None:

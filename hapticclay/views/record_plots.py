@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -122,7 +122,7 @@ def energy_plot(record: Record) -> Figure:
         color, dash, label = looks[name]
         ax.plot(record.t, values, color=color, ls=dash, label=label)
     for name, value in _added_up(record).items():
-        look = dict(color=looks[name][0], ms=stroke(5.0), label="added up by the run")
+        look: Any = dict(color=looks[name][0], ms=stroke(5.0), label="added up by the run")
         ax.plot(record.t[-1], value, "o", **look)
     ax.set(xlabel="time [s]", ylabel="energy [J]")
     add_legend(figure, 3)

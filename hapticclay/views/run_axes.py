@@ -111,6 +111,7 @@ def shades(record: Record, axis: str) -> tuple[list[float], list[float]]:
     if isinstance(law, Smooth) and len(x) > MOST_SHADES:
         near = np.searchsorted(x, np.linspace(x[0], x[-1], MOST_SHADES))
         x, first = x[near], first[near]
-    force = law.forces_at(clay.kinds, *record.p[first].T, *SHADED)
+    x_met, y_met = record.p[first].T
+    force = law.forces_at(clay.kinds, x_met, y_met, *SHADED)
     change = np.flatnonzero(np.diff(force))
     return (0.5 * (x[change] + x[change + 1])).tolist(), force[[*change, -1]].tolist()

@@ -127,7 +127,7 @@ def yield_map_plot(chart: YieldMap) -> Figure:
         if K_limit < top:
             ax.axhline(K_limit, color=VERMILION, ls=dash, label=f"theory: {name}")
     for c in sorted(chart.cells, key=lambda c: list(PUSH_MARKS).index(c.simulated)):
-        look = dict(ls="none", ms=stroke(8), label=f"a run: {PUSH_NAMES[c.simulated]}")
+        look: Any = dict(ls="none", ms=stroke(8), label=f"a run: {PUSH_NAMES[c.simulated]}")
         if c.simulated == "limit cycle":
             look["mfc"] = shaded.cmap(colors(1e3 * c.speed))
         ax.plot(c.Fy, c.K, **look, **PUSH_MARKS[c.simulated])

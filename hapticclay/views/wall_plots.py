@@ -75,7 +75,7 @@ def regions_plot(regions: Sequence[ZRegion], walls: Sequence[VirtualWall]) -> Fi
     _draw_family(ax, regions)
     bottom = ax.get_ylim()[0]
     for i, wall in enumerate(walls):
-        look = ring(curve_look(i)["color"], 10.0) | dict(clip_on=False, zorder=6)
+        look: Any = ring(curve_look(i)["color"], 10.0) | dict(clip_on=False, zorder=6)
         look["marker"] = "o" if wall.K >= bottom else "v"
         ax.plot(wall.B, max(wall.K, bottom), **look)
     add_legend(figure, 2)

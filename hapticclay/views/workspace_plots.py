@@ -29,6 +29,7 @@ def workspace_plot(drift: Drift) -> Figure:
     for i, row in enumerate(axes):
         fitted = drift.coefficients[:, :, DRIFT_BLOCKS.index("S"), i, 0]
         top = max(float(drift.mobility[:, i].max()), float(fitted.max()))
+        mesh: Any = None
         for k, ax in enumerate(row):
             mesh = _pose_cells(ax, drift, fitted[:, k], 1.02 * top)
             if k == 0:

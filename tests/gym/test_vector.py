@@ -9,7 +9,8 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import hapticclay as hc
-from hapticclay.gym import registry, task
+import hapticclay.gym
+from hapticclay.gym import cut_line, registry, task
 
 IDS = registry.IDS
 CUT = "hapticclay/CutLine-v0"
@@ -92,6 +93,32 @@ def assert_same_infos(mine, theirs):
             mask = theirs[f"_{name}"]
             for a, b in zip(mine[name][mask], value[mask], strict=True):
                 assert np.array_equal(a, b), name
+
+
+@pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP"])
+def test_a_restart_that_was_refused_is_made_at_the_next_step(mode):
+    """The second of the scenes that follow the first episodes is refused, once."""
+    made = []
+
+    class Refusing(cut_line.CutLineTask):
+        def scenario(self, truth):
+            made.append(truth)
+            if len(made) == N + 2:
+                raise hc.ParameterError("b", truth["b"], "must be another")
+            return super().scenario(truth)
+
+    class RefusingVector(hapticclay.gym.TaskVectorEnv):
+        task_type = Refusing
+
+    env = RefusingVector(N, max_episode_steps=1, autoreset_mode=mode, engine="python")
+    env.reset(seed=0)
+    rest = np.zeros((N, 2), np.float32)
+    with pytest.raises(hc.ParameterError, match="must be another"):
+        env.step(rest), env.step(rest)
+    _, rewards, ended, cut_off, _ = env.step(rest)
+    assert not rewards.any() and not (ended | cut_off).any()  # the step that restarts them
+    assert len(made) > N + 2
+    assert env.step(rest)[3].all()
 
 
 def test_without_autoreset_a_mask_says_which_copies_begin_anew():

@@ -439,6 +439,19 @@ def test_a_folder_removed_after_the_last_file_is_an_error(tmp_path):
         sweep_study(tmp_path, progress)
 
 
+def test_a_folder_removed_while_a_file_is_written_is_an_error(tmp_path, monkeypatch):
+    out, write = tmp_path / "o", store.write_part
+
+    def slow(*given):
+        write(*given)
+        shutil.rmtree(out)
+
+    monkeypatch.setattr(store, "write_part", slow)
+    with pytest.raises(FileNotFoundError, match="was removed or replaced"):
+        sweep.run_sweep(plan(), out, workers=1)
+    assert not out.exists()
+
+
 @pytest.mark.untraced
 def test_the_command_says_in_one_line_that_its_folder_has_gone(tmp_path):
     out = tmp_path / "o"
