@@ -144,7 +144,15 @@ class Result:
         return with_schema(self.written_as, {**self.contents(), **units})
 
     def write(self, folder: Path, asked: Mapping[str, Any] | None = None) -> None:
-        """Writes folder/NAME.json: the summary, and the question that a command was asked."""
+        """Writes folder/NAME.json: the summary, and the question that a command was asked.
+
+        Args:
+            folder: where to.
+            asked: further entries of the file, by name.
+
+        Raises:
+            ParameterError: the file cannot be written.
+        """
         write_json({**self.summary(), **(asked or {})}, folder / f"{self.written_as}.json")
 
     def save(self, path: str | os.PathLike[str]) -> Path:

@@ -6,16 +6,13 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..display import one_line
 from ..errors import ParameterError, is_series, nearest, number
 from .mechanism import Mechanism
-
-if TYPE_CHECKING:
-    from .mjcf_arm import MjcfArm
 
 LIGHTEST = 1e-12  # [kg.m^2] least eigenvalue of M of a mechanism with an inverse
 TIED = 1e-6  # [rad or m] chains of a file that are open by more are closed, and it is noted
@@ -53,7 +50,7 @@ class Loaded(NamedTuple):
     notes: tuple[str, ...]
 
 
-def load(arm: MjcfArm) -> Loaded:
+def load(arm: Any) -> Loaded:
     """Loads the file of an arm, and resolves its fields.
 
     Raises:
@@ -304,7 +301,7 @@ def _check_mechanism(mechanism: Mechanism, names: Sequence[str]) -> None:
         raise ParameterError("joint", light, bound)
 
 
-def _notes(model: Any, arm: MjcfArm, mechanism: Mechanism, joints: list[int]) -> list[str]:
+def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> list[str]:
     """Sentences about what the file leaves open, and what of it takes no part."""
     names = [model.joint(j).name for j in joints]
     rotors = model.dof_armature[mechanism.dofs]

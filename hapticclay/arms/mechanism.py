@@ -48,7 +48,7 @@ class Mechanism:
     """
 
     def __init__(self, model: Any, dofs: list[int], site: tuple[str, int] | None, pose: np.ndarray):
-        import mujoco
+        from ..physics import mujoco
 
         self._mujoco, self._model, self._site = mujoco, model, site
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT

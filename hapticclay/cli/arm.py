@@ -77,7 +77,7 @@ class ArmCommand:
         arm = self._arm()
         out = self.out or console.default_folder("arm", arm)
         writable(out)
-        for found in self._answers(arm):
+        for found in list(self._answers(arm)):  # all is computed before a file is written
             console.deliver(found, out, self.figures)
         return 0
 
