@@ -30,7 +30,7 @@ from .options import (
     options_of,
     parts_of,
 )
-from .unused import Unused, refuse_unused
+from .unused import Unused
 
 NEGATIVE = re.compile(r"^-(?=\.?\d|inf$|nan$)")  # no option: it gets a space in front
 EXPERIMENT, FILE = "experiment", "file"  # and RECORD: where a scenario comes from
@@ -111,7 +111,9 @@ def read(words: Sequence[str]) -> Line:
     given = {line.options[name]: texts for name, texts in bound.arguments.items() if texts != ()}
     kinds = (line.kind, *parts_of(line.kind).values())
     rules = (rule for kind in kinds for rule in getattr(kind, "unused", ()))
-    refuse_unused((*rules, OF_SAMPLING), _given_words(line, given))
+    by_word = _given_words(line, given)
+    for rule in (*rules, OF_SAMPLING):
+        rule.refuse(by_word)
     values = {
         option.name: texts if isinstance(texts, bool) else option.value(texts)
         for option, texts in given.items()

@@ -15,7 +15,7 @@ from . import console
 from .device_options import DeviceOptions
 from .options import RecordWord
 from .run import deliver_record
-from .unused import FIGURE_WORDS, Unused, undrawn
+from .unused import FIGURE_WORDS, Unused
 
 if TYPE_CHECKING:
     from ..live.replay import Replay
@@ -95,7 +95,6 @@ class ViewCommand:
         Unused(("device-rate", "coupling"), "is of your device: give --device too", (), HAND),
         Unused(("device-plane", "device-force"), "is of a device: give one too", (), HAND + SERVER),
         Unused(("stiffness",), "is of the hand at the mouse: your device is the hand", HAND),
-        *undrawn("no-plots"),
     )
 
     def __call__(self) -> int:
