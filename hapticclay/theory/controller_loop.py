@@ -186,7 +186,7 @@ def controller_stability(
         ParameterError: the scenario has no controller, the law does not rest near the start,
             depends on the time, or is not linear around rest (quantized, saturating or
             discontinuous), or a value is out of its bounds.
-        LawFailed: the law failed.
+        RuntimeError: the law failed (`LawFailed`).
     """
     made = scenario.controller
     if made is None:
