@@ -127,10 +127,10 @@ class ControllerStability(Result):
 
     def headline(self) -> str:
         """Verdict, largest stable gain and frequency, in one line."""
-        told = "stable" if self.stable else "unstable"
+        verdict = "stable" if self.stable else "unstable"
         if not self.high:
-            return f"{told} at every gain from {self.gains[0]:.4g} to {self.gains[-1]:.4g}"
-        band = f"{told} at gain {self.gain:.4g}; stable from {self.low:.4g} to {self.high:.4g}"
+            return f"{verdict} at every gain from {self.gains[0]:.4g} to {self.gains[-1]:.4g}"
+        band = f"{verdict} at gain {self.gain:.4g}; stable from {self.low:.4g} to {self.high:.4g}"
         return band + (
             f", where it oscillates at {self.omega / math.tau:.4g} Hz" if self.omega > 0.0 else ""
         )
