@@ -96,11 +96,13 @@ def cell_text(x: Any, form: str = "") -> str:
         return "any" if x > 0.0 else "-"
     if form.endswith(" %"):
         return f"{100.0 * x:{form[:-2]}} %"
-    if isinstance(x, numbers.Integral) and not form:
+    if form:
+        return f"{x:{form}}"
+    if isinstance(x, numbers.Integral):
         return str(x)
-    if not form and MANY_DIGITS[0] <= abs(x) < MANY_DIGITS[1]:
+    if MANY_DIGITS[0] <= abs(x) < MANY_DIGITS[1]:
         return f"{x:.0f}"
-    return f"{x:{form or '.4g'}}"
+    return f"{x:.4g}"
 
 
 def brief(value: Any, /) -> str:

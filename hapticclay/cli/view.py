@@ -14,7 +14,7 @@ from ..files import writable
 from . import console
 from .device_options import DeviceOptions
 from .options import RecordWord
-from .run import deliver
+from .run import deliver_record
 from .unused import FIGURE_WORDS, Unused, undrawn
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ class ViewCommand:
         record = session.record()
         out = self.out or console.default_folder("view", record.scenario)
         figures = self.figures if self.plots else None
-        deliver(record, out, figures, paced=True)
+        deliver_record(record, out, figures, paced=True)
         self.devices.deliver(session, out, figures)
         return 0
 

@@ -119,7 +119,7 @@ class Comparison(Result):
         names = dict.fromkeys(n for x in self.files for n in x.numbers)
         columns = {n: [x.numbers.get(n, math.nan) for x in self.files] for n in names}
         known = {n: column for n, column in columns.items() if not all(map(math.isnan, column))}
-        side = {"": [*known, "outcome of its run"]}
+        side: dict[str, list[Any]] = {"": [*known, "outcome of its run"]}
         for i, x in enumerate(self.files):
             side[x.name] = [*(column[i] for column in known.values()), x.record.status]
         numbers = {"file": [x.name for x in self.files], **columns}

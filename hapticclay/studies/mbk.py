@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, NamedTuple
 
@@ -85,9 +85,9 @@ class DeviceMBK(Result):
         gaps = [abs(x.y / x.exact - 1.0) for some in self.found.values() for x in some]
         return max(gaps, default=math.nan)
 
-    def tables(self) -> dict[str, dict[str, Sequence[Any]]]:
+    def tables(self) -> dict[str, dict[str, list[Any]]]:
         """The numbers of the figures, by table, columns headed with their units."""
-        out: dict[str, dict[str, Sequence[Any]]] = {}
+        out: dict[str, dict[str, list[Any]]] = {}
         for plane, region in self.regions.items():
             a, b = (f"{name} [{MBK_UNITS[name]}]" for name in PLANES[plane])
             low, high = region.low.tolist(), region.high.tolist()
@@ -183,10 +183,10 @@ class ArmMBK(Result):
         """Largest relative difference of a mass found by runs from the exact one; NaN if none."""
         return max((abs(r.y / r.exact - 1.0) for r in self.found), default=math.nan)
 
-    def tables(self) -> dict[str, dict[str, Sequence[Any]]]:
+    def tables(self) -> dict[str, dict[str, list[Any]]]:
         """The numbers of the figure, by table, columns headed with their units."""
         M, B = "least M [kg]", "B [N.s/m]"
-        out: dict[str, dict[str, Sequence[Any]]] = {
+        out: dict[str, dict[str, list[Any]]] = {
             name: {B: b.tolist(), M: m.tolist()}
             for name, (m, b) in (("this hand", self.nominal), ("hand box", self.worst))
         }
