@@ -133,8 +133,8 @@ def arm_at(q: tuple[float, float], arm: Arm = PAPER) -> tuple[np.ndarray, np.nda
 def timestep_view(model: mujoco.MjModel) -> np.ndarray:
     """A view of model.opt.timestep, shape (1,).
 
-    The engine shows its gravity as an array, which stands in the same record of options, behind the
-    timestep; where, is found by two values that are written there.
+    The engine shows its gravity as an array, which lies in the same record of options, after the
+    timestep. Two values written to the timestep find where that lies.
     """
     start = model.opt.gravity.ctypes.data - 8 * OPTIONS
     memory: Any = (ctypes.c_double * OPTIONS).from_address(start)
