@@ -10,6 +10,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from tabulate import tabulate
+
 import hapticclay as hc
 from hapticclay import files
 
@@ -59,8 +61,23 @@ def machine() -> list[str]:
 
 
 def number(x: float | None) -> str:
-    """Format a figure of a table; "-" for None."""
-    return "-" if x is None else format(x, ".1e")
+    """Format a figure of a table to two digits, as 3.4e-5; "-" for None."""
+    return "-" if x is None else plain(format(x, ".1e"))
+
+
+def plain(text: str) -> str:
+    """A number in exponential notation without the zero and the plus of its exponent."""
+    return text.replace("e-0", "e-").replace("e+0", "e").replace("e+", "e")
+
+
+def milliseconds(seconds: float | None) -> str:
+    """Format a run time in ms to two digits; "-" for None."""
+    return "-" if seconds is None else format(float(f"{1e3 * seconds:.2g}"), "g")
+
+
+def table(cells: list[Any], head: list[str] | str = "keys") -> str:
+    """A Markdown table; text cells stay as they are."""
+    return tabulate(cells, head, tablefmt="github", disable_numparse=True)
 
 
 def write(out: Path, name: str, found: dict[str, Any]) -> dict[str, Any]:

@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
@@ -226,7 +225,6 @@ def sections(data: dict[str, Any]) -> list[str]:
         f"force after {FELT:g} s",
     ]
     return [
-        "## Hits",
         f"Clay of {', '.join(format(b, 'g') for b in data['clays'])} N.s/m: a cut from rest, a "
         "hit at 0.3 m/s and its rebound, a hit at 0.5 m/s with a hand, three layers of 1 mm (b, "
         "b/10, b), and grazing contact at about 1 cm/s. Largest error over all clays of the "
@@ -234,8 +232,26 @@ def sections(data: dict[str, Any]) -> list[str]:
         f"relative error of the force on the hand {FELT:g} s after the hit. The reference is the "
         "matrix exponential. Refused: the explicit method would need more than 1000 steps per "
         "sample.",
-        tabulate(cells, head, tablefmt="github", disable_numparse=True),
+        common.table(cells, head),
     ]
+
+
+def conclusions(data: dict[str, Any]) -> list[str]:
+    """The largest error of a border-crossing time at the control sample's step."""
+    found = [r["crossing"] for r in data["rows"] if r["setting"] == TS and r["method"][0] == "f"]
+    if not found or None in found:
+        return []
+    least, most = (format(f(data["clays"]), "g") for f in (min, max))
+    return [
+        f"Hits. In clay of {least} to {common.plain(most)} N.s/m, with the default step of "
+        f"{1e3 * TS:g} ms, border-crossing times are within {common.number(max(found))} s of the "
+        "exact ones."
+    ]
+
+
+def tables(data: dict[str, Any]) -> list[dict[str, Any]]:
+    """All measured rows, for the CSV file."""
+    return data["rows"]
 
 
 def main(out: Path = Path("out/bench"), quick: bool = False) -> dict[str, Any]:

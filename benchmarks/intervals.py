@@ -126,7 +126,7 @@ def page(found: list[dict[str, Any]]) -> str:
                 f"{identification.REALISATIONS} runs. Without force noise, except where the head "
                 "of the column names one. By chance alone, two thirds of the shares are within "
                 f"{math.sqrt(0.95 * 0.05 / n):.3f} of 0.95. The columns share the runs of a seed. "
-                "Made by `benchmarks/intervals.py`; do not edit.",
+                "Made by `benchmarks/intervals.py`.",
                 tabulate(
                     [[*k, *v] for k, v in cells.items()],
                     ["block", "axis", "coefficient", *SENSORS],

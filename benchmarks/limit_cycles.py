@@ -101,7 +101,7 @@ def page(rows: list[dict[str, Any]], steps: tuple[float, ...] = STEPS) -> str:
                 "describing function. The next columns are the deviation from it of the exact "
                 f"cycle (matrix exponentials) and of a run at {1e3 * steps[0]:g} ms, and the "
                 "deviation of the run from the exact cycle. Made by "
-                "`benchmarks/limit_cycles.py`; do not edit.",
+                "`benchmarks/limit_cycles.py`.",
                 f"Where the prediction is trusted, runs are within {100.0 * worst[0]:.2g} % "
                 f"of its amplitude and {100.0 * worst[1]:.2g} % of its frequency.",
                 tabulate(cells, head, tablefmt="github", disable_numparse=True),

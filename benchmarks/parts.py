@@ -18,7 +18,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay.kernel import engine, native
@@ -160,10 +159,7 @@ TITLES = {
 
 def sections(data: dict[str, Any]) -> list[str]:
     """The paragraphs of the page."""
-    out = [
-        "## What each part costs",
-        "A part that a scene lacks costs nothing.",
-    ]
+    out = ["A part that a scene lacks costs nothing."]
     for name, title in TITLES.items():
         if name not in data:
             continue
@@ -171,8 +167,18 @@ def sections(data: dict[str, Any]) -> list[str]:
             {"part": r["part"], "over plain": f"{r['ratio']:.2f}", "us": f"{r['us']:.2f}"}
             for r in data[name]
         ]
-        out += [title, tabulate(cells, headers="keys", tablefmt="github", disable_numparse=True)]
+        out += [title, common.table(cells)]
     return out
+
+
+def conclusions(data: dict[str, Any]) -> list[str]:
+    """The part that costs most in a compiled step."""
+    found = data.get("native", data["loop"])
+    most = max(found, key=lambda r: r["ratio"])
+    return [
+        "Parts. A part that a scene lacks costs nothing; the most expensive one "
+        f"({most['part']}) makes a step {most['ratio']:.2f} times as long."
+    ]
 
 
 def main(

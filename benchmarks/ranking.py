@@ -10,18 +10,17 @@ import itertools
 import statistics
 from typing import Any
 
-from tabulate import tabulate
-
 from . import common
 
 ASKED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # errors, in the unit of the kind
 # methods that model hardware; their error is the hold's, no matter how well they are computed
 SAMPLED = "sampled"
+RUN_TIME = "run time [ms per simulated s]"
 
 
 def setting_text(setting: float | str) -> str:
     """A setting as the tables print it."""
-    return setting if isinstance(setting, str) else format(setting, "g")
+    return setting if isinstance(setting, str) else common.plain(format(setting, "g"))
 
 
 def recommend(
@@ -86,21 +85,30 @@ def leaders(rows: list[dict], kind: str = "crossing") -> list[dict[str, Any]]:
 
 
 def who_leads(found: list[dict[str, Any]], unit: str = "s") -> str:
-    """One line on which package leads in which span of errors."""
-    spans = [list(run) for _, run in itertools.groupby(found, lambda x: x["package"])]
-    texts = [
-        f"{s[0]['package']} at {s[0]['asked']:.0e}"
-        + (f" to {s[-1]['asked']:.0e} {unit}" if s[1:] else f" {unit}")
-        for s in spans
-    ]
-    return "Fastest, by requested error: " + "; ".join(texts) + "."
+    """One sentence on which package is fastest in which span of errors, and by what factor."""
+    parts = []
+    for _, run in itertools.groupby(found, lambda x: x["package"]):
+        span = list(run)
+        asked = list(dict.fromkeys(error_text(x["asked"]) for x in (span[0], span[-1])))
+        part = f"{span[0]['package']} at {' to '.join(asked)} {unit}"
+        factors = [x["factor"] for x in span if x["factor"]]
+        if factors:
+            bounds = list(dict.fromkeys(f"{f(factors):.1f}" for f in (min, max)))
+            part += f" (the next package takes {' to '.join(bounds)} times as long)"
+        parts.append(part)
+    return "Fastest, by requested error: " + "; ".join(parts) + "."
+
+
+def error_text(x: float) -> str:
+    """A requested error, a power of ten."""
+    return common.plain(format(x, ".0e"))
 
 
 def table_of_leaders(found: list[dict[str, Any]], unit: str = "s") -> str:
     """The leaders, one line for each asked error."""
     cells = [
         [
-            format(x["asked"], ".0e"),
+            error_text(x["asked"]),
             x["first"],
             x["next"],
             "-" if x["factor"] is None else f"{x['factor']:.1f}",
@@ -111,55 +119,31 @@ def table_of_leaders(found: list[dict[str, Any]], unit: str = "s") -> str:
         f"requested error [{unit}]",
         "fastest",
         "fastest of another package",
-        "run time over that of the fastest",
+        "its run time over that of the fastest",
     ]
-    return tabulate(cells, head, tablefmt="github", disable_numparse=True)
+    return common.table(cells, head)
+
+
+def setting_cells(x: dict[str, Any]) -> list[str]:
+    """Method, setting, error and run time of a recommended setting."""
+    method = x["method"].partition(", ")[0] if x["package"] == "hapticclay" else x["method"]
+    times = common.number(x["error"]), common.milliseconds(x["wall"])
+    return [method, setting_text(x["setting"]), *times]
 
 
 def table_of_settings(found: list[dict[str, Any]], unit: str = "s") -> str:
-    """The recommended settings, one line for each asked error."""
-    cells = [
-        [
-            format(x["asked"], ".0e"),
-            x["package"],
-            x["method"],
-            setting_text(x["setting"]),
-            common.number(x["error"]),
-            common.number(x["wall"]),
-        ]
-        for x in found
-    ]
-    head = [
-        f"requested error [{unit}]",
-        "package",
-        "method",
-        "setting",
-        f"error [{unit}]",
-        "time per simulated s",
-    ]
-    return tabulate(cells, head, tablefmt="github", disable_numparse=True)
+    """The recommended settings: a line for each, with the errors for which it is the fastest."""
+    cells = spans([[error_text(x["asked"]), *setting_cells(x)] for x in found])
+    head = [f"requested error [{unit}]", "method", "step [s]", f"error [{unit}]", RUN_TIME]
+    return common.table(cells, head)
 
 
-def table_of_rows(rows: list[dict], heads: dict[str, str]) -> str:
-    """All rows of a problem.
-
-    Args:
-        rows: as above.
-        heads: of the columns of errors, by kind.
-    """
-    cells = [
-        [
-            r["package"],
-            r["method"],
-            setting_text(r["setting"]),
-            *(common.number(r[k]) for k in heads),
-            common.number(r["wall"]),
-            r["note"],
-        ]
-        for r in rows
+def spans(cells: list[list[str]]) -> list[list[str]]:
+    """Rows of a table, those that differ in their first cell alone made one."""
+    groups = [list(group) for _, group in itertools.groupby(cells, lambda x: x[1:])]
+    return [
+        [" to ".join(dict.fromkeys((group[0][0], group[-1][0]))), *group[0][1:]] for group in groups
     ]
-    head = ["package", "method", "setting", *heads.values(), "time per simulated s", "note"]
-    return tabulate(cells, head, tablefmt="github", disable_numparse=True)
 
 
 def dominance(rows: list[dict], kind: str = "crossing") -> list[dict]:

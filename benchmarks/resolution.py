@@ -114,7 +114,7 @@ def page(rows: list[dict[str, Any]]) -> str:
                 f"{100 * WITHIN[0]:g} to {100 * WITHIN[1]:g} cm, against b. Velocity is the "
                 "difference of encoder angles over the window; the fifth column is the velocity "
                 "of one count over the window as a share of the speed. The mean error is that of "
-                "mean fe over mean v. Made by `benchmarks/resolution.py`; do not edit.",
+                "mean fe over mean v. Made by `benchmarks/resolution.py`.",
                 tabulate(cells, head, tablefmt="github", disable_numparse=True),
                 "## Machine",
                 "\n".join(f"- {x}" for x in common.machine()),

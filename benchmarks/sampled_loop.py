@@ -2,7 +2,7 @@
 
     python -m benchmarks.sampled_loop [--quick] [--out DIR]
 
-Writes sampled_loop.json and one PNG a problem; benchmarks.bench makes the page.
+Writes sampled_loop.json and one PNG a problem; benchmarks.pages makes the page.
 """
 
 from __future__ import annotations
@@ -125,11 +125,12 @@ def problem(render: str, quick: bool) -> study.Problem:
     )
 
 
-sections = study.sections
+sections, conclusions = study.sections, study.conclusions
+figures, tables = study.figures, study.tables
 
 
 def main(out: Path = Path("out/bench"), quick: bool = False) -> dict[str, Any]:
-    """Measures, writes the data and the diagrams; returns the data."""
+    """Measures, writes the data; returns it."""
     problems = [problem(render, quick) for render in RENDERED]
     return study.main("sampled_loop", problems, OMISSIONS, out, quick)
 

@@ -15,8 +15,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-from tabulate import tabulate
-
 from hapticclay.files import atomic
 from hapticclay.studies import store, store_runs
 from hapticclay.studies.sampling import parse_grid
@@ -138,10 +136,9 @@ def sections(data: dict[str, Any]) -> list[str]:
             {k.replace("_", " "): (f"{x:.3g}" if x < 1e3 else f"{x:.0f}") for k, x in r.items()}
             for r in found
         ]
-        return tabulate(cells, headers="keys", tablefmt="github", disable_numparse=True)
+        return common.table(cells)
 
     return [
-        "## Scaling",
         f"A sweep of {data['runs']} runs in {data['chunks']} chunks on dask workers of one thread, "
         "up to all "
         f"{data['cores']} cores of this machine: measured, medians of ratios.",
@@ -152,6 +149,15 @@ def sections(data: dict[str, Any]) -> list[str]:
         f"the shared folder, {1e-3 * data['chunk_bytes']:.0f} kB per chunk. With chunks of "
         f"{data['asked_s']:.0f} s that gives, at best:",
         table(data["projection"]),
+    ]
+
+
+def conclusions(data: dict[str, Any]) -> list[str]:
+    """The speed-up that was measured."""
+    return [
+        f"Scaling. A sweep on {r['workers']} dask workers is {r['speedup']:.2f} times as fast as "
+        "on one."
+        for r in data["rows"][-1:]
     ]
 
 

@@ -5,17 +5,17 @@ clay gave it in full.
 
     python -m benchmarks.stiffness [--dt 3.6e-4] [--out DIR]
 
-The reference is the arm in joint space under Radau. Writes stiffness.json; benchmarks.bench makes
+The reference is the arm in joint space under Radau. Writes stiffness.json; benchmarks.pages makes
 the page.
 """
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay.kernel.engine import warnings_caught
@@ -86,14 +86,32 @@ def sections(data: dict[str, Any]) -> list[str]:
         line += [common.number(r["rebound"]), common.number(r["felt"])]
         cells.append(line)
     return [
-        "## Stiff clay",
         f"The handle runs into clay of damping b at 0.1 m/s, in steps of {data['dt']:g} s. "
         f"Position error after {T:g} s, and peak of v² over that of the exact motion (1 is "
         "exact), against the arm solved by Radau. Broken: an error above 1 mm, ten times the "
         "energy, or not a number. Rebound: error of the time at which a handle that hit the clay "
         "at 0.2 m/s leaves it; force: relative error of the clay's force after the hit; both "
         "against the matrix exponential.",
-        tabulate(cells, head, tablefmt="github", disable_numparse=True),
+        common.table(cells, head),
+    ]
+
+
+def conclusions(data: dict[str, Any]) -> list[str]:
+    """Up to which damping hapticclay and plain MuJoCo hold."""
+    rows = data["rows"]
+    labels = [k for k in rows[0] if isinstance(rows[0][k], dict)]
+
+    def largest(label: str) -> str:
+        held = itertools.takewhile(lambda r: not r[label]["broken"], rows)
+        return common.plain(format(max((r["b"] for r in held), default=0.0), "g"))
+
+    others = " and ".join(
+        f"{largest(x)} N.s/m ({x.removeprefix('plain, ')})" for x in labels if x != "default"
+    )
+    return [
+        f"Stiff clay. At a step of {1e3 * data['dt']:g} ms hapticclay's default method holds to "
+        f"{largest('default')} N.s/m, MuJoCo alone to {others}; the stiffest clay tried has "
+        f"{common.plain(format(rows[-1]['b'], 'g'))} N.s/m."
     ]
 
 

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 import hapticclay as hc
-from hapticclay import files
 from hapticclay.kernel import native
 
 from . import common, diagrams, ranking
@@ -168,7 +167,7 @@ def figure_name(problem: str) -> str:
 def main(
     name: str, problems: list[Problem], omissions: list[str], out: Path, quick: bool
 ) -> dict[str, Any]:
-    """Measures problems, writes the data and a diagram of each; returns the data.
+    """Measures problems, writes the data; returns it.
 
     Args:
         name: of the part of the page.
@@ -179,31 +178,30 @@ def main(
     """
     rows, texts = [], {}
     for x in problems:
-        found, notes = measure(x, quick, 2 if quick else 5)
+        found, reference = measure(x, quick, 2 if quick else 5)
         rows += found
-        texts[x.name] = [x.about, notes]
-        with files.atomic(out / figure_name(x.name)) as f:
-            diagrams.draw(found, x.name, ERRORS).savefig(f, format="png")
+        texts[x.name] = [x.about, reference]
     return common.write(out, name, {"omissions": omissions, "texts": texts, "rows": rows})
 
 
 # ---- the page ------------------------------------------------------------------------------------
 
 
-def least_errors(rows: list[dict[str, Any]]) -> str:
-    """The least error that each package reached at any run time, and who alone goes further."""
+def least_errors(rows: list[dict[str, Any]]) -> dict[str, float]:
+    """The least error that each package reached at any run time."""
     least: dict[str, float] = {}
     for r in rows:
         if r[POSITION] is not None:
             least[r["package"]] = min(r[POSITION], least.get(r["package"], np.inf))
-    errors = (f"{package} {common.number(x)} {UNIT}" for package, x in least.items())
-    out = f"Least error with any of the settings: {', '.join(errors)}."
+    return least
+
+
+def who_goes_further(least: dict[str, float]) -> str:
+    """A sentence, after a space, on the packages that went below hapticclay's least error."""
     mine = least.get("hapticclay", np.inf)
     further = [package for package, x in least.items() if x < mine]
-    if further:
-        only = " and ".join(further)
-        out += f" Only {only} went below the {common.number(mine)} {UNIT} of hapticclay."
-    return out
+    only = " and ".join(further)
+    return f" Only {only} went below {common.number(mine)} {UNIT}." if further else ""
 
 
 def ranked(rows: list[dict[str, Any]]) -> list[str]:
@@ -215,8 +213,8 @@ def ranked(rows: list[dict[str, Any]]) -> list[str]:
 def shown(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The rows of the table: of methods with two numbers to set, those on the front alone."""
     out = []
-    for key in dict.fromkeys((r["package"], r["method"]) for r in rows):
-        mine = [r for r in rows if (r["package"], r["method"]) == key]
+    for key in dict.fromkeys((r["problem"], r["package"], r["method"]) for r in rows):
+        mine = [r for r in rows if (r["problem"], r["package"], r["method"]) == key]
         known = [r for r in mine if r[POSITION] is not None]
         out += diagrams.line(known, POSITION) if isinstance(mine[0]["setting"], str) else mine
     return out
@@ -228,12 +226,15 @@ def is_of_both(data: dict[str, Any]) -> bool:
 
 
 def sections(data: dict[str, Any]) -> list[str]:
-    """The paragraphs of a part of the page, a section a problem."""
+    """The paragraphs of the page, a section a problem."""
     text = []
-    for problem, notes in data["texts"].items():
+    for problem, about in data["texts"].items():
         rows = [r for r in data["rows"] if r["problem"] == problem]
-        text += [f"## {problem.capitalize()}", *notes]
+        text += [f"## {problem.capitalize()}", *about]
         text += [f"![work-precision diagram]({figure_name(problem)})", *ranked(rows)]
+        least = least_errors(rows)
+        reached = (f"{package} {common.number(x)} {UNIT}" for package, x in least.items())
+        further = who_goes_further(least)
         single = [r for r in rows if not r["method"].endswith(THROUGHOUT)]
         if len(single) < len(rows):
             text += [
@@ -245,7 +246,26 @@ def sections(data: dict[str, Any]) -> list[str]:
         text += [
             "hapticclay's fastest setting for each requested error:",
             ranking.table_of_settings(ranking.recommend(rows, {"hapticclay"}, POSITION), UNIT),
-            least_errors(rows),
-            ranking.table_of_rows(shown(rows), {POSITION: f"{POSITION} [{UNIT}]"}),
+            f"Least error with any of the settings: {', '.join(reached)}.{further}",
         ]
     return text
+
+
+def conclusions(data: dict[str, Any]) -> list[str]:
+    """A sentence for each problem: who is fastest, by requested error."""
+    out = []
+    for problem in data["texts"]:
+        rows = [r for r in data["rows"] if r["problem"] == problem]
+        lead = ranking.who_leads(ranking.leaders(rows, POSITION), UNIT)
+        out.append(f"{problem.capitalize()}. {lead}{who_goes_further(least_errors(rows))}")
+    return out
+
+
+def figures(data: dict[str, Any]) -> dict[str, Any]:
+    """The diagram of each problem, by file."""
+    return {figure_name(x): diagrams.draw(data["rows"], x, ERRORS) for x in data["texts"]}
+
+
+def tables(data: dict[str, Any]) -> list[dict[str, Any]]:
+    """All measured rows, for the CSV file."""
+    return shown(data["rows"])

@@ -4,7 +4,7 @@
 
 Ratios hold on a noisy machine, microseconds do not. Short runs, of 100 steps, are 1e6, and 1e4
 where it is quick. --full takes minutes more: 16384 runs in a batch, 100 000 runs for linearity, and
-a stability map. Writes throughput.json; benchmarks.bench
+a stability map. Writes throughput.json; benchmarks.pages
 makes the page.
 """
 
@@ -21,7 +21,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay.files import atomic
@@ -403,7 +402,7 @@ TITLES = {
 
 def sections(data: dict[str, Any]) -> list[str]:
     """The paragraphs of the page."""
-    out = ["## Throughput"]
+    out = []
     for name, title in TITLES.items():
         if data.get(name):
             cells = [
@@ -413,10 +412,27 @@ def sections(data: dict[str, Any]) -> list[str]:
                 }
                 for r in data[name]
             ]
-            out += [
-                title,
-                tabulate(cells, headers="keys", tablefmt="github", disable_numparse=True),
-            ]
+            out += [title, common.table(cells)]
+    return out
+
+
+def conclusions(data: dict[str, Any]) -> list[str]:
+    """The cost of a step beside the engine's, and the largest number of runs."""
+    out = []
+    found = [r["native_recorded"] for r in data.get("rows", ()) if r.get("native_recorded")]
+    if found:
+        bounds = dict.fromkeys(f"{f(found):.2f}" for f in (min, max))
+        out.append(
+            f"Throughput. A compiled step of the whole loop, every sample recorded, takes "
+            f"{' to '.join(bounds)} times as long as a bare `mj_step` of the same model."
+        )
+    if data.get("columns"):
+        x = max(data["columns"], key=lambda r: r["runs"])
+        out.append(
+            f"Many runs. {x['runs']:,} runs of {SHORT_STEPS} steps in one call take "
+            f"{x['over_floor_cpu']:.2f} times the processor time of as many bare steps, "
+            f"{x['runs_a_second']:,.0f} runs a second."
+        )
     return out
 
 

@@ -2,7 +2,7 @@
 
     python -m benchmarks.work_precision [--quick] [--out DIR]
 
-Writes work_precision.json and one PNG a job; benchmarks.bench makes the page.
+Writes work_precision.json; benchmarks.pages makes the page and the diagrams.
 """
 
 from __future__ import annotations
@@ -14,23 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tabulate import tabulate
 
 import hapticclay as hc
-from hapticclay import files
 
 from . import common, diagrams
 from . import reference as hybrid
 from .problems import EDGES, PROBLEMS, Result, reference
-from .ranking import (
-    dominance,
-    leaders,
-    recommend,
-    table_of_leaders,
-    table_of_rows,
-    table_of_settings,
-    who_leads,
-)
+from .ranking import dominance, leaders, table_of_leaders, who_leads
+from .study import figure_name
 from .turns import take_turns
 
 PEERS = (
@@ -47,12 +38,6 @@ ERRORS = {
     "position": "largest error of the handle position [m]",
     "force": "root mean square error of the clay force along x [N]",
     "b": "error of b fitted to the cut's speed [N.s/m]",
-}
-HEADS = {
-    "crossing": "crossing [s]",
-    "position": "position [m]",
-    "force": "force [N]",
-    "b": "b [N.s/m]",
 }
 HYBRID_END = 0.9  # [s] end of the runs against the hybrid system, beyond the first border
 
@@ -130,48 +115,52 @@ def measure(
     return rows, omissions
 
 
-def draw(rows: list[dict], problem: str):
-    """The four work-precision diagrams of a job."""
-    return diagrams.draw(rows, problem, ERRORS)
-
-
 def sections(data: dict[str, Any]) -> list[str]:
     """The paragraphs of the page."""
     rows = data["rows"]
-    parts = [
-        "## Error against run time",
+    found = leaders(rows)
+    text = [
         "Every package steps the same closed loop: the nonlinear arm, servo, compensator and clay "
-        "on both axes, to the "
-        "end of the path. Errors are those against the arm in joint space, solved by DOP853 "
-        "at 1e-12 with borders as events. "
-        "The setting is a step [s], or a relative tolerance for adaptive methods.",
-        "### Recommended settings",
-        "The fastest setting whose border-crossing times stay within the requested error on each "
-        "of the three cuts.",
-        table_of_settings(recommend(rows)),
-        "With a MuJoCo model in the loop:",
-        table_of_settings(recommend(rows, {"hapticclay", "MuJoCo, plain"})),
-        "### Fastest package",
-        who_leads(leaders(rows)),
-        table_of_leaders(leaders(rows)),
-        "Settings of each package for which one setting of hapticclay (continuous time) is at "
-        "least as good in both error and run time.",
-        tabulate(dominance(rows), headers="keys", tablefmt="github"),
-        "### Sampled control",
+        "on both axes, to the end of the path. Errors are those against the arm in joint space, "
+        "solved by DOP853 at 1e-12 with borders as events. The setting is a step [s], or a "
+        "relative tolerance for adaptive methods.",
+        "## Fastest package",
+        who_leads(found),
+        table_of_leaders(found),
+        "How many settings of each package are no better than one setting of hapticclay in "
+        "continuous time, in error and in run time:",
+        common.table(dominance(rows)),
+        "## Sampled control",
         "hapticclay's rows `sampled` belong to another system, that of the hardware: measured "
-        "and held every Ts, here Ts = dt. In the diagrams they show the delay of the hold, half "
+        "and held every Ts, here Ts = dt. Beside the others they show the delay of the hold, half "
         "a sample, and borders noticed up to a sample late, both first-order in Ts. This is a "
-        "property of the hardware, not a numerical error. The numerical error is that against "
-        "the hybrid system, exact between samples (default cut, largest position error up to "
-        f"{HYBRID_END:g} s):",
+        "property of the hardware, not a numerical error; so the diagrams leave them out. The "
+        "numerical error is that against the hybrid system, exact between samples (default cut, "
+        f"largest position error up to {HYBRID_END:g} s):",
         table_of_hybrid(data["hybrid"]),
+        "## Diagrams",
+        "A line is the best of all settings and methods of a package. Shown are the six packages "
+        "that keep border-crossing times within 1e-3 s in the least time.",
     ]
     for problem in dict.fromkeys(r["problem"] for r in rows):
-        mine = [r for r in rows if r["problem"] == problem]
-        name = problem.replace(" ", "_")
-        parts += [f"### {problem.capitalize()}", f"![work-precision diagrams]({name}.png)"]
-        parts.append(table_of_rows(mine, HEADS))
-    return parts
+        text.append(f"![{problem}: error over run time]({figure_name(problem)})")
+    return text
+
+
+def conclusions(data: dict[str, Any]) -> list[str]:
+    """Who is fastest in the cuts."""
+    return [f"Cuts, error of the border-crossing times. {who_leads(leaders(data['rows']))}"]
+
+
+def figures(data: dict[str, Any]) -> dict[str, Any]:
+    """The diagrams of each job, by file."""
+    jobs = dict.fromkeys(r["problem"] for r in data["rows"])
+    return {figure_name(x): diagrams.draw(data["rows"], x, ERRORS) for x in jobs}
+
+
+def tables(data: dict[str, Any]) -> list[dict[str, Any]]:
+    """All measured rows, for the CSV file."""
+    return data["rows"]
 
 
 def against_hybrid(quick: bool) -> list[dict[str, Any]]:
@@ -201,26 +190,19 @@ def against_hybrid(quick: bool) -> list[dict[str, Any]]:
 
 
 def table_of_hybrid(rows: list[dict[str, Any]]) -> str:
+    """Errors of sampled runs."""
     cells = [
-        [
-            x["render"],
-            format(x["Ts"], "g"),
-            common.number(x["hybrid"]),
-            common.number(x["continuous"]),
-        ]
+        [x["render"], format(x["Ts"], "g"), *map(common.number, (x["hybrid"], x["continuous"]))]
         for x in rows
     ]
     head = ["render", "Ts [s]", "against the hybrid system [m]", "against continuous time [m]"]
-    return tabulate(cells, head, tablefmt="github", disable_numparse=True)
+    return common.table(cells, head)
 
 
 def main(out: Path = Path("out/bench"), quick: bool = False) -> dict[str, Any]:
-    """Measures, writes the data and the diagrams; returns the data."""
+    """Measures, writes the data; returns it."""
     problems = list(PROBLEMS)[: 1 if quick else None]
     rows, omissions = measure(quick, problems, rounds=2 if quick else 5)
-    for problem in problems:
-        with files.atomic(out / f"{problem.replace(' ', '_')}.png") as f:
-            draw(rows, problem).savefig(f, format="png")
     found = {"omissions": omissions, "rows": rows, "hybrid": against_hybrid(quick)}
     return common.write(out, "work_precision", found)
 

@@ -3,7 +3,7 @@ regularised law.
 
     python -m benchmarks.yielding_clay [--quick] [--out DIR]
 
-Writes yielding_clay.json and one PNG; benchmarks.bench makes the page.
+Writes yielding_clay.json and one PNG; benchmarks.pages makes the page.
 """
 
 from __future__ import annotations
@@ -126,11 +126,12 @@ def problem(quick: bool) -> study.Problem:
     )
 
 
-sections = study.sections
+sections, conclusions = study.sections, study.conclusions
+figures, tables = study.figures, study.tables
 
 
 def main(out: Path = Path("out/bench"), quick: bool = False) -> dict[str, Any]:
-    """Measures, writes the data and the diagram; returns the data."""
+    """Measures, writes the data; returns it."""
     return study.main("yielding_clay", [problem(quick)], OMISSIONS, out, quick)
 
 

@@ -84,7 +84,7 @@ def page(rows: Sequence[dict[str, Any]]) -> str:
                 "with an encoder fc = 0.02 N, and the filter's and window's encoder reads 20 um. "
                 "Without friction and encoder a wall is stable if the oscillation of a run decays, "
                 "with them if it comes to rest within 1 um after a push of 1 N at 50 mm/s. Made by "
-                "`benchmarks/zwidth.py`; do not edit.",
+                "`benchmarks/zwidth.py`.",
                 f"Runs are within {100.0 * max(gaps, default=math.nan):.2g} % of the exact line of "
                 f"the linear loop; {len(below)} were unstable below a line that is sufficient.",
                 tabulate(cells, head, tablefmt="github", disable_numparse=True),

@@ -50,14 +50,18 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.intersphinx",
+    "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
+    "sphinx-mathjax-offline",  # MathJax is part of the site, which needs no network
     "sphinx_gallery.gen_gallery",
 ]
 exclude_patterns = ["templates", "gallery/**/*.ipynb", "**/sg_execution_times.rst"]
 highlight_language = "none"  # indented blocks are equations and commands
 default_role = "py:obj"  # `name` in a docstring links to the name, where there is one
 myst_heading_anchors = 4
+myst_enable_extensions = ["dollarmath"]
+myst_fence_as_directive = ["math"]  # as GitHub writes display formulas
 suppress_warnings = ["config.cache"]  # of functions in sphinx_gallery_conf
 nitpicky = True
 nitpick_ignore_regex = [
@@ -67,6 +71,7 @@ nitpick_ignore_regex = [
     ("py:class", r".*\.Exchanged|Chart"),  # what logs and labs hold
     ("py:class", r".*\.(StabilityMap|YieldMap)"),  # made by the command line
     ("py:class", r"gymnasium\..*"),  # by their private modules
+    ("py:class", r"collections\.abc\.Callable\[\[\]"),  # beside a default that is a function
 ]
 linkcheck_timeout = 20
 
@@ -239,7 +244,8 @@ def plain_defaults(app, what, name, thing, options, signature, returned):
         signature: the text of its arguments.
         returned: the text of what it returns.
     """
-    spelled = (signature or "").replace("<factory>", "...").replace("np.ndarray", "numpy.ndarray")
+    spelled = (signature or "").replace("<factory>", "...")
+    spelled = re.sub(r"(?<![\w.])(?:np\.)?ndarray", "numpy.ndarray", spelled)
     return re.sub(r"(?<!=) \[[^\]]*\]", "", spelled) or None, returned
 
 
@@ -275,10 +281,16 @@ def plain_text(app, what: str, name: str, thing, options, lines: list[str]) -> N
         elif line and not last and out and not code and not section(out):
             out += ["::", ""]  # an indented block outside of a section
             code = True
-        out.append(line if code else re.sub(r"([|*\\])", r"\\\1", line))
+        out.append(line if code else typeset_unit(re.sub(r"([|*\\])", r"\\\1", line)))
     if what in ("property", "attribute") and out:  # "The speed: ..." has no type to split off
         out[0] = out[0].replace(":", COLON)
     lines[:] = out
+
+
+def typeset_unit(text: str) -> str:
+    """Units with a centred dot and raised powers, as figures and pages have them."""
+    text = re.sub(r"\b(N|kg)\.(?=[sm]\b)", r"\1·", text)
+    return re.sub(r"(?<=[ms])\^2\b", "²", text)
 
 
 def section(lines: list[str]) -> bool:

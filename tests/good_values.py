@@ -56,7 +56,7 @@ def good_values(folder):
         "Servo": {"G": hc.SecondOrder(1.0, 1.0, 1.0), "S": hc.SecondOrder(1.0, 1.0, 1.0)},
         "Spring": {"start": 0.0, "end": 0.1, "stiffness": 10.0},
         "Step": {"value": (1.0, 0.0), "time": 0.0}, "Sum": {"parts": (hc.Constant((1.0, 0.0)),)},
-        "wall_borders": {"plane": "B-K", "x": 1.0}, "polygon": {"turn": (1, 2)},
+        "wall_borders": {"plane": "damper-stiffness", "x": 1.0}, "polygon": {"turn": (1, 2)},
         "zigzag": {"amplitude": 1e-4}, "taken_energy": {"path": zigzag},
         "parse_grid": {"text": "b=1:9:2"},
         "Sweep": {"experiment": "constant", "vary": swept.vary},

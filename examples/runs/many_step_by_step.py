@@ -3,7 +3,7 @@ Many hands at once, step by step
 ================================
 
 ``hc.SimulationBatch`` advances many runs in one call, each under its own force. Here 21 hands pull
-with 1 to 8 N minus 30 N.s/m times their speed, which they measure every 10 ms. The clay begins at 5
+with 1 to 8 N minus 30 N·s/m times their speed, which they measure every 10 ms. The clay begins at 5
 cm.
 """
 

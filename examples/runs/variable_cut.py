@@ -2,7 +2,7 @@
 A cut through clay that grows
 =============================
 
-The paper's cut along both axes: beyond 5 cm the clay is harder, and in x it grows by 30 N.s/m each
+The paper's cut along both axes: beyond 5 cm the clay is harder, and in x it grows by 30 N·s/m each
 second (Eq. 25). The speed drops at the border and then keeps falling as K f/(10 + K b(t)).
 """
 

@@ -3,7 +3,7 @@ Passive on x, not on y
 ======================
 
 A loop is stable with every passive hand if its impedance is passive: Re Z(jω) at or above 0. At b =
-90 N.s/m the cut is passive on x; on y it is stable with the paper's hand, but not passive.
+90 N·s/m the cut is passive on x; on y it is stable with the paper's hand, but not passive.
 """
 
 import matplotlib.pyplot as plt

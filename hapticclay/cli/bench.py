@@ -21,7 +21,7 @@ class BenchCommand:
     missing or were measured on other code.
 
     Attributes:
-        out: Folder for bench.md, the data and the diagrams.
+        out: Folder for the pages (bench.md is the first), the data and the diagrams.
         quick: Run fewer jobs, settings and scenes: about two minutes.
         anew: Measure again what was measured before.
         check: Measure nothing; name the parts in the folder that are older than kernel, formulas

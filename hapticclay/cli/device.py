@@ -15,7 +15,7 @@ from ..files import writable
 from . import console
 from .device_options import deliver_loops, write_report
 from .options import Loose
-from .run import deliver
+from .run import deliver_record
 from .unused import Unused
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ class DeviceCommand:
             print("nothing was recorded")
             return 0
         record = ended_as_planned(server.record()) if planned else server.record()
-        deliver(record, out, self.figures if self.plots else None, paced=True)
+        deliver_record(record, out, self.figures if self.plots else None, paced=True)
         if service.skipped:
             share = service.skipped / (service.skipped + service.samples)
             text = f"{service.skipped} control samples ({share:.1%}) were skipped"
@@ -189,7 +189,7 @@ def trajectory_of(words: tuple[str, ...]) -> Trajectory | None:
     units = ("m", "m", "m", "m", "m/s")
     try:
         x = [number_in("hand", w, unit) for w, unit in zip(words, units, strict=False)]
-    except ParameterError:  # of a unit
+    except ParameterError:  # a wrong unit
         raise
     except ValueError:
         x = []

@@ -69,7 +69,8 @@ def array_table(record: Record) -> str:
     """Shape, unit and range of each array, for a terminal."""
     import numpy as np
 
-    from ..simulation.tables import ARRAY_UNITS, LONG_NAMES, recorded_arrays
+    from ..simulation.columns import COLUMNS
+    from ..simulation.tables import recorded_arrays
 
     arrays = recorded_arrays(record)
     if record.ground is not None:
@@ -78,10 +79,10 @@ def array_table(record: Record) -> str:
     table = {
         "array": list(arrays),
         "shape": [" x ".join(map(str, x.shape)) for x in arrays.values()],
-        "unit": [ARRAY_UNITS.get(name, "m") for name in arrays],
+        "unit": [COLUMNS[name].unit for name in arrays],
         "lowest": [x.min() if x.size else np.nan for x in known],
         "highest": [x.max() if x.size else np.nan for x in known],
-        "what it is": [LONG_NAMES[name] for name in arrays],
+        "what it is": [COLUMNS[name].words for name in arrays],
     }
     return text_table(table, {"lowest": ".6g", "highest": ".6g"})
 

@@ -2,49 +2,60 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import shutil
+import textwrap
 from collections.abc import Sequence
 
-import cyclopts
-from rich.console import Console
-
+from ..fields import UNSET
 from . import parser
 from .commands import COMMANDS, load_command
-from .options import RECORD, SCENARIO
+from .options import SCENARIO
 
 NARROWEST = 20  # columns of a terminal in which help is laid out; in five that never ends
 ABOUT = "Virtual clay, cut with a simulated haptic arm."
-MORE = "hapticclay COMMAND --help shows the options of a command."
 
 
 def print_help(words: Sequence[str]) -> None:
     """Prints the help page of a command line."""
-    if not words or words[0].startswith("-"):
-        app = parser.new_app("hapticclay", ABOUT)
-        for name in COMMANDS:
-            _list(app, name, load_command(name))
-        app.help_epilogue = MORE
-    else:
-        line, _ = parser.begun(words, whole=False)
-        app = parser.app_of(line)
-        if SCENARIO in line.options:
-            _add_experiments(app, line)
     width = max(shutil.get_terminal_size().columns, NARROWEST)
+    if words and not words[0].startswith("-"):
+        _print_command(words, width)
+        return
+    print(f"Usage: hapticclay COMMAND [OPTIONS]\n\n{textwrap.fill(ABOUT, width)}\n")
+    for name in COMMANDS:
+        text, indent = f"  {name:11} {_paragraphs(load_command(name))[0]}", " " * 14
+        print(textwrap.fill(text, width, subsequent_indent=indent))
+    print("\n" + textwrap.fill("hapticclay COMMAND --help shows the options of a command.", width))
+
+
+def _print_command(words: Sequence[str], width: int) -> None:
+    from rich.console import Console
+
+    line, _ = parser.begun(words, whole=False)
+    app, about = parser.app_of(line), _paragraphs(line.kind)
+    if SCENARIO in line.options or line.origin:
+        from ..scene.experiments import EXPERIMENTS
+
+        if line.origin == parser.EXPERIMENT:
+            about = _paragraphs(EXPERIMENTS[line.source])
+        elif not line.origin:
+            for name, kind in EXPERIMENTS.items():
+                app.command(parser.new_app(name, help=_paragraphs(kind)[0], group="Experiments"))
+            app.help_epilogue = (
+                f"hapticclay {line.name} EXPERIMENT --help shows the options of one."
+            )
+    loose = [option for option in line.options.values() if option.note]
+    shown = [option.usage if option.default is UNSET else f"[{option.usage}]" for option in loose]
+    usage = " ".join(["Usage: hapticclay", line.path, *shown, "[OPTIONS]"])
+    for text in (usage, *about):
+        print(textwrap.fill(text, width) + "\n")
     color = None if os.environ.get("NO_COLOR") else "auto"
     app.help_print([], console=Console(width=width, color_system=color))
 
 
-def _add_experiments(app: cyclopts.App, line: parser.Line) -> None:
-    from ..scene.experiments import EXPERIMENTS
-
-    for name, kind in EXPERIMENTS.items():
-        _list(app, name, kind, group="Experiments")
-    record = "|RECORD" if line.options[SCENARIO].note == RECORD else ""
-    app.usage = f"Usage: hapticclay {line.name} EXPERIMENT|FILE{record} [OPTIONS]"
-    app.help_epilogue = f"hapticclay {line.name} EXPERIMENT --help shows the options of one."
-
-
-def _list(app: cyclopts.App, name: str, kind: type, **look: str) -> None:
-    """Adds a line on what a command or an experiment is."""
-    app.command(parser.new_app(name, parser.help_text(kind).partition("\n")[0], **look))
+def _paragraphs(kind: type) -> list[str]:
+    """What a command or an experiment is."""
+    text = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0]
+    return [" ".join(part.split()) for part in text.strip().split("\n\n")]

@@ -30,10 +30,11 @@ from .options import (
     options_of,
     parts_of,
 )
-from .unused import Unused, refuse_unused
+from .unused import Unused
 
 NEGATIVE = re.compile(r"^-(?=\.?\d|inf$|nan$)")  # no option: it gets a space in front
 EXPERIMENT, FILE = "experiment", "file"  # and RECORD: where a scenario comes from
+SET_WORDS = Several([Verbatim(str)], many=True)
 OF_SAMPLING = Unused(
     ("render",),
     "is of sampled control: give --control sampled too",
@@ -69,14 +70,16 @@ class Line:
     def command(self) -> Any:
         """The command with its options, ready to be called; files are read only now."""
         own = self._values("")
-        own |= {part: kind(**self._values(part)) for part, kind in parts_of(self.kind).items()}
+        for part, default in parts_of(self.kind).items():
+            own[part] = replace(default, **self._values(part))
         if self.origin:
             own[SCENARIO] = self._scenario(self._values(SCENARIO))
         return self.kind(**own)
 
     def _values(self, part: str) -> dict[str, Any]:
         """What was given of a part of the command."""
-        return {name: x for name, x in self.values.items() if self.options[name].part == part}
+        given = ((self.options[name], x) for name, x in self.values.items())
+        return {option.field: x for option, x in given if option.part == part}
 
     def _scenario(self, parameters: dict[str, Any]) -> Any:
         """The scenario, or the record."""
@@ -101,14 +104,19 @@ def read(words: Sequence[str]) -> Line:
         ParameterError: it has a word that its command does not take.
     """
     line, rest = begun([NEGATIVE.sub(r" \g<0>", word) for word in words])
+    quiet: Any = object()  # a console would be imported for an error, which nobody prints there
     try:
-        _, bound, _ = app_of(line).parse_args(rest, exit_on_error=False, print_error=False)
+        _, bound, _ = app_of(line).parse_args(
+            rest, exit_on_error=False, print_error=False, error_console=quiet
+        )
     except cyclopts.CycloptsError as error:
         raise _refusal(error, line) from None
     given = {line.options[name]: texts for name, texts in bound.arguments.items() if texts != ()}
-    kinds = (line.kind, *parts_of(line.kind).values())
-    rules = (rule for kind in kinds for rule in getattr(kind, "unused", ()))
-    refuse_unused((*rules, OF_SAMPLING), _given_words(line, given))
+    owners = (line.kind, *parts_of(line.kind).values())
+    rules = (rule for owner in owners for rule in getattr(owner, "unused", ()))
+    by_word = _given_words(line, given)
+    for rule in (*rules, OF_SAMPLING):
+        rule.refuse(by_word)
     values = {
         option.name: texts if isinstance(texts, bool) else option.value(texts)
         for option, texts in given.items()
@@ -137,7 +145,7 @@ def begun(words: Sequence[str], whole: bool = True) -> tuple[Line, list[str]]:
     origin, source = _scenario_of(line, rest, at)
     of_scenario = experiment_options(EXPERIMENTS[source]) if origin == EXPERIMENT else {}
     if origin != RECORD:
-        of_scenario[SET] = Option(SET, Several([Verbatim(str)], many=True), SET_HELP, (), SCENARIO)
+        of_scenario[SET] = Option(SET, SET_WORDS, SET_HELP, (), SCENARIO, "", SET)
     own = {name: option for name, option in line.options.items() if name != SCENARIO}
     return replace(line, options=own | of_scenario, origin=origin, source=source), rest
 
@@ -202,12 +210,8 @@ def _first_loose(options: Mapping[str, Option], words: Sequence[str]) -> int | N
 
 
 def app_of(line: Line) -> cyclopts.App:
-    """The parser of a command, which prints its help too."""
-    about, kind = field_descriptions(line.kind), line.kind
-    if line.origin == EXPERIMENT:
-        from ..scene.experiments import EXPERIMENTS
-
-        kind = EXPERIMENTS[line.source]
+    """The parser of a command, which prints its options too."""
+    about = field_descriptions(line.kind)
     titles = {"": "Options", SCENARIO: f"Options of {line.source}"}
     groups = {
         part: cyclopts.Group.create_ordered(
@@ -222,21 +226,15 @@ def app_of(line: Line) -> cyclopts.App:
     command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
         sorted(parameters, key=lambda p: p.kind)
     )
-    app = new_app(f"hapticclay {line.path}", help_text(kind))
+    app = new_app(line.name)
     app.default(command)
     return app
 
 
-def new_app(name: str, about: str, **look: Any) -> cyclopts.App:
-    """A parser without options for help and version: they are read before it."""
+def new_app(name: str, **look: Any) -> cyclopts.App:
+    """A parser without options for help and version, which are read before it."""
     bare: dict[str, Any] = {"help_flags": (), "version_flags": (), "help_format": "plaintext"}
-    return cyclopts.App(name=name, help=about, end_of_options_delimiter="", **bare, **look)
-
-
-def help_text(kind: type) -> str:
-    """What a command or an experiment is, a line a paragraph."""
-    text = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[0]
-    return "\n\n".join(" ".join(part.split()) for part in text.strip().split("\n\n"))
+    return cyclopts.App(name=name, usage="", end_of_options_delimiter="", **bare, **look)
 
 
 def _parameter(option: Option, group: cyclopts.Group) -> inspect.Parameter:

@@ -69,9 +69,9 @@ class ReproduceCommand:
             text = report.classic_page(found, source) if source else report.paper_page(rows)
             with atomic(self.page) as f:
                 f.write(text.encode())
-        return self._tell(rows, out)
+        return self._summarize(rows, out)
 
-    def _tell(self, rows: Sequence[Row], out: Path) -> int:
+    def _summarize(self, rows: Sequence[Row], out: Path) -> int:
         """Prints what does not agree, of a classic every claim; returns the exit status."""
         from ..paper.report import format_error, format_number
 
@@ -92,14 +92,16 @@ class ReproduceCommand:
 
 def claims_table(rows: Sequence[Row]) -> str:
     """The claims of a classic, for a terminal."""
-    from ..paper.report import format_error, format_number, format_verdict
+    from ..paper import report
 
     return text_table(
         {
             "claim": [textwrap.fill(r.what, WIDE) for r in rows],
-            "expected": [format_number(r.expected, r.unit) for r in rows],
-            "ours": [format_number(r.ours, r.unit) for r in rows],
-            "error": [format_error(r) for r in rows],
-            "agrees": [format_verdict(r) for r in rows],
+            "expected": [
+                report.format_number(r.expected, r.unit, report.expected_digits(r)) for r in rows
+            ],
+            "ours": [report.format_number(r.ours, r.unit, report.digits(r)) for r in rows],
+            "error": [report.format_error(r) for r in rows],
+            "agrees": [report.format_verdict(r) for r in rows],
         }
     )

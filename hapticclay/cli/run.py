@@ -14,7 +14,7 @@ from ..files import writable
 from ..model.constants import AXES
 from . import console
 from .options import ScenarioWord
-from .unused import Unused, undrawn
+from .unused import Unused
 
 if TYPE_CHECKING:
     from ..model.clay import Clay
@@ -62,7 +62,6 @@ class RunCommand:
         Unused(("integrator",), CHOSEN, ("error",)),
         Unused(("dt",), CHOSEN, ("error",), ("control=sampled",)),
         Unused(("dt",), CHOSEN, ("error", "Ts")),
-        *undrawn("no-plots"),
     )
 
     def __call__(self) -> int:
@@ -72,7 +71,7 @@ class RunCommand:
             print(f"hapticclay: {line}", file=sys.stderr)
         with console.ctrl_c() as stop:
             record = simulate_with_progress(self.scenario, self.every, stop.is_set, self.error)
-        deliver(record, out, self.figures if self.plots else None)
+        deliver_record(record, out, self.figures if self.plots else None)
         return 130 if record.outcome.code == "interrupted" else 0
 
 
@@ -86,12 +85,12 @@ def unstable_axes(scenario: Scenario) -> list[str]:
 
     if scenario.clay is None or not scenario.clay.viscous:
         return []
-    limits, told = PoseLimits(scenario), []
+    limits, unstable = PoseLimits(scenario), []
     for i, axis in enumerate(AXES):
         limit = limits.ahead(i)
         if scenario.gain[i] > limit.K:
-            told.append(f"gain[{axis}] = {scenario.gain[i]:g} > {limit.K:.4g} {limit}")
-    return [f"the linear loop is unstable: {', '.join(told)}"] if told else []
+            unstable.append(f"gain[{axis}] = {scenario.gain[i]:g} > {limit.K:.4g} {limit}")
+    return [f"the linear loop is unstable: {', '.join(unstable)}"] if unstable else []
 
 
 def simulate_with_progress(
@@ -114,7 +113,7 @@ def simulate_with_progress(
         return simulate(scenario, every=every, progress=progress, error=error)
 
 
-def deliver(
+def deliver_record(
     record: Record, folder: Path, figures: console.FigureOptions | None, paced: bool = False
 ) -> None:
     """Writes a record and its plots, prints its table, and removes plots of an earlier record."""
@@ -195,12 +194,12 @@ def _energy_lines(record: Record) -> list[str]:
 
 def _stop_lines(record: Record) -> list[str]:
     lines = []
-    told = [x for i, x in enumerate(record.stops) if i < MOST_ROWS or x.end is None]
-    for x in told:
+    shown = [x for i, x in enumerate(record.stops) if i < MOST_ROWS or x.end is None]
+    for x in shown:
         until = "to the end" if x.end is None else f"to {x.end:.6f} s"
         lines.append(f"{' and '.join(x.axis)} held still from {x.start:.6f} s {until}")
-    if len(record.stops) > len(told):
-        lines.append(f"... and {len(record.stops) - len(told)} more stops")
+    if len(record.stops) > len(shown):
+        lines.append(f"... and {len(record.stops) - len(shown)} more stops")
     return lines
 
 

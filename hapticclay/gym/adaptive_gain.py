@@ -103,7 +103,7 @@ class AdaptiveGain(TaskEnv):
 
     Args:
         ranges: ends (low, high) of each number drawn for an episode, by name; None for the task's.
-        engine: as in `Simulation`: "auto", "python" or "native".
+        engine: "auto", "python" or "native", as in `Simulation`.
         render_mode: "human", "rgb_array" or None.
     """
 

@@ -84,7 +84,7 @@ class CutLine(TaskEnv):
     Args:
         shape: shape of the line: "straight", "arc" or "corner".
         ranges: ends (low, high) of each number drawn for an episode, by name; None for the task's.
-        engine: as in `Simulation`: "auto", "python" or "native".
+        engine: "auto", "python" or "native", as in `Simulation`.
         render_mode: "human", "rgb_array" or None.
     """
 

@@ -28,7 +28,7 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     Args:
         render_mode: "human", "rgb_array" or None.
-        engine: as in `Simulation`: "auto", "python" or "native".
+        engine: "auto", "python" or "native", as in `Simulation`.
         ranges: ends (low, high) of each number drawn for an episode, by name; None for the task's.
         **options: options of the task.
 

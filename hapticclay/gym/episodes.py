@@ -111,12 +111,12 @@ class Episodes:
     Args:
         task: the task.
         kind: `One` copy or `Many`.
-        engine: as in `Simulation`.
+        engine: "auto", "python" or "native".
 
     Attributes:
         truth: numbers drawn for the episodes, by name.
-        memory: of the task.
-        handle: at the end of the last control period.
+        memory: memory of the task.
+        handle: state of the handle at the end of the last control period.
     """
 
     def __init__(self, task: Task, kind: type[One | Many], engine: str):

@@ -32,7 +32,7 @@ class TaskVectorEnv(VectorEnv):
         autoreset_mode: "NEXT_STEP", "SAME_STEP" or "DISABLED", as a word or a member of
             `AutoresetMode`.
         render_mode: "rgb_array" or None.
-        engine: as in `Simulation`: "auto", "python" or "native".
+        engine: "auto", "python" or "native", as in `Simulation`.
         ranges: ends (low, high) of each number drawn for an episode, by name; None for the task's.
         **options: options of the task.
 

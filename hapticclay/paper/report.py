@@ -204,26 +204,48 @@ PICTURES = (
 )
 
 
-def format_number(x: float | None, unit: str = "") -> str:
-    """Formats a value for a table with six digits; None gives an empty cell."""
+def format_number(x: float | None, unit: str = "", digits: int = 6) -> str:
+    """Formats a value for a table; None gives an empty cell."""
     if x is None:
         return ""
     if math.isnan(x):
         return "none"
-    text = "0" if abs(x) < 1e-9 else f"{x:.6g}"
+    text = "0" if abs(x) < 1e-9 else f"{float(f'{x:.{digits}g}'):.6g}"
     return f"{text} {typeset(unit)}".strip()
 
 
+def digits(row: Row) -> int:
+    """Significant digits that a found value carries by its row's tolerance; at least those of the
+    expected value where it is printed with five or fewer.
+    """
+    if not row.tolerance:
+        return 4
+    if row.expected == 0.0:
+        return 2
+    shown = _significant(row.expected)
+    return min(6, max(3, 2 - math.floor(math.log10(row.tolerance)), shown if shown < 6 else 0))
+
+
+def expected_digits(row: Row) -> int:
+    """All digits of an expected value that is printed so; those of the found value otherwise."""
+    return 6 if _significant(row.expected) < 6 else digits(row)
+
+
+def _significant(x: float | None) -> int:
+    """Significant digits of a value of a table, of six at most."""
+    return len(format_number(x).partition("e")[0].replace(".", "").strip("-0"))
+
+
 def typeset(unit: str) -> str:
-    """Typesets a unit: N·s/m, 1/s²; nothing for "1"."""
-    return "" if unit == "1" else unit.replace("N.", "N·").replace("^2", "²")
+    """Typesets a unit, and units in a sentence: N·s/m, 1/s²; nothing for "1"."""
+    return "" if unit == "1" else re.sub(r"\bN\.(?=[ms]\b)", "N·", unit).replace("^2", "²")
 
 
-def aligned(x: float | None) -> Any:
+def aligned(x: float | None, digits: int = 6) -> Any:
     """Formats a value so that the decimal points of an HTML column align."""
     import markupsafe  # a dependency of jinja2
 
-    whole, point, rest = format_number(x).partition(".")
+    whole, point, rest = format_number(x, digits=digits).partition(".")
     cell = '<span><span class="i">{}</span><span class="f">{}</span></span>'
     return markupsafe.Markup(cell).format(whole, point + rest)
 
@@ -233,9 +255,9 @@ def format_error(row: Row) -> str:
     if row.error is None or math.isnan(row.error):
         return ""
     if row.expected == 0.0:
-        return format_number(row.error if abs(row.error) > 1e-6 else 0.0, row.unit)
-    percent = 100.0 * row.error
-    return "0 %" if abs(percent) < 5e-4 else f"{percent:+.3f} %"
+        return format_number(row.error if abs(row.error) > 1e-6 else 0.0, row.unit, 2)
+    percent = float(f"{100.0 * row.error:.3f}")
+    return f"{float(f'{percent:.2g}'):+.6g} %" if percent else "0 %"
 
 
 def format_verdict(row: Row) -> str:
@@ -259,6 +281,8 @@ def template_environment() -> Any:
         "number": format_number,
         "aligned": aligned,
         "unit": typeset,
+        "digits": digits,
+        "expected_digits": expected_digits,
         "error": format_error,
         "verdict": format_verdict,
         "cell": lambda s: s.replace("|", "\\|"),

@@ -2,36 +2,44 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ..model.constants import AXES
+from ..model.hardware import JOINTS
 from ..scene.scenario import Scenario
 from .monitor import Outcome
 
+
+class Column(NamedTuple):
+    """An array over the samples: its unit, what it is, and its parts; none for a single number."""
+
+    unit: str
+    words: str
+    parts: tuple[str, ...] = AXES
+
+
 ARRAYS = {
-    "t": "s",
-    "p": "m",
-    "v": "m/s",
-    "fh": "N",
-    "fe": "N",
-    "b": "N.s/m",
-    "q": "rad",
-    "qd": "rad/s",
-    "tau": "N.m",
-    "delta": "m",
+    "t": Column("s", "time", ()),
+    "p": Column("m", "position of the handle"),
+    "v": Column("m/s", "velocity of the handle"),
+    "fh": Column("N", "force of the operator on the handle"),
+    "fe": Column("N", "resisting force of the clay"),
+    "b": Column("N.s/m", "damping of the clay at the handle"),
+    "q": Column("rad", "joint angle", JOINTS),
+    "qd": Column("rad/s", "joint rate", JOINTS),
+    "tau": Column("N.m", "motor torque", JOINTS),
+    "delta": Column("m", "output of the compensator"),
 }
 EXTRA = {  # arrays that some records have
-    "removed": "m^3",
-    "removal_rate": "m^3/s",
-    "target": "m",
-    "gain": "1/kg",
+    "removed": Column("m^3", "volume of clay removed", ()),
+    "removal_rate": Column("m^3/s", "rate of removal", ()),
+    "target": Column("m", "point that the hand pulls to"),
+    "gain": Column("1/kg", "gain K of the compensator"),
 }
-SCALAR = (
-    "t",
-    "removed",
-    "removal_rate",
-)  # arrays of one number per sample; the others have one per axis
+# the remaining clay is an array over cells instead
+COLUMNS = ARRAYS | EXTRA | {"ground": Column("m", "height of the remaining clay")}
 
 
 class Recorded(Protocol):

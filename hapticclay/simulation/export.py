@@ -15,7 +15,7 @@ from ..display import one_line
 from ..errors import ParameterError, choice, needing
 from ..files import atomic
 from . import tables
-from .columns import Recorded
+from .columns import COLUMNS, Recorded
 from .stored import check_times
 
 TOPIC = "/hapticclay"  # of MCAP
@@ -58,10 +58,9 @@ def _parquet(record: Recorded, file: IO[bytes]) -> None:
 
 def _csv(record: Recorded, file: IO[bytes]) -> None:
     columns, units = tables.record_columns(record), tables.column_units(record)
-    told = [f"{one_line(record.scenario.name)}: {one_line(record.status, 200)}"]
-    told.append(", ".join(f"{name} [{unit}]" for name, unit in units.items()))
-    head = [*(f"# {line}" for line in told), ",".join(columns)]
-    file.write(("\n".join(head) + "\n").encode())
+    title = f"{one_line(record.scenario.name)}: {one_line(record.status, 200)}"
+    labels = ", ".join(f"{name} [{unit}]" for name, unit in units.items())
+    file.write(f"# {title}\n# {labels}\n{','.join(columns)}\n".encode())
     values = np.column_stack(list(columns.values()))
     for i in range(0, len(values), ROWS):  # repr preserves the float exactly
         rows = values[i : i + ROWS].tolist()
@@ -71,30 +70,26 @@ def _csv(record: Recorded, file: IO[bytes]) -> None:
 def _mcap(record: Recorded, file: IO[bytes]) -> None:
     with needing("mcap", "mcap"):
         from mcap.writer import Writer
-    told = tables.told_of(record)
+    attributes = tables.attributes_of(record)
     writer = Writer(file)
-    writer.start(library=told["source"])
-    writer.add_metadata("hapticclay", {k: str(v) for k, v in told.items()})
+    writer.start(library=attributes["source"])
+    writer.add_metadata("hapticclay", {k: str(v) for k, v in attributes.items()})
     schema = writer.register_schema(
         "hapticclay.Sample", "jsonschema", json.dumps(_sample_schema(record)).encode()
     )
     channel = writer.register_channel(TOPIC, "json", schema)
     arrays = {name: x.tolist() for name, x in tables.recorded_arrays(record).items()}
-    keys = {name: tables.parts_of(name) for name in arrays}
     for i, t in enumerate(arrays["t"]):
-        sample = {
-            name: _finite(x[i])
-            if not keys[name]
-            else dict(zip(keys[name], map(_finite, x[i]), strict=True))
-            for name, x in arrays.items()
-        }
+        sample = {name: _entry(COLUMNS[name].parts, x[i]) for name, x in arrays.items()}
         at = round(1e9 * t)
         writer.add_message(channel, at, json.dumps(sample).encode(), at, i)
     writer.finish()
 
 
-def _finite(x: float) -> float | None:
-    """The number; JSON has null for NaN."""
+def _entry(parts: tuple[str, ...], x: Any) -> Any:
+    """A number or numbers by part for JSON, which has null for NaN."""
+    if parts:
+        return {part: _entry((), one) for part, one in zip(parts, x, strict=True)}
     return x if math.isfinite(x) else None
 
 
@@ -102,11 +97,10 @@ def _sample_schema(record: Recorded) -> dict[str, Any]:
     """The JSON schema of a sample."""
 
     def entry(name: str) -> dict[str, Any]:
-        told = {"description": f"{tables.LONG_NAMES[name]} [{tables.ARRAY_UNITS[name]}]"}
-        parts = tables.parts_of(name)
-        if not parts:
-            return {"type": "number", **told}
-        return {"type": "object", **told, "properties": {x: {"type": "number"} for x in parts}}
+        unit, words, parts = COLUMNS[name]
+        kind: dict[str, Any] = {"type": "object" if parts else "number"}
+        kind["description"] = f"{words} [{unit}]"
+        return kind | ({"properties": {x: {"type": "number"} for x in parts}} if parts else {})
 
     names = tables.recorded_arrays(record)
     return {"type": "object", "properties": {name: entry(name) for name in names}}
@@ -115,18 +109,18 @@ def _sample_schema(record: Recorded) -> dict[str, Any]:
 def _rerun(record: Recorded, file: IO[bytes]) -> None:
     with needing("rrd", "rerun-sdk", "rerun"):
         import rerun as rr
-    told = tables.told_of(record)
+    attributes = tables.attributes_of(record)
     recording = rr.RecordingStream(RECORDING)
     memory = recording.memory_recording()  # a file written by Rerun itself would hide a full disk
-    for name, text in told.items():
+    for name, text in attributes.items():
         recording.log(f"about/{name}", rr.TextDocument(str(text)), static=True)
     whole = np.rint(1e9 * record.t).astype("timedelta64[ns]")  # floats would be truncated
     time = rr.TimeColumn("t", duration=whole)
     for name, x in tables.recorded_arrays(record).items():
         if name == "t":
             continue
-        lines = [f"{name}_{part}" for part in tables.parts_of(name)] or [name]
-        labels = [f"{line} [{tables.ARRAY_UNITS[name]}]" for line in lines]
+        lines = [f"{name}_{part}" for part in COLUMNS[name].parts] or [name]
+        labels = [f"{line} [{COLUMNS[name].unit}]" for line in lines]
         recording.log(name, rr.SeriesLines(names=labels), static=True)
         if len(x):
             recording.send_columns(name, indexes=[time], columns=rr.Scalars.columns(scalars=x))
@@ -141,13 +135,13 @@ def _matlab(record: Recorded, file: IO[bytes]) -> None:
     from scipy.io.matlab import MatWriteError
 
     arrays = tables.recorded_arrays(record)
-    units = {name: tables.ARRAY_UNITS[name] for name in arrays}
+    units = {name: COLUMNS[name].unit for name in arrays}
     if record.ground is not None:
         arrays, units = arrays | {"ground": record.ground}, units | {"ground": "m"}
-    told = tables.told_of(record)
-    axes = {name: np.array(tables.parts_of(name) or ("",), dtype=object) for name in units}
+    attributes = tables.attributes_of(record)
+    axes = {name: np.array(COLUMNS[name].parts or ("",), dtype=object) for name in units}
     try:
-        savemat(file, {**arrays, "units": units, "columns": axes, **told}, oned_as="column")
+        savemat(file, {**arrays, "units": units, "columns": axes, **attributes}, oned_as="column")
     except MatWriteError as error:
         bound = f"must be smaller for a MAT file ({error}): use nc, which MATLAB reads"
         raise ParameterError("format", "mat", bound) from None

@@ -28,7 +28,7 @@ from ..scene.text import scenario_rows
 from ..theory import linear_loop
 from ..theory.stability_margins import Verdict
 from .accuracy import Accuracy
-from .columns import ARRAYS, EXTRA, SCALAR
+from .columns import ARRAYS, COLUMNS, EXTRA
 from .monitor import Outcome
 from .run import Crossing, Run, Stop
 from .stored import check_head, check_headers, check_times
@@ -155,8 +155,8 @@ class Record:
 
     def _units(self) -> dict[str, str]:
         """Unit of each array that the record has."""
-        extra = {name: EXTRA[name] for name in self.extra}
-        return ARRAYS | extra | ({"ground": "m"} if self.ground is not None else {})
+        names = [*ARRAYS, *self.extra, *["ground"] * (self.ground is not None)]
+        return {name: COLUMNS[name].unit for name in names}
 
     @property
     def plot(self) -> Any:
@@ -467,7 +467,7 @@ def _check(arrays: dict[str, np.ndarray]) -> None:
     """Raises ValueError unless arrays are finite and have their shapes."""
     t = arrays["t"]
     for name, x in arrays.items():
-        shape = (t.size,) if name in SCALAR else (t.size, 2)
+        shape = (t.size, 2) if COLUMNS[name].parts else (t.size,)
         if x.shape != shape or x.dtype != np.float64:
             raise ValueError(
                 f"array {name} must be float64 of shape {shape}, is {x.dtype} of shape {x.shape}"

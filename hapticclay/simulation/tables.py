@@ -11,31 +11,11 @@ from ..errors import needing
 from ..fields import plain_data
 from ..model.constants import AXES
 from ..model.hardware import JOINTS
-from .columns import ARRAYS, EXTRA, SCALAR, Recorded
+from .columns import ARRAYS, COLUMNS, Recorded
 
 if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
-
-ARRAY_UNITS = ARRAYS | EXTRA
-OF_JOINTS = ("q", "qd", "tau")  # arrays whose columns are the joints; others have the axes
-LONG_NAMES = {
-    "t": "time",
-    "p": "position of the handle",
-    "v": "velocity of the handle",
-    "fh": "force of the operator on the handle",
-    "fe": "resisting force of the clay",
-    "b": "damping of the clay at the handle",
-    "q": "joint angle",
-    "qd": "joint rate",
-    "tau": "motor torque",
-    "delta": "output of the compensator",
-    "removed": "volume of clay removed",
-    "removal_rate": "rate of removal",
-    "target": "point that the hand pulls to",
-    "gain": "gain K of the compensator",
-    "ground": "height of the remaining clay",
-}
 
 
 def recorded_arrays(record: Recorded) -> dict[str, np.ndarray]:
@@ -43,16 +23,11 @@ def recorded_arrays(record: Recorded) -> dict[str, np.ndarray]:
     return {name: getattr(record, name) for name in ARRAYS} | record.extra
 
 
-def parts_of(name: str) -> tuple[str, ...]:
-    """Names of an array's columns: axes or joints; empty for one number a sample."""
-    return () if name in SCALAR else JOINTS if name in OF_JOINTS else AXES
-
-
 def record_columns(record: Recorded) -> dict[str, np.ndarray]:
     """Each number of a sample as a column, shape (n,): t, p_x, p_y, v_x, ..., tau_elbow, ..."""
     out = {}
     for name, x in recorded_arrays(record).items():
-        parts = parts_of(name)
+        parts = COLUMNS[name].parts
         out |= {f"{name}_{part}": x[:, i] for i, part in enumerate(parts)} if parts else {name: x}
     return out
 
@@ -60,13 +35,13 @@ def record_columns(record: Recorded) -> dict[str, np.ndarray]:
 def column_units(record: Recorded) -> dict[str, str]:
     """Unit of each of the `record_columns`."""
     return {
-        f"{name}_{part}" if part else name: ARRAY_UNITS[name]
+        f"{name}_{part}" if part else name: COLUMNS[name].unit
         for name in recorded_arrays(record)
-        for part in parts_of(name) or ("",)
+        for part in COLUMNS[name].parts or ("",)
     }
 
 
-def told_of(record: Recorded) -> dict[str, Any]:
+def attributes_of(record: Recorded) -> dict[str, Any]:
     """Texts and numbers that go with the arrays into any file."""
     summary = {k: v for k, v in record.summary().items() if k not in ("scenario", "regions")}
     return {
@@ -87,7 +62,7 @@ def to_frame(record: Recorded) -> DataFrame:
 
     columns = record_columns(record)
     out = pd.DataFrame(columns, index=pd.Index(columns.pop("t"), name="t"))
-    out.attrs |= {"units": column_units(record), **told_of(record)}
+    out.attrs |= {"units": column_units(record), **attributes_of(record)}
     return out
 
 
@@ -98,7 +73,7 @@ def to_xarray(record: Recorded) -> Dataset:
 
     dims = {(): ("time",), AXES: ("time", "axis"), JOINTS: ("time", "joint")}
     values: dict[str, Any] = {
-        name: (dims[parts_of(name)], x, _labels(name))
+        name: (dims[COLUMNS[name].parts], x, _labels(name))
         for name, x in recorded_arrays(record).items()
     }
     coords = {
@@ -109,11 +84,11 @@ def to_xarray(record: Recorded) -> Dataset:
     block = record.scenario.clay and record.scenario.clay.ground
     if record.ground is not None and block:
         for name, edges in zip(("cell_x", "cell_y"), block.edges, strict=True):
-            told = {"units": "m", "long_name": f"centre of a cell of clay along {name[-1]}"}
-            coords[name] = (name, 0.5 * (edges[1:] + edges[:-1]), told)
+            labels = {"units": "m", "long_name": f"centre of a cell of clay along {name[-1]}"}
+            coords[name] = (name, 0.5 * (edges[1:] + edges[:-1]), labels)
         values["ground"] = (("cell_x", "cell_y"), record.ground, _labels("ground"))
-    return xr.Dataset(values, coords, told_of(record))
+    return xr.Dataset(values, coords, attributes_of(record))
 
 
 def _labels(name: str) -> dict[str, str]:
-    return {"units": ARRAY_UNITS.get(name, "m"), "long_name": LONG_NAMES[name]}
+    return {"units": COLUMNS[name].unit, "long_name": COLUMNS[name].words}

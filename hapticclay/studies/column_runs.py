@@ -46,8 +46,8 @@ def run_columns(
     the missing chunks. `read_sweep` reads the folder.
 
     Args:
-        base: as in `simulate_columns`.
-        columns: as in `simulate_columns`.
+        base: what the runs have in common.
+        columns: values by dotted name, as for `with_fields`, shape (n,) each.
         out: the folder.
         chunk: runs per file, the most that a killed process loses.
         workers: processes on this machine; None for one per core.
@@ -69,13 +69,7 @@ def run_columns(
 
 
 class ColumnRuns(Plan):
-    """Runs of a scenario with columns of numbers in place of some fields.
-
-    Args:
-        base: as in `run_columns`.
-        columns: as in `run_columns`.
-        chunk: as in `run_columns`.
-    """
+    """Runs of a scenario with columns of numbers in place of some fields, see `run_columns`."""
 
     notes = {
         **{name: RESULT_COLUMNS[name] for name in ("run", "status", "axis", "end_time")},

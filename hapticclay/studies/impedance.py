@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import ParameterError, integer, number
+from ..errors import Bound, ParameterError
 from ..model.constants import AXES
 from ..model.signals import Multisine
 from ..results import Result, figure_of
@@ -135,9 +135,9 @@ def measure_impedance(
     *,
     band: tuple[float, float] = IMPEDANCE_BAND,
     lines: int = IMPEDANCE_LINES,
-    period: float = IMPEDANCE_PERIOD,
-    amplitude: float = MOTION,
-    seed: int = 0,
+    period: Annotated[float, Bound(0.1, 1000.0, "s")] = IMPEDANCE_PERIOD,
+    amplitude: Annotated[float, Bound(0.0, 0.1, "m", above=True)] = MOTION,
+    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0,
 ) -> MeasuredImpedance:
     """Measure the impedance of a loop or a wall by a run, and compute it.
 
@@ -160,10 +160,7 @@ def measure_impedance(
     """
     wall = as_wall(subject, axis)
     wall.check_steady()
-    amplitude = number("amplitude", amplitude, 0.0, 0.1, above=True, unit="m")
-    length = number("period", period, 0.1, 1000.0, unit="s")
-    seed = integer("seed", seed, 0, 2**32 - 1)
-    Ts, n, steps = _steps_of(wall, length)
+    Ts, n, steps = _steps_of(wall, period)
     dt = (Ts or LONGEST_STEP) / steps
     i = AXES.index(wall.axis)
     along = (1.0, 0.0) if i == 0 else (0.0, 1.0)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from ..arguments import checked, named
 from ..display import table_of
-from ..errors import choice, integer, numbers_of
+from ..errors import Bound, numbers_of
 from ..results import Result, figure_of
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import VirtualWall
@@ -19,6 +19,7 @@ from ..theory.hand_boxes import Box
 from ..theory.mbk import (
     PLANES,
     DynamicRange,
+    Plane,
     Region,
     dynamic_range,
     least_mass,
@@ -84,9 +85,9 @@ class DeviceMBK(Result):
         gaps = [abs(x.y / x.exact - 1.0) for some in self.found.values() for x in some]
         return max(gaps, default=math.nan)
 
-    def tables(self) -> dict[str, dict[str, Sequence[Any]]]:
+    def tables(self) -> dict[str, dict[str, list[Any]]]:
         """The numbers of the figures, by table, columns headed with their units."""
-        out: dict[str, dict[str, Sequence[Any]]] = {}
+        out: dict[str, dict[str, list[Any]]] = {}
         for plane, region in self.regions.items():
             a, b = (f"{name} [{MBK_UNITS[name]}]" for name in PLANES[plane])
             low, high = region.low.tolist(), region.high.tolist()
@@ -182,10 +183,10 @@ class ArmMBK(Result):
         """Largest relative difference of a mass found by runs from the exact one; NaN if none."""
         return max((abs(r.y / r.exact - 1.0) for r in self.found), default=math.nan)
 
-    def tables(self) -> dict[str, dict[str, Sequence[Any]]]:
+    def tables(self) -> dict[str, dict[str, list[Any]]]:
         """The numbers of the figure, by table, columns headed with their units."""
         M, B = "least M [kg]", "B [N.s/m]"
-        out: dict[str, dict[str, Sequence[Any]]] = {
+        out: dict[str, dict[str, list[Any]]] = {
             name: {B: b.tolist(), M: m.tolist()}
             for name, (m, b) in (("this hand", self.nominal), ("hand box", self.worst))
         }
@@ -220,7 +221,7 @@ class ArmMBK(Result):
 def device_mbk(
     wall: VirtualWall,
     *,
-    columns: int = 5,
+    columns: Annotated[int, Bound(0, 100)] = 5,
     points: int = 41,
     band: tuple[float, float] = RANGE_BAND,
     progress: Callable[[Iterable], Iterable] = iter,
@@ -238,27 +239,26 @@ def device_mbk(
     Raises:
         ParameterError: a value is out of its bounds, or nothing in a plane is stable.
     """
-    columns = integer("columns", columns, 0, 100)
     low, high = numbers_of("band", band, ("low", "high"), 0.0, 1e4, above=True, unit="Hz")
     linear = replace(wall.device, friction=0.0, quantum=0.0)
     wall = replace(wall, device=linear, unilateral=False)
     regions = {plane: renderable(wall, plane, points) for plane in PLANES}
     # away from the ends of a plane, where the borders meet
     shares = (np.arange(columns) + 0.5) / columns if columns else np.empty(0)
-    asked = [
+    searched = [
         (plane, float(region.x[0] + share * (region.x[-1] - region.x[0])))
         for plane, region in regions.items()
         for share in shares.tolist()
     ]
     found: dict[str, list[Border]] = {plane: [] for plane in PLANES}
-    for plane, x in progress(asked):
+    for plane, x in progress(searched):
         found[plane] += wall_borders(wall, plane, x)
     spread = dynamic_range(wall, 2.0 * math.pi * np.geomspace(low, high, points))
     return DeviceMBK(wall, regions, {k: tuple(v) for k, v in found.items()}, spread)
 
 
 @checked
-def wall_borders(wall: VirtualWall, plane: str, x: float) -> list[Border]:
+def wall_borders(wall: VirtualWall, plane: Plane, x: float) -> list[Border]:
     """The borders in one column of a plane by runs; the search starts at the exact borders.
 
     Low borders at or below 0 are not searched.
@@ -268,7 +268,7 @@ def wall_borders(wall: VirtualWall, plane: str, x: float) -> list[Border]:
         plane: one of PLANES.
         x: the part on the horizontal axis.
     """
-    across, up = PLANES[choice("plane", plane, tuple(PLANES))]
+    across, up = PLANES[plane]
     wall = replace(wall, **{across: x})
     low, high = stable_band(wall, up)
     out = []
@@ -291,8 +291,8 @@ def arm_mbk(
     box: Box = HANDS,
     *,
     axis: str = "x",
-    columns: int = 5,
-    points: int = 15,
+    columns: Annotated[int, Bound(0, 100)] = 5,
+    points: Annotated[int, Bound(2, 1001)] = 15,
     samples: int = 24,
     progress: Callable[[Iterable], Iterable] = iter,
 ) -> ArmMBK:
@@ -311,7 +311,6 @@ def arm_mbk(
         ParameterError: a value is out of its bounds.
     """
     loop = of_scenario(loop, axis)
-    points, columns = integer("points", points, 2, 1001), integer("columns", columns, 0, 100)
     decays, linear = np.geomspace(*DECAYS, points), loop.linear
     nominal, worst, found = [], [], []
     runs = set(np.linspace(0, points - 1, columns).round().astype(int).tolist())

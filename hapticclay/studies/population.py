@@ -41,8 +41,9 @@ class Hands:
         source: publication of the numbers; "" for your own numbers.
         spread: meaning of the spread, such as "subjects" or "assumed".
         subjects: number of people who were measured, 0 where that is not known.
-        correlation: of the normal scores of (mass, damper), (mass, spring) and (damper, spring), -1
-            to 1; that of the logarithms where both are log-normal. 0 where none was published.
+        correlation: correlation of the normal scores of (mass, damper), (mass, spring) and (damper,
+            spring), -1 to 1; for log-normal pairs that of the logarithms. 0 where none was
+            published.
     """
 
     mass: Annotated[float | Distribution, Bound(0.0, unit="kg")]
@@ -123,7 +124,7 @@ class Hands:
 
         Args:
             n: number of hands, 1 to 100000.
-            seed: of the generator.
+            seed: seed of the generator.
         """
         n = integer("n", n, 1, MOST_HANDS)
         u = open_uniform(np.random.default_rng(seed), (n, 3))
@@ -133,7 +134,7 @@ class Hands:
         """Ranges that contain a given share of each number separately, for `worst_case`.
 
         Args:
-            share: of the population between the ends of each range, 0 to 1.
+            share: share of the population between the ends of each range, 0 to 1.
         """
         out = 0.5 * (1.0 - number("share", share, 0.0, 1.0 - 1e-9))
         ends = {}
@@ -146,7 +147,7 @@ class Hands:
         """A row of a table of populations: name, mass, damper, spring, subjects, spread, source.
 
         Args:
-            name: of the population.
+            name: name of the population.
         """
         values = self._values.values()
         texts = [x.text() if isinstance(x, Distribution) else f"{x:g}" for x in values]
@@ -253,7 +254,7 @@ class Draw:
 
     Attributes:
         hands: number of hands, 2 to 100000.
-        seed: of the generator, 0 to 2^32 - 1.
+        seed: seed of the generator, 0 to 2^32 - 1.
     """
 
     hands: Annotated[int, Bound(2, MOST_HANDS)] = 200
@@ -344,5 +345,5 @@ def _limit_band(
         rows.append([limit(v, hand) for hand in drawn])
         nominal.append(limit(v, middle))
     own = hands.spread or "own numbers"
-    told = next((k for k, v in POPULATIONS.items() if v == hands), own)
-    return Band(*names, np.array(values), np.array(rows), drawn, np.array(nominal), told)
+    name = next((k for k, v in POPULATIONS.items() if v == hands), own)
+    return Band(*names, np.array(values), np.array(rows), drawn, np.array(nominal), name)

@@ -165,9 +165,9 @@ def removed(
     In clay that stays cut (`Clay.groove`) it is the volume removed in the run by its own tool.
 
     Args:
-        record: of the run.
-        width: of the tool [m]; not used in clay that stays cut.
-        depth: of the cut [m]; not used in clay that stays cut.
+        record: record of the run.
+        width: diameter of the tool [m]; not used in clay that stays cut.
+        depth: depth of the cut [m]; not used in clay that stays cut.
         cell: largest cell of the map [m]; None for 1/32 of the width, which the accuracy requires.
 
     Returns:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -72,6 +72,11 @@ class Range:
             raise ParameterError(field, text, bound) from None
         return cls(min(values), max(values), len(values), False, values)
 
+    @property
+    def count(self) -> int:
+        """Number of values on a grid."""
+        return len(self.values) or self.n or 1
+
     def grid(self) -> np.ndarray:
         """The values, shape (n,)."""
         if self.values:
@@ -90,6 +95,13 @@ class Range:
         if self.log:
             return self.low * (self.high / self.low) ** u
         return self.low + (self.high - self.low) * u
+
+
+def grid_columns(ranges: Iterable[Range], cells: np.ndarray) -> list[np.ndarray]:
+    """Values in some cells of a grid, by range; the last range is the fastest."""
+    axes = [r.grid() for r in ranges]
+    index = np.unravel_index(cells, [len(x) for x in axes])
+    return [x[i] for x, i in zip(axes, index, strict=True)]
 
 
 @functools.lru_cache(1)  # a worker needs it for each chunk

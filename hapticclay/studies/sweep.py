@@ -22,7 +22,7 @@ from ..scene.files import read_settings
 from ..scene.scenario import Scenario
 from ..simulation.simulate import simulate
 from . import store, store_runs
-from .sampling import MOST_RUNS, Range, unit_samples
+from .sampling import MOST_RUNS, Range, grid_columns, unit_samples
 from .sweep_rows import result_row
 
 SWEEP_SCHEMA = "hapticclay-sweep-2"
@@ -83,7 +83,7 @@ class Sweep(store.Plan):
     def __len__(self) -> int:
         if self.runs is not None:
             return self.runs
-        return math.prod(r.n or 1 for r in self.vary.values())
+        return math.prod(r.count for r in self.vary.values())
 
     def points(self, first: int, last: int) -> np.ndarray:
         """Parameters of some runs, shape (last - first, parameters).
@@ -94,8 +94,7 @@ class Sweep(store.Plan):
         """
         axes = list(self.vary.values())
         if self.design == "grid":
-            index = np.unravel_index(np.arange(first, last), [r.n or 1 for r in axes])
-            return np.column_stack([r.grid()[i] for r, i in zip(axes, index, strict=True)])
+            return np.column_stack(grid_columns(axes, np.arange(first, last)))
         unit = unit_samples(self.design, len(axes), len(self), self.seed)[first:last]
         return np.column_stack([r.spread(u) for r, u in zip(axes, unit.T, strict=True)])
 
@@ -125,7 +124,7 @@ class Sweep(store.Plan):
         """A row of the data set, for the types of its columns."""
         return result_row(0, list(self.vary), np.zeros(len(self.vary)), None)
 
-    def rows(self, runs: range, late: Callable[[], bool] = lambda: False) -> list[dict[str, Any]]:
+    def rows(self, runs: range, late: Callable[[], bool]) -> list[dict[str, Any]]:
         """Makes some runs, one row per run.
 
         Args:

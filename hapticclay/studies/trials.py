@@ -17,7 +17,7 @@ from ..scene.changes import nested, with_fields
 from ..scene.scenario import Scenario
 from .distribution import Distribution
 from .population import HAND, Hands, hands_of, open_uniform
-from .sampling import MOST_RUNS, Range
+from .sampling import MOST_RUNS, Range, grid_columns
 from .store import Plan
 from .sweep_rows import RESULT_COLUMNS, Notes
 from .verdicts import Case, judge
@@ -90,7 +90,7 @@ class Trials(Plan):
     @property
     def cells(self) -> int:
         """Number of cells of the grid, 1 without one."""
-        return math.prod(len(r.grid()) for r in self.grid.values())
+        return math.prod(r.count for r in self.grid.values())
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -104,15 +104,11 @@ class Trials(Plan):
         Run i lies in cell i modulo the number of cells, so that all cells fill evenly.
 
         Args:
-            number: of the chunk, from 0.
+            number: number of the chunk, from 0.
         """
         runs = np.array(self.chunk_runs(number))
         rng = np.random.default_rng([self.seed, number])
-        columns = []
-        if self.grid:
-            axes = [r.grid() for r in self.grid.values()]
-            index = np.unravel_index(runs % self.cells, [len(x) for x in axes])
-            columns += [x[i] for x, i in zip(axes, index, strict=True)]
+        columns = grid_columns(self.grid.values(), runs % self.cells) if self.grid else []
         if isinstance(self.hands, Hands):
             columns += list(self.hands.spread_over(open_uniform(rng, (len(runs), 3))).T)
         u = open_uniform(rng, (len(runs), len(self.vary)))
@@ -181,7 +177,7 @@ class Trials(Plan):
 
         Args:
             points: their parameters, shape (runs, names).
-            threads: as in `simulate_batch`.
+            threads: number of parallel runs; None for one per core.
 
         Returns:
             Whether each is unstable: 1 or 0, NOT_RUN for one that cannot be run (a pose out of
@@ -197,7 +193,7 @@ class Trials(Plan):
         """A row of the data set, for the types of its columns."""
         return {"run": 0, **dict.fromkeys(self.names, 0.0), "unstable": 0, "longer": False}
 
-    def rows(self, runs: range, late: Callable[[], bool] = lambda: False) -> list[dict[str, Any]]:
+    def rows(self, runs: range, late: Callable[[], bool]) -> list[dict[str, Any]]:
         """Makes the runs of a chunk, one row per run.
 
         Args:

@@ -39,7 +39,7 @@ class Drift(Result):
         x: world positions [m], (m,), points of a square grid.
         y: world positions [m], (m,), all >= 0: turning the arm by 180 degrees changes no
             coefficient.
-        spacing: of the grid [m].
+        spacing: distance of neighbouring points [m].
         coefficients: (m, 2, 2, 2, 3): without and with shaping; G and Sh; axis x and y; gain,
             damping, stiffness.
         mobility: Wxx and Wyy of the bare arm [1/kg], (m, 2): the gain of Sh without shaping.
@@ -124,8 +124,8 @@ def drift_map(
     It takes a few minutes.
 
     Args:
-        spacing: of the grid of poses [m], 0.01 to 0.3.
-        seed: of the phases.
+        spacing: distance of neighbouring poses [m], 0.01 to 0.3.
+        seed: seed of the phases of the tones.
         progress: called after each pose with (poses done, poses in all).
 
     Raises:

@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import ParameterError, array_of, integer, number
+from ..errors import Bound, ParameterError, array_of, integer, number
 from ..formulas import arm as arm_law
 from ..formulas.constants import B_MAX
 from ..model import support
@@ -126,10 +127,10 @@ class ControllerStability(Result):
 
     def headline(self) -> str:
         """Verdict, largest stable gain and frequency, in one line."""
-        told = "stable" if self.stable else "unstable"
+        verdict = "stable" if self.stable else "unstable"
         if not self.high:
-            return f"{told} at every gain from {self.gains[0]:.4g} to {self.gains[-1]:.4g}"
-        band = f"{told} at gain {self.gain:.4g}; stable from {self.low:.4g} to {self.high:.4g}"
+            return f"{verdict} at every gain from {self.gains[0]:.4g} to {self.gains[-1]:.4g}"
+        band = f"{verdict} at gain {self.gain:.4g}; stable from {self.low:.4g} to {self.high:.4g}"
         return band + (
             f", where it oscillates at {self.omega / math.tau:.4g} Hz" if self.omega > 0.0 else ""
         )
@@ -160,9 +161,9 @@ def controller_stability(
     scenario: Scenario,
     *,
     gain: int | None = None,
-    b: float | None = None,
+    b: Annotated[float | None, Bound(0.0, B_MAX, "N.s/m")] = None,
     matrices: LinearLaw | None = None,
-    size: float = 1e-2,
+    size: Annotated[float, Bound(1e-9, 1.0)] = 1e-2,
 ) -> ControllerStability:
     """Stability and largest stable gain of a loop with a sampled controller of one's own.
 
@@ -185,17 +186,16 @@ def controller_stability(
         ParameterError: the scenario has no controller, the law does not rest near the start,
             depends on the time, or is not linear around rest (quantized, saturating or
             discontinuous), or a value is out of its bounds.
-        LawFailed: the law failed.
+        RuntimeError: the law failed (`LawFailed`).
     """
     made = scenario.controller
     if made is None:
         raise ParameterError("controller", None, "must be given: gain_limit is for the paper's own")
     if b is not None:
-        dampings = [number("b", b, 0.0, B_MAX, unit="N.s/m")]
+        dampings = [b]
     else:
         clay = scenario.clay if scenario.render == "physical" else None
         dampings = dampings_of(clay, (0, 1)) or [0.0]
-    size = number("size", size, 1e-9, 1.0)
     own = 1.0 if gain is None else _parameter(made, gain, matrices)
     rest = Rest(scenario, made if matrices is None else None)
     known = matrices or rest.linear_law(size)
@@ -281,7 +281,8 @@ class Rest:
 
     def _jacobian(self, q: np.ndarray) -> np.ndarray:
         """Velocity of the handle from the rates of the links, one column a link."""
-        return np.array(arm_law.jacobian(*q, self.scenario.arm.links)).reshape(2, 2).T
+        u = arm_law.jacobian(float(q[0]), float(q[1]), self.scenario.arm.links)
+        return np.array(u).reshape(2, 2).T
 
     @property
     def jacobian(self) -> np.ndarray:
@@ -309,9 +310,7 @@ class Rest:
     def _unrest(self, at: np.ndarray) -> np.ndarray:
         """Torques that nothing balances, and change of the state."""
         out = self.answer(self._measured(at))
-        out[:2] += arm_law.joint_torques(
-            *self._force(at[:2]), arm_law.jacobian(*at[:2], self.scenario.arm.links)
-        )
+        out[:2] += np.linalg.solve(JOINTS.T, self._jacobian(at[:2]).T @ self._force(at[:2]))
         out[2:] -= at[2:]
         return out
 
@@ -419,8 +418,8 @@ class Plant:
         whole, part = whole_samples(parts.delay, self.Ts)
         differs = parts.velocity == "difference"
         window = 2 * parts.velocity_window * differs
-        smooth = 2 * (differs and parts.velocity_filter is not None)
-        filtered = 4 * (parts.force_filter is not None)
+        cutoff, sieve_cutoff = parts.velocity_filter if differs else None, parts.force_filter
+        smooth, filtered = 2 * (cutoff is not None), 4 * (sieve_cutoff is not None)
         at = np.cumsum([0, 2, 2, n, window, smooth, filtered, 2 * (1 + whole)])
         unit = np.eye(at[-1] + 2 + n)  # behind x, the torques and the state that the law returns
         angle, rate, state, past, slow, sieve, queue = (
@@ -430,15 +429,15 @@ class Plant:
         q, w = JOINTS @ angle, JOINTS @ rate
         if differs:
             w = (q - past[-2:]) / (parts.velocity_window * self.Ts)
-        if smooth:
-            keep = math.exp(-math.tau * parts.velocity_filter * self.Ts)
+        if cutoff is not None:
+            keep = math.exp(-math.tau * cutoff * self.Ts)
             w = keep * slow + (1.0 - keep) * w
         turning = self.place @ angle + self.rate @ rate + self.push @ oldest
         u = self.jacobian
         force = -(self.damper @ u @ rate + self.spring @ u @ angle + self.mass @ u @ turning)
         sieved = sieve
-        if filtered:
-            f = np.array(butterworth(parts.force_filter, parts.filter_order, self.Ts))
+        if sieve_cutoff is not None:
+            f = np.array(butterworth(sieve_cutoff, parts.filter_order, self.Ts))
             sieved = np.kron(np.eye(2), f[:4].reshape(2, 2)) @ sieve + np.kron(force, f[4:, None])
             force = sieve[::2]
         due = np.vstack((torques, queue))[2 * whole : 2 * whole + 2]

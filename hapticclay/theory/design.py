@@ -15,7 +15,6 @@ from ..model.compensator import Compensator
 from ..results import Result
 from . import gain_limits, margin_gains, stability_margins
 from .loops import TIMING, Loop, of_loop
-from .stability_margins import Break
 
 K_MAX = 1e6  # bound of Scenario.gain: a margin that holds up to here counts as holding for any gain
 SPARE = 1e-10  # a gain is lower by this share, so that rounding does not cost it its margin
@@ -30,7 +29,7 @@ def design_gain(
     phase_margin: Annotated[float, Bound(0.0, math.pi, "rad")] = 0.0,
     disk_margin: Annotated[float, Bound(0.0, 2.0)] = 0.0,
     delay_margin: Annotated[float, Bound(0.0, unit="s")] = 0.0,
-    at: Break = "compensator",
+    at: stability_margins.Break = "compensator",
 ) -> float:
     """Largest K for which it and every lower K keep all requested margins.
 
@@ -52,18 +51,18 @@ def design_gain(
     Raises:
         ParameterError: a value is out of its bounds.
     """
-    gain, phase, disk, late = gain_margin, phase_margin, disk_margin, delay_margin
     top = gain_limits.gain_limit(loop)
+    beside = phase_margin, disk_margin, delay_margin
     if loop.Ts is not None or loop.delay:
-        if phase or disk or late or at != "compensator":
+        if any(beside) or at != "compensator":
             bound = "must stay as they are with sampling or delay, where only gain_margin is known"
             field = "phase_margin, disk_margin, delay_margin, at"
-            raise ParameterError(field, (phase, disk, late, at), bound)
-        return top / gain
+            raise ParameterError(field, (*beside, at), bound)
+        return top / gain_margin
 
     if at == "compensator":
-        top /= gain
-    K = (1.0 - SPARE) * min(top, margin_gains.first_gain(loop, at, gain, phase, disk, late))
+        top /= gain_margin
+    K = (1.0 - SPARE) * min(top, margin_gains.first_gain(loop, at, gain_margin, *beside))
     return math.inf if top == math.inf and K > K_MAX else K
 
 
@@ -130,7 +129,7 @@ def compare(
     compensators: Iterable[Any],
     *,
     band: tuple[float, float] = DESIGN_BAND,
-    at: Break = "compensator",
+    at: stability_margins.Break = "compensator",
     **margin: float,
 ) -> list[Design]:
     """Compensators at equal margin, the most transparent first.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..arguments import checked
-from ..errors import Bound, number
+from ..errors import Bound
 from ..scene.virtual_wall import Device, VirtualWall
 from . import linear_loop, roots
 from .loops import Loop, of_loop
@@ -56,8 +56,12 @@ def passivity(loop: Loop) -> Verdict:
     return Verdict(good, worst, omega, (LINEAR, "continuous time"), how, measures, fails)
 
 
+@checked
 def colgate_schenkel(
-    H: Callable[[np.ndarray], np.ndarray], Ts: float, damping: float, n: int = FREQUENCIES
+    H: Callable[[np.ndarray], np.ndarray],
+    Ts: Annotated[float, Bound(0.0, unit="s", above=True)],
+    damping: Annotated[float, Bound(0.0, unit="N.s/m")],
+    n: int = FREQUENCIES,
 ) -> Verdict:
     """Passivity of a sampled virtual object behind a physical damper.
 
@@ -67,8 +71,6 @@ def colgate_schenkel(
 
     for 0 < omega <= pi/Ts.
     """
-    Ts = number("Ts", Ts, 0.0, above=True, unit="s")
-    damping = number("damping", damping, 0.0, unit="N.s/m")
     theta = np.linspace(0.0, np.pi, n)[1:]
     response = -np.expm1(-1j * theta) * H(np.exp(1j * theta))
     need = 0.25 * Ts / np.sin(0.5 * theta) ** 2 * response.real

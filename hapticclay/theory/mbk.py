@@ -18,7 +18,7 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..display import brief
-from ..errors import Bound, ParameterError, choice, number
+from ..errors import Bound, ParameterError
 from ..model.compensator import Compensator
 from ..scene.virtual_wall import VirtualWall
 from . import gain_limits, hand_boxes
@@ -29,7 +29,8 @@ from .roots import bisect
 from .wall_limits import wall_differences
 
 Plane = Literal["mass-damper", "mass-stiffness", "damper-stiffness"]
-PLANES: dict[str, tuple[str, str]] = {  # fields of VirtualWall: horizontal, vertical
+WallPart = Literal["K", "B", "M"]
+PLANES: dict[str, tuple[WallPart, WallPart]] = {  # fields of VirtualWall: horizontal, vertical
     "mass-damper": ("M", "B"),
     "mass-stiffness": ("M", "K"),
     "damper-stiffness": ("B", "K"),
@@ -65,7 +66,7 @@ class Region:
 
 
 @checked
-def stable_band(wall: VirtualWall, part: Literal["K", "B", "M"]) -> tuple[float, float]:
+def stable_band(wall: VirtualWall, part: WallPart) -> tuple[float, float]:
     """Range of one part in which the linear wall is stable, with its own values of the other two.
 
     Eigenvalues of the sampled loop are computed on a grid of values; the ends are then refined to
@@ -126,7 +127,9 @@ def _stability(
 
 
 @checked
-def renderable(wall: VirtualWall, plane: str = "mass-damper", n: int = 41) -> Region:
+def renderable(
+    wall: VirtualWall, plane: Plane = "mass-damper", n: Annotated[int, Bound(3, 1001)] = 41
+) -> Region:
     """Stable region of a virtual wall over a plane, exact at each of n columns.
 
     Args:
@@ -138,8 +141,7 @@ def renderable(wall: VirtualWall, plane: str = "mass-damper", n: int = 41) -> Re
     Raises:
         ParameterError: unknown plane, n out of its bounds, or nothing stable.
     """
-    across, up = PLANES[choice("plane", plane, tuple(PLANES))]
-    n = int(number("n", n, 3, 1001))
+    across, up = PLANES[plane]
     d, hand = wall.device, wall.hand
     mass, own = d.mass + hand.mass, d.damper + hand.damper
     low, high = (-1.2 * mass, WIDEST * mass) if across == "M" else (-own, WIDEST * mass / wall.Ts)

@@ -172,6 +172,11 @@ def test_instability_is_a_result_with_advice(capsys, tmp_path):
         (["device", "srve"], ["action = 'srve'", "did you mean 'serve'?"]),
         (["export", "o", "--format", "cvs"], ["--format = 'cvs'", "did you mean 'csv'?"]),
         (["run", "variable", "--growth", "nne"], ["--growth = 'nne'", "did you mean 'none'?"]),
+        (["run", "constant", "--format"], ["--format = '': must be one or more, each one of png"]),
+        (["run", "constant", "--"], ["--: no option of run constant"]),
+        (["stability", "--num"], ["--num = '': must be one or more, each a finite number"]),
+        (["stability", "--G", "1", "2"], ["--G = '1 2': must be 3 numbers"]),
+        (["zwidth", "--hand", "1", "2s", "0"], ["--hand = '2s': must be a number in N.s/m, not"]),
         (["run", "constant", "--operator=maybe"], ["--operator = 'maybe': must be True or False"]),
         ([], ["give a command: accuracy, bench"]),
         (["run", "constant", "--every", "0"], ["every = 0"]),
@@ -453,10 +458,14 @@ def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(
         ("run --gain 1 0.5 --operator constant", "run constant --gain 1 0.5 --operator"),
         ("run --force -1 -2e-1 --no-plots free", "run free --force -1 -2e-1 --no-plots"),
         ("run --out constant variable", "run variable --out constant"),
-        ("view --tool-width 2 o", "view record o --tool-width 2"),
+        ("view --tool-width .02 o", "view record o --tool-width 2cm"),
         ("view --web variable --port=1", "view variable --web --port=1"),
         ("view --every 3", "view constant --every 3"),
         ("view", "view constant"),
+        ("run --start -5cm -.01 free", "run free --start -5cm -0.01"),
+        ("video --speed -1 o", "video record o --speed=-1"),
+        ("run free --operator=true --no-plots", "run free --operator --plots=no"),
+        ("run free --length 1 --length 2", "run free --length 2"),
         ("video --speed 2 o/record.npz", "video record o/record.npz --speed 2"),
         ("video --out x.gif --size 320 240 o", "video record o --out x.gif --size 320 240"),
         ("video --tool_width 0.01 --smooth record o", "video record o --tool-width 0.01 --smooth"),
@@ -544,7 +553,7 @@ def test_no_color_is_heeded(tmp_path, env, coloured):
     with (
         open(terminal, "rb", buffering=0) as screen,
         subprocess.Popen(
-            [sys.executable, "-m", "hapticclay", "version", "--help"],
+            [sys.executable, "-m", "hapticclay", "lab", "--help"],
             cwd=tmp_path,
             env=env,
             stdout=end,
@@ -689,3 +698,12 @@ def test_help_ends_in_the_narrowest_terminal(columns):
     env = {**os.environ, "COLUMNS": columns}
     out = subprocess.run(words, env=env, capture_output=True, text=True, timeout=120)
     assert out.returncode == 0 and "Usage" in out.stdout
+
+
+def test_a_part_of_a_command_keeps_its_defaults_beside_what_is_given():
+    for words, style in (([], "screen"), (["--style", "print"], "print")):
+        figures = parser.read(["reproduce", *words]).command().figures
+        assert (figures.format, figures.style) == (("svg",), style)
+    small = parser.read(["materials", "--tool-width", "2cm"]).command().tool
+    assert (small.width, small.depth) == (0.02, 0.005)
+    assert parser.read(["view", "--tool-depth", "5mm"]).command().tool == small

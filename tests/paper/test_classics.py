@@ -10,6 +10,7 @@ import pytest
 from hapticclay.cli import app
 from hapticclay.cli.reproduce import ReproduceCommand
 from hapticclay.errors import ParameterError
+from hapticclay.paper import report
 from hapticclay.paper.classics import CLASSICS, chawda2015, classic, hannaford2002, hulin2006
 from hapticclay.paper.classics.classic import CLASSIC_STATUSES, FORMULA, QUOTED
 from tests.hunt import some
@@ -36,7 +37,7 @@ def test_quick_runs_agree_with_every_claim(name, monkeypatch):
 def test_page_of_a_classic_is_that_of_its_source(name):
     page, source = (PAGES / f"{name}.md").read_text(), classic(name)
     for words in (source.title, source.citation, source.read, source.method):
-        assert words in page, words
+        assert report.typeset(words) in page, words
     assert "| NO |" not in page and f"hapticclay reproduce {name}" in page
     for picture in re.findall(r"\]\(([^)]+\.png)\)", page):
         assert (PAGES / picture).is_file(), picture

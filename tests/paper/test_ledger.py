@@ -1,7 +1,5 @@
 """Every number the paper prints stands once in params.py, and is what the paper printed."""
 
-import ast
-import re
 from pathlib import Path
 
 import pytest
@@ -85,23 +83,3 @@ def test_every_row_that_should_agree_does(ledger_rows):
 def test_each_contradiction_has_its_row(words, ledger_rows):
     mine = [r for r in ledger_rows if words in r.printed]
     assert mine and all(len(r.reason) > 15 for r in mine)
-
-
-NUMBERS = (41.8, 30.3, 79.19, 13.1, 41.1, 432.0, 32.4, 492.46, 0.36e-3)
-LITERAL = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?", re.IGNORECASE)
-
-
-@pytest.fixture(scope="module")
-def typed():
-    """Every float that is typed in a file of the package where one of NUMBERS is written."""
-    texts = [file.read_text() for file in SOURCE.parents[1].rglob("*.py")]
-    some = [x for x in texts if any(float(n) in NUMBERS for n in LITERAL.findall(x))]
-    nodes = (
-        node for x in some for node in ast.walk(ast.parse(x)) if isinstance(node, ast.Constant)
-    )
-    return [node.value for node in nodes if isinstance(node.value, float)]
-
-
-@pytest.mark.parametrize("number", NUMBERS)
-def test_a_printed_number_is_typed_once(number, typed):
-    assert typed.count(number) == 1

@@ -92,7 +92,10 @@ def test_report_is_one_file_with_every_figure(written):
     ):
         assert figure in text
     for row in rows:
-        assert report.aligned(row.ours) in text and report.typeset(row.unit) in text
+        assert (
+            report.aligned(row.ours, report.digits(row)) in text
+            and report.typeset(row.unit) in text
+        )
     for p in report.PICTURES:  # of the paper's figures: what of it stands beside ours
         assert (p.paper and p.paper in text) or not p.name.startswith("fig")
     assert 'class="wide"' in text and "@page { size: A4" in text
@@ -125,7 +128,7 @@ def test_command_says_what_does_not_agree_and_fails(tmp_path, monkeypatch, capsy
     monkeypatch.setattr(report, "PICTURES", ())
     assert app.main(["reproduce", "--quick", "--out", str(tmp_path)]) == 1
     out = capsys.readouterr().out
-    assert "does not agree: a (Eq. 1): 2 m, +100.000 %" in out and "1 of 2 numbers agree" in out
+    assert "does not agree: a (Eq. 1): 2 m, +100 %" in out and "1 of 2 numbers agree" in out
     assert str(tmp_path / "report.html") in out
     monkeypatch.setattr(claims, "ledger_rows", lambda runs: [ROW])
     assert app.main(["reproduce", "--quick", "--out", str(tmp_path)]) == 0

@@ -15,6 +15,7 @@ from hapticclay.errors import ParameterError
 from hapticclay.fields import make_part
 from hapticclay.scene.scenario import Scenario
 from hapticclay.simulation import export, tables
+from hapticclay.simulation.columns import COLUMNS
 
 FORMATS = tuple(export.EXPORTS)
 EXACT = {"nc", "parquet", "csv", "mat", "mcap"}  # hold t as a double; rrd has whole nanoseconds
@@ -173,13 +174,13 @@ def read_mat(file):
     for name in m["units"].dtype.names:
         if name == "ground":
             continue
-        parts = tables.parts_of(name)
+        parts = COLUMNS[name].parts
         out |= (
             {f"{name}_{p}": m[name][:, i] for i, p in enumerate(parts)}
             if parts
             else {name: m[name].ravel()}
         )
-        assert m["units"][name][0, 0][0] == tables.ARRAY_UNITS[name]
+        assert m["units"][name][0, 0][0] == COLUMNS[name].unit
     return out, json.loads(str(m["scenario"][0])), str(m["status"][0])
 
 

@@ -96,6 +96,11 @@ def test_grid_is_every_combination_once_whatever_the_chunks(n, m, chunk):
     assert np.all(points[:m, 0] == 1.0)  # the last parameter is the fastest
 
 
+def test_a_list_made_without_a_count_is_whole():
+    s = Sweep("constant", {"b": Range(1.0, 3.0, values=(1.0, 2.0, 3.0)), "gain.x": Range(1, 2, 2)})
+    assert s.points(0, len(s)).tolist() == [[b, k] for b in (1.0, 2.0, 3.0) for k in (1.0, 2.0)]
+
+
 @pytest.mark.parametrize("design", ["lhs", "sobol"])
 def test_samples_fill_the_space(design):
     s = Sweep("constant", parse_grid("b=1:1000log gain.x=0:2"), {}, design, 60, seed=3)

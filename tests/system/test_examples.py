@@ -1,6 +1,5 @@
-"""Each example and each tutorial runs without a warning, prints or draws, and is short."""
+"""Each example and each tutorial runs without a warning, and draws figures with labels."""
 
-import ast
 import runpy
 from pathlib import Path
 
@@ -92,24 +91,6 @@ def test_runs_and_shows_a_figure(page, tmp_path, monkeypatch):
             labels = ax.get_xlabel() + ax.get_ylabel()
             shared = ax.get_shared_x_axes().get_siblings(ax)
             assert labels or len(shared) > 1, f"{page.name}: axes without a label"
-
-
-@pytest.mark.parametrize("page", EXAMPLES, ids=IDS[: len(EXAMPLES)])
-def test_an_example_is_short_and_takes_the_public_api(page):
-    text = page.read_text()
-    assert len(text.splitlines()) < 60
-    tree = ast.parse(text)
-    title = (ast.get_docstring(tree) or "").splitlines()
-    assert len(title) > 3 and set(title[1]) == {"="} and len(title[1]) == len(title[0])
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom):
-            assert node.module != "hapticclay", f"{page.name}: import hapticclay as hc"
-        if isinstance(node, ast.Attribute):
-            assert not node.attr.startswith("_"), f"{page.name}: {node.attr}"
-
-
-def test_there_are_enough():
-    assert len(EXAMPLES) >= 20 and len(TUTORIALS) == 4
 
 
 def test_the_style_sheet_is_the_style_of_the_figures():
