@@ -82,8 +82,9 @@ def text_table(
 
 
 def _are_numbers(cells: Iterable[str]) -> bool:
-    """Whether all texts are numbers or ranges, with or without a unit."""
-    return any(cells) and all(NUMERIC.fullmatch(x) for x in cells)
+    """Whether most texts are numbers or ranges, with or without a unit."""
+    matches = [NUMERIC.fullmatch(x) is not None for x in cells if x]
+    return 2 * sum(matches) > len(matches)
 
 
 def cell_text(x: Any, form: str = "") -> str:

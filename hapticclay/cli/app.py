@@ -57,25 +57,25 @@ def _exit_status(argv: Sequence[str] | None, received: list[int]) -> int:
         return 2
     except ParameterError as error:
         text = error.bound if error.field == "arguments" else str(error)
-        _tell(text)
+        _print_end(text)
         return 2
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
     except MemoryError as error:
-        _tell(f"out of memory: {error or 'none is left'}")
+        _print_end(f"out of memory: {error or 'none is left'}")
         return 1
     except OSError as error:
         where = f"{one_line(error.filename, 200)}: " if error.filename else ""
-        _tell(f"{where}{error.strerror or error}")
+        _print_end(f"{where}{error.strerror or error}")
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except KeyboardInterrupt:
-        _tell(f"ended by {signal.Signals(received[0]).name}" if received else "interrupted")
+        _print_end(f"ended by {signal.Signals(received[0]).name}" if received else "interrupted")
         return 130
 
 
-def _tell(text: str) -> None:
+def _print_end(text: str) -> None:
     """Prints a line about the end of a command, unless its terminal has gone."""
     with contextlib.suppress(OSError):
         print(f"hapticclay: {text}", file=sys.stderr, flush=True)

@@ -189,7 +189,7 @@ def trajectory_of(words: tuple[str, ...]) -> Trajectory | None:
     units = ("m", "m", "m", "m", "m/s")
     try:
         x = [number_in("hand", w, unit) for w, unit in zip(words, units, strict=False)]
-    except ParameterError:  # of a unit
+    except ParameterError:  # a wrong unit
         raise
     except ValueError:
         x = []

@@ -12,7 +12,7 @@ from ..errors import ParameterError
 from ..fields import UNSET, Field, Node, dotted_names, leaves, no_field
 from .options import Loose
 
-WIDTH = 96  # of the text
+WIDTH = 96  # characters of a line
 
 
 @dataclass(frozen=True)

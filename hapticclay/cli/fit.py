@@ -17,7 +17,11 @@ if TYPE_CHECKING:
     from ..studies.measurement import Measurement
 
 COLUMNS_EXAMPLE = "t=time p=pos f=force"
-FIT_COLUMNS = {"t": "t", "p": "output", "f": "input"}  # of a file; their names in a Measurement
+FIT_COLUMNS = {
+    "t": "t",
+    "p": "output",
+    "f": "input",
+}  # columns of a file, as a Measurement names them
 
 
 @dataclass(frozen=True)

@@ -94,8 +94,8 @@ class GymCommand:
                 )
             except KeyboardInterrupt:
                 if kept[0]:
-                    told = f"{kept[0]} of {episodes} episodes are kept"
-                    print(f"{told}; the same command continues the recording")
+                    share = f"{kept[0]} of {episodes} episodes are kept"
+                    print(f"{share}; the same command continues the recording")
                 raise
         print(f"{name}: {made.total_episodes} episodes, {made.total_steps} steps")
         return 0

@@ -22,7 +22,7 @@ QUICK_SIGNALS: dict[str, dict[str, Any]] = {  # period [s], band [Hz]
     "S": {"periods": 1, "lines": 20, "period": 2.5, "band": (0.3, 20.0)},
     "Th": {"periods": 1, "lines": 20, "period": 5.0, "band": (0.15, 3.0)},
 }
-SPACING, QUICK_SPACING = 0.08, 0.2  # of the map's poses [m]
+SPACING, QUICK_SPACING = 0.08, 0.2  # [m] between the poses of the map
 
 
 @dataclass(frozen=True)

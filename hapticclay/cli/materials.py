@@ -61,5 +61,5 @@ def material_table(tool: Tool) -> str:
         "b [N.s/m]": [f.b or None for f in flows],
         "source": [sources[m.source] for m in MATERIALS.values()],
     }
-    told = [f"{mark} {source}" for source, mark in sources.items()]
-    return "\n".join([text_table(table), "", *told])
+    notes = [f"{mark} {source}" for source, mark in sources.items()]
+    return "\n".join([text_table(table), "", *notes])

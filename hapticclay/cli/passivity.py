@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ..scene.scenario import Scenario
 
 PASSIVE_WALL = {"K": 500.0, "delay": 5e-4, "device.damper": 1.0}
-QUICK_RUNS = (1.0,)  # of Ts, at which limits are found by runs
+QUICK_RUNS = (1.0,)  # sample times, in parts of Ts, at which limits are found by runs
 FULL_RUNS = (0.25, 1.0, 4.0)
 
 
@@ -68,7 +68,7 @@ class PassivityCommand:
         return 0
 
     def _scenarios(self) -> tuple[Scenario, Scenario]:
-        """Of the arm over frequency, and of the rendered clay over time."""
+        """The scenario of the arm over frequency, and that of the rendered clay over time."""
         from ..scene.experiments import constant_cut
         from ..scene.scenario import Scenario
 

@@ -69,9 +69,9 @@ class ReproduceCommand:
             text = report.classic_page(found, source) if source else report.paper_page(rows)
             with atomic(self.page) as f:
                 f.write(text.encode())
-        return self._tell(rows, out)
+        return self._summarize(rows, out)
 
-    def _tell(self, rows: Sequence[Row], out: Path) -> int:
+    def _summarize(self, rows: Sequence[Row], out: Path) -> int:
         """Prints what does not agree, of a classic every claim; returns the exit status."""
         from ..paper.report import format_error, format_number
 

@@ -86,12 +86,12 @@ def unstable_axes(scenario: Scenario) -> list[str]:
 
     if scenario.clay is None or not scenario.clay.viscous:
         return []
-    limits, told = PoseLimits(scenario), []
+    limits, unstable = PoseLimits(scenario), []
     for i, axis in enumerate(AXES):
         limit = limits.ahead(i)
         if scenario.gain[i] > limit.K:
-            told.append(f"gain[{axis}] = {scenario.gain[i]:g} > {limit.K:.4g} {limit}")
-    return [f"the linear loop is unstable: {', '.join(told)}"] if told else []
+            unstable.append(f"gain[{axis}] = {scenario.gain[i]:g} > {limit.K:.4g} {limit}")
+    return [f"the linear loop is unstable: {', '.join(unstable)}"] if unstable else []
 
 
 def simulate_with_progress(
@@ -195,12 +195,12 @@ def _energy_lines(record: Record) -> list[str]:
 
 def _stop_lines(record: Record) -> list[str]:
     lines = []
-    told = [x for i, x in enumerate(record.stops) if i < MOST_ROWS or x.end is None]
-    for x in told:
+    shown = [x for i, x in enumerate(record.stops) if i < MOST_ROWS or x.end is None]
+    for x in shown:
         until = "to the end" if x.end is None else f"to {x.end:.6f} s"
         lines.append(f"{' and '.join(x.axis)} held still from {x.start:.6f} s {until}")
-    if len(record.stops) > len(told):
-        lines.append(f"... and {len(record.stops) - len(told)} more stops")
+    if len(record.stops) > len(shown):
+        lines.append(f"... and {len(record.stops) - len(shown)} more stops")
     return lines
 
 

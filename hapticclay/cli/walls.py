@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
@@ -69,12 +69,7 @@ class DeviceOptions:
     @property
     def given(self) -> dict[str, Any]:
         """The options that were given."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
-        return {
-            name: value
-            for name, value in values.items()
-            if value is not None and value is not False
-        }
+        return {name: x for name, x in vars(self).items() if x is not None and x is not False}
 
     @property
     def timing(self) -> dict[str, Any]:

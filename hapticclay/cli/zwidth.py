@@ -91,8 +91,10 @@ class ZWidthCommand:
             )
         console.deliver(found, self.out, self.figures, wall=wall, vary=self.vary, box=self.box)
         if tried and all(r.linear for r in found.regions):
-            told = f"{', '.join(f'--{name}' for name in tried)} did not count: no push tries a loop"
-            print(f"hapticclay: {told} that is linear, its growth rate does", file=sys.stderr)
+            ignored = (
+                f"{', '.join(f'--{name}' for name in tried)} did not count: no push tries a loop"
+            )
+            print(f"hapticclay: {ignored} that is linear, its growth rate does", file=sys.stderr)
         return 0
 
     def _wall(self) -> Subject:

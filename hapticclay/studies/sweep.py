@@ -124,7 +124,7 @@ class Sweep(store.Plan):
         """A row of the data set, for the types of its columns."""
         return result_row(0, list(self.vary), np.zeros(len(self.vary)), None)
 
-    def rows(self, runs: range, late: Callable[[], bool] = lambda: False) -> list[dict[str, Any]]:
+    def rows(self, runs: range, late: Callable[[], bool]) -> list[dict[str, Any]]:
         """Makes some runs, one row per run.
 
         Args:

@@ -193,7 +193,7 @@ class Trials(Plan):
         """A row of the data set, for the types of its columns."""
         return {"run": 0, **dict.fromkeys(self.names, 0.0), "unstable": 0, "longer": False}
 
-    def rows(self, runs: range, late: Callable[[], bool] = lambda: False) -> list[dict[str, Any]]:
+    def rows(self, runs: range, late: Callable[[], bool]) -> list[dict[str, Any]]:
         """Makes the runs of a chunk, one row per run.
 
         Args:

@@ -29,7 +29,8 @@ from .roots import bisect
 from .wall_limits import wall_differences
 
 Plane = Literal["mass-damper", "mass-stiffness", "damper-stiffness"]
-PLANES: dict[str, tuple[str, str]] = {  # fields of VirtualWall: horizontal, vertical
+WallPart = Literal["K", "B", "M"]
+PLANES: dict[str, tuple[WallPart, WallPart]] = {  # fields of VirtualWall: horizontal, vertical
     "mass-damper": ("M", "B"),
     "mass-stiffness": ("M", "K"),
     "damper-stiffness": ("B", "K"),
@@ -65,7 +66,7 @@ class Region:
 
 
 @checked
-def stable_band(wall: VirtualWall, part: Literal["K", "B", "M"]) -> tuple[float, float]:
+def stable_band(wall: VirtualWall, part: WallPart) -> tuple[float, float]:
     """Range of one part in which the linear wall is stable, with its own values of the other two.
 
     Eigenvalues of the sampled loop are computed on a grid of values; the ends are then refined to
