@@ -245,13 +245,13 @@ def device_mbk(
     regions = {plane: renderable(wall, plane, points) for plane in PLANES}
     # away from the ends of a plane, where the borders meet
     shares = (np.arange(columns) + 0.5) / columns if columns else np.empty(0)
-    asked = [
+    searched = [
         (plane, float(region.x[0] + share * (region.x[-1] - region.x[0])))
         for plane, region in regions.items()
         for share in shares.tolist()
     ]
     found: dict[str, list[Border]] = {plane: [] for plane in PLANES}
-    for plane, x in progress(asked):
+    for plane, x in progress(searched):
         found[plane] += wall_borders(wall, plane, x)
     spread = dynamic_range(wall, 2.0 * math.pi * np.geomspace(low, high, points))
     return DeviceMBK(wall, regions, {k: tuple(v) for k, v in found.items()}, spread)

@@ -379,13 +379,13 @@ def _index_by_run(wall: VirtualWall, turn: tuple[int, int]) -> float:
     from scipy.optimize import brentq
 
     b, omega = wall.device.damper, np.array([math.pi * turn[0] / (turn[1] * wall.Ts)])
-    asked = max(b - float(wall_limits.passivity_index(wall, omega * (1.0 - 1e-12))[0]), 1e-9)
+    needed = max(b - float(wall_limits.passivity_index(wall, omega * (1.0 - 1e-12))[0]), 1e-9)
 
     def energy(damper: float) -> float:
         other = replace(wall, device=replace(wall.device, damper=damper))
         return taken_energy(other, polygon(other, turn, WORST_AMPLITUDE))
 
-    low, high = 0.5 * asked, 2.0 * asked
+    low, high = 0.5 * needed, 2.0 * needed
     if energy(low) > 0.0 or energy(high) < 0.0:
         return math.nan
     return b - float(brentq(energy, low, high, rtol=1e-5))  # type: ignore[arg-type]
