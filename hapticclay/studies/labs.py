@@ -87,7 +87,11 @@ class Lab(Result):
         return out
 
     def text(self, form: str = "") -> str:
-        """Task, table, result and questions."""
+        """Task, table, result and questions.
+
+        Args:
+            form: as in `Result.text`.
+        """
         return f"{self.title}. {self.task}\n\n{super().text(form)}"
 
     def remarks(self) -> list[str]:

@@ -36,7 +36,7 @@ class Case(NamedTuple):
 
     Attributes:
         wall: the wall, or the arm in clay.
-        scenario: of the run, in which more than the wall may have been changed.
+        scenario: scenario of the run; a trial may change more of it than the wall.
     """
 
     wall: Wall
@@ -51,9 +51,9 @@ class Reading(NamedTuple):
     """How the growth of runs is read.
 
     Attributes:
-        scale: of a case, the rates below which a mode does not count and growth is left open [1/s].
+        scale: rates below which a mode does not count, and growth is left open [1/s].
         short: growth rates of short runs.
-        long: of longer ones, none of them open.
+        long: growth rates of longer runs, none of them open.
     """
 
     scale: Callable[[Case], tuple[float, float]]
@@ -152,7 +152,7 @@ def long_arms(cases: Cases, threads: int | None) -> Rates:
 def wall_scale(case: Case) -> tuple[float, float]:
     """Reading.scale of a wall."""
     n, _, slowest = case.wall.growth_reading()
-    return slowest, WALL_MAP_TOLD / (n * case.wall.Ts)
+    return slowest, WALL_MAP_TOLD / (n * case.wall.subject.Ts)
 
 
 def short_walls(cases: Cases, threads: int | None) -> Rates:
@@ -160,14 +160,14 @@ def short_walls(cases: Cases, threads: int | None) -> Rates:
     rate, span = long_walls(cases, threads, WALL_SPANS[0]), {}
     for i, x in cases.items():
         n, *_ = x.wall.growth_reading(WALL_SPANS[0])
-        span[i] = n * x.wall.Ts
+        span[i] = n * x.wall.subject.Ts
     return {i: x if abs(x) * span[i] >= WALL_TOLD else math.nan for i, x in rate.items()}
 
 
 def long_walls(cases: Cases, threads: int | None, span: float = WALL_SPANS[1]) -> Rates:
     """Growth rates of walls from longer runs."""
     # Those with as many steps a sample run together: their records keep one step of so many.
-    steps = {i: round(x.wall.Ts / x.scenario.dt) for i, x in cases.items()}
+    steps = {i: round(x.wall.subject.Ts / x.scenario.dt) for i, x in cases.items()}
     rate = {}
     for every in sorted(set(steps.values())):
         members = [i for i in cases if steps[i] == every]
@@ -175,7 +175,7 @@ def long_walls(cases: Cases, threads: int | None, span: float = WALL_SPANS[1]) -
             some = [(i, cases[i]) for i in members[first : first + WALL_BATCH]]
             read = [x.wall.growth_reading(span) for _, x in some]
             jobs = [
-                replace(x.scenario, t_max=n * x.wall.Ts)
+                replace(x.scenario, t_max=n * x.wall.subject.Ts)
                 for (_, x), (n, *_) in zip(some, read, strict=True)
             ]
             records = simulate_batch(jobs, threads=threads, every=every)
