@@ -17,6 +17,7 @@ from .options import ScenarioWord
 from .unused import Unused
 
 if TYPE_CHECKING:
+    from ..fields import Axis
     from ..model.clay import Clay
     from ..scene.scenario import Scenario
     from ..simulation.record import Record
