@@ -98,11 +98,7 @@ class Line:
 
 
 def read(words: Sequence[str]) -> Line:
-    """Reads a command line.
-
-    Raises:
-        ParameterError: it has a word that its command does not take.
-    """
+    """Reads a command line; refuses a word that its command does not take."""
     line, rest = begun([NEGATIVE.sub(r" \g<0>", word) for word in words])
     quiet: Any = object()  # a console would be imported for an error, which nobody prints there
     try:

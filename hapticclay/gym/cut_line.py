@@ -27,11 +27,7 @@ GAIN_SHARE = Range(0.3, 1.0, "", 0.01, 2.0, False, "gain of the device, share of
 
 @dataclass(frozen=True)
 class CutLineTask(Follow):
-    """Task: cut along a line through viscous clay.
-
-    Attributes:
-        shape: shape of the line: "straight", "arc" or "corner".
-    """
+    """Task: cut along a line through viscous clay."""
 
     shape: Literal["straight", "arc", "corner"] = "straight"
     drawn: ClassVar[dict[str, Range]] = {

@@ -18,19 +18,12 @@ Ends = Sequence[tuple[float, float]]  # of the quantities of an observation
 
 
 class Period(NamedTuple):
-    """Results of a control period, of one copy or of all.
+    """Results of a control period, of one copy or of all."""
 
-    Attributes:
-        observation: shape (m,) or (n, m), float32.
-        reward: number or shape (n,).
-        ended: whether the episode is over, bool or shape (n,).
-        info: values by name, numbers or shape (n,) each.
-    """
-
-    observation: np.ndarray
-    reward: Any
-    ended: Any
-    info: Memory
+    observation: np.ndarray  # float32, shape (m,) or (n, m)
+    reward: Any  # a number, or shape (n,)
+    ended: Any  # whether the episode is over: bool, or shape (n,)
+    info: Memory  # by name: numbers, or shape (n,) each
 
 
 class One:
@@ -106,18 +99,7 @@ class Many:
 
 
 class Episodes:
-    """Episodes of a task.
-
-    Args:
-        task: the task.
-        kind: `One` copy or `Many`.
-        engine: "auto", "python" or "native".
-
-    Attributes:
-        truth: numbers drawn for the episodes, by name.
-        memory: memory of the task.
-        handle: state of the handle at the end of the last control period.
-    """
+    """Episodes of a task, with the numbers drawn for them, of `One` copy or of `Many`."""
 
     def __init__(self, task: Task, kind: type[One | Many], engine: str):
         self.task, self.kind, self.engine = task, kind, engine

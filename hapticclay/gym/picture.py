@@ -17,11 +17,7 @@ PATH = 2000  # points of the path to keep
 
 
 class Picture:
-    """A picture of one copy, in a window or as an array, with the path of its handle.
-
-    Attributes:
-        unseen: why there is no window although one was asked for, else "".
-    """
+    """A picture of one copy, in a window or as an array; `unseen` says why there is no window."""
 
     def __init__(self, task: Task, window: bool):
         self._task, self._plan = task, PlanPicture(window)

@@ -14,7 +14,7 @@ from typing import Any
 
 from ..ports.coupled import DeviceHand
 from ..ports.device import device_scenario
-from ..ports.driven_arm import LARGEST_FORCE, Drive, DrivenArm, Sensed
+from ..ports.driven_arm import LARGEST_FORCE, Device, Drive, DrivenArm, Sensed
 from ..ports.service import Service
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
@@ -84,7 +84,7 @@ class ServedSession(Session):
         return replace(super().record(), scenario=self.undriven)
 
 
-class LiveDevice:
+class LiveDevice(Device):
     """The arm of a session as the device of a service; the session's player advances it."""
 
     paced = True
@@ -95,22 +95,18 @@ class LiveDevice:
 
     @property
     def t(self) -> float:
-        """Simulated time [s]."""
         return self._session.t
 
     @property
     def sensed(self) -> Sensed:
-        """The newest measurement."""
         return self._session.arm.sensed
 
     @property
     def force(self) -> tuple[float, float]:
-        """The force that acts on the handle [N]."""
         return self._session.arm.force
 
     @property
     def torques(self) -> tuple[float, float]:
-        """Torques in addition to that force [N.m]."""
         return self._session.arm.asked.torques
 
     @property
@@ -120,11 +116,9 @@ class LiveDevice:
 
     @property
     def scenario(self) -> Scenario:
-        """The simulated scenario."""
         return self._session.undriven
 
     def drive(self, drive: Drive) -> tuple[float, float]:
-        """Changes the drive of the motors from the next control sample on."""
         return self._session.arm.drive(drive)
 
     def advance(self, samples: int | None = None) -> None:
@@ -167,7 +161,7 @@ class DevicePartner(Partner):
         """Sends the force of the coupling, and reads the device."""
         handle, self._handle = self._handle, None
         if handle is None:
-            self.hand.watch()
+            self.hand.read_position()
         else:
             self.hand.exchange(*handle)
 
