@@ -44,7 +44,6 @@ class CutLineTask(Follow):
 
     @property
     def observations(self) -> tuple[Quantity, ...]:
-        """Quantities of an observation."""
         return (
             symmetric("distance from the line, positive to its left", 50.0, "mm"),
             *MOTION,
@@ -52,7 +51,6 @@ class CutLineTask(Follow):
         )
 
     def line(self, truth: Truth) -> np.ndarray:
-        """Nodes of the line [m]."""
         return lines.rotated(lines.SHAPES[self.shape](LENGTH), truth["angle"])
 
     @override

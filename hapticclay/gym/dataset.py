@@ -83,7 +83,6 @@ class Recording(store.Plan):
 
     @functools.cached_property
     def env(self) -> Any:
-        """The environment."""
         return gymnasium.make(f"{NAMESPACE}/{self.id}", engine=self.engine)
 
     def _episode(self, seed: int) -> dict[str, np.ndarray]:

@@ -34,7 +34,6 @@ class One:
         self.gain: Any = None
 
     def reset(self, which: Sequence[int], scenarios: Sequence[Any]) -> None:
-        """Restarts the run."""
         self.run.reset(scenarios[0])
         self.gain = None
 
@@ -71,7 +70,6 @@ class Many:
         self.run = SimulationBatch(scenarios, engine=engine, monitored=False)
 
     def reset(self, which: Sequence[int], scenarios: Sequence[Any]) -> None:
-        """Restarts some runs."""
         self.run.reset(which, scenarios)
 
     def advance(self, n: int, command: Command, live: np.ndarray) -> None:
@@ -82,18 +80,15 @@ class Many:
             self.run.advance(n, force=np.stack(command.force, axis=1), mask=live)
 
     def measured(self, n: int, k: int) -> tuple[Any, Any, Any]:
-        """As `One.measured`."""
         run = self.run
         return run.numbers().T, run.torque_reached(n, k).T, run.ended
 
     def observation(self, values: Iterable[Value], ends: Ends) -> np.ndarray:
-        """As `One.observation`."""
         low, high = np.array(ends).T
         return observed(np.stack(tuple(values), axis=1), low, high).astype(np.float32)
 
     @staticmethod
     def merged(kept: Memory, which: Sequence[int], rows: Sequence[Memory]) -> Memory:
-        """As `One.merged`."""
         new = {name: columns_of([x[name] for x in rows]) for name in rows[0]}
         return {name: replaced(kept[name], which, x) for name, x in new.items()} if kept else new
 
@@ -162,7 +157,6 @@ class Episodes:
         return {name: float(x[i]) for name, x in self.truth.items()}
 
     def close(self) -> None:
-        """Ends the runs."""
         if self._runs is not None:
             self._runs.run.close()
         self._runs = None

@@ -25,11 +25,9 @@ class Picture:
         self._path: list[tuple[float, float]] = []
 
     def begin(self) -> None:
-        """Starts a new path."""
         self._path = []
 
     def note(self, p: tuple[float, float]) -> None:
-        """Adds a point to the path."""
         point = float(p[0]), float(p[1])
         if not self._path or self._path[-1] != point:
             self._path.append(point)
@@ -50,7 +48,6 @@ class Picture:
         return f"K = {m['K']:.2f} 1/kg, {speed}" if "K" in m else speed
 
     def close(self) -> None:
-        """Closes the window, if any."""
         self._plan.close()
 
 

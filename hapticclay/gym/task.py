@@ -117,7 +117,6 @@ class Task:
 
 
 def hand_of(truth: Truth) -> Operator:
-    """The hand of an episode."""
     return Operator(*(truth[name] for name in HAND))
 
 

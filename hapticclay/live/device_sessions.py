@@ -46,7 +46,6 @@ class ServedSession(Session):
         every: int = 1,
         largest_force: float = LARGEST_FORCE,
     ):
-        """Begins at the start of a scenario."""
         self._largest_force = largest_force
         self._counts: deque[tuple[float, int]] = deque()
         self.partner = Partner(SERVED_SPAN)
@@ -90,7 +89,6 @@ class LiveDevice(Device):
     paced = True
 
     def __init__(self, session: ServedSession):
-        """The arm of a session."""
         self._session = session
 
     @property
@@ -131,7 +129,6 @@ class DeviceSession(Session):
     frame_time = FRAME_TIME
 
     def __init__(self, scenario: Scenario, hand: DeviceHand, tool: Tool = TOOL, every: int = 1):
-        """Begins at the start of a scenario."""
         self.hand, self.partner = hand, DevicePartner(hand)
         super().__init__(scenario, 1.0, tool, every)
 
@@ -152,7 +149,6 @@ class DevicePartner(Partner):
     """
 
     def __init__(self, hand: DeviceHand):
-        """Connects a device to a session."""
         super().__init__(hand.client.limits.Ts)
         self.hand = hand
         self._handle: Any = None  # position and velocity of the simulated handle; None at rest

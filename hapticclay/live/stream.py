@@ -64,7 +64,6 @@ class UdpStream:
             self._socket.sendto(json.dumps(values).encode(), self._to)
 
     def close(self) -> None:
-        """Closes the socket."""
         self._socket.close()
 
 

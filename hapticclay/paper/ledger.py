@@ -63,7 +63,6 @@ class Runs:
     """The runs behind rows and figures, each run once, on first use; `progress` takes its name."""
 
     def __init__(self, progress: Callable[[str], None] | None = None):
-        """Starts without runs."""
         self.progress = progress or (lambda name: None)
         self._kept: dict[str, Any] = {}
 
@@ -74,25 +73,21 @@ class Runs:
         return self._kept[name]
 
     def constant(self, **kw) -> Record:
-        """A constant cut."""
         return self._get(f"constant cut {_keywords(kw)}", lambda: simulate(constant_cut(**kw)))
 
     def variable(self, growth: Any = "30/s", **kw) -> Record:
-        """A variable cut."""
         return self._get(
             f"variable cut, growth {growth} {_keywords(kw)}",
             lambda: simulate(variable_cut(growth, **kw)),
         )
 
     def stability(self, gain: float, **kw) -> Record:
-        """A stability test."""
         return self._get(
             f"stability test, K = {gain:g} {_keywords(kw)}",
             lambda: simulate(stability_test(gain, **kw)),
         )
 
     def free(self, **kw) -> Record:
-        """A motion in free space."""
         return self._get(f"free {_keywords(kw)}", lambda: simulate(free(**kw)))
 
     def identified(self, what: str, axis: str) -> Identified:
@@ -125,6 +120,5 @@ def row(
     status: str,
     reason: str = "",
 ) -> Row:
-    """Makes one row of the ledger."""
     what, where, printed, unit = cells.split(" | ")
     return Row(what, where, printed, unit, *figures, status, reason)

@@ -153,7 +153,6 @@ class DeviceHand:
         self.rate, self.t = to_plane(sample.velocity, self.plane), sample.t
 
     def notes(self) -> dict[str, object]:
-        """Notes about the device for a record."""
         return {
             "url": self.client.url,
             "device_id": self.client.device_id,

@@ -127,7 +127,6 @@ class ExchangeLog:
     """Keeps the newest exchanges."""
 
     def __init__(self, most: int = MOST_ROWS):
-        """Makes an empty log."""
         self._rows = Rows(len(COLUMNS), most)
 
     @property
@@ -136,10 +135,8 @@ class ExchangeLog:
         return self._rows.count
 
     def add(self, row: Exchange) -> None:
-        """Adds an exchange."""
         times, (position, velocity, asked, applied) = row[:3], row[3:]
         self._rows.add((*times, *position, *velocity, *asked, *applied))
 
     def exchanges(self) -> Exchanges:
-        """The exchanges that are kept."""
         return Exchanges.of_table(self._rows.table())

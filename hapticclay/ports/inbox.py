@@ -25,7 +25,6 @@ class Inbox:
     """
 
     def __init__(self, socket: Any, broken: tuple[type[BaseException], ...]):
-        """Starts to read."""
         self.skipped, self.ended = 0, ""
         self._socket, self._broken = socket, broken
         self._changed = threading.Condition()

@@ -304,7 +304,6 @@ GRIP_STATUS = {"connected": True, "awake": True, "ready": True}
 
 
 def frame_text(frame: Frame) -> str:
-    """The text of a frame of the service."""
     return json.dumps(frame_data(frame), allow_nan=False)
 
 

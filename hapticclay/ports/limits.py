@@ -69,7 +69,6 @@ class ForceLimiter:
         self._is_frozen = False
 
     def restart(self, t: float) -> None:
-        """Restarts the ramp."""
         self._ramp_from, self._pushed_at = t, None
 
     def see(self, position: Vector, t: float) -> None:

@@ -155,18 +155,15 @@ def _command(kind: str, vector: Vector | None) -> Command:
 
 
 def publish_text(topic: str, msg: Mapping[str, Any]) -> str:
-    """A message on a topic."""
     return json.dumps({"op": "publish", "topic": topic, "msg": msg}, allow_nan=False)
 
 
 def status_text(level: str, text: str, to: Operation) -> str:
-    """A status message."""
     name = {} if to.id is None else {"id": to.id}
     return json.dumps({"op": "status", **name, "level": level, "msg": text})
 
 
 def response_text(to: Operation, values: Any, result: bool) -> str:
-    """The answer of a service."""
     name = {} if to.id is None else {"id": to.id}
     body = {"service": to.topic, "values": values, "result": result}
     return json.dumps({"op": "service_response", **name, **body}, allow_nan=False)

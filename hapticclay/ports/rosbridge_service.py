@@ -30,7 +30,6 @@ class Subscriptions:
     buttons: frozenset[str] | None = None  # those in the last message; None before it
 
     def add(self, operation: Operation, kind: str) -> None:
-        """Adds a subscription."""
         self.topics[operation.topic] = kind
         self.throttles.setdefault(operation.topic, {})[operation.id] = operation.throttle
 

@@ -21,7 +21,6 @@ class Rows:
     """The newest rows of a table."""
 
     def __init__(self, width: int, most: int = MOST_ROWS):
-        """Makes an empty table."""
         self.count, self._width, self._most = 0, width, most  # rows so far, kept or not
         chunks = -(-most // CHUNK) + 1
         self._chunks: collections.deque[np.ndarray] = collections.deque(maxlen=chunks)
@@ -30,7 +29,6 @@ class Rows:
         return min(self.count, self._most)
 
     def add(self, row: Sequence[float]) -> None:
-        """Adds a row."""
         at = self.count % CHUNK
         if not at:
             self._chunks.append(np.empty((CHUNK, self._width)))

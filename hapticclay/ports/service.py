@@ -59,7 +59,6 @@ class Service:
     # ---- clients
 
     def connect(self) -> tuple[int, list[str]]:
-        """Adds a client."""
         with self._lock:
             self._count += 1
             number = self._count
@@ -78,7 +77,6 @@ class Service:
             self.device.drive(LIMP if self.clock == "tick" else self._drive())
 
     def answer(self, number: int, data: str | bytes) -> list[str]:
-        """The answer to a message."""
         with self._lock:
             return self.protocol.answer(self, self._sessions[number], data)
 
@@ -183,7 +181,6 @@ class Service:
             self._thread.start()
 
     def stop(self) -> None:
-        """Stops the clock and the device."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join()
@@ -213,7 +210,6 @@ class Service:
 
 
 def protocol_of(protocol: str) -> WireProtocol:
-    """The protocol with a given name."""
     if protocol == "rosbridge":
         from .rosbridge_service import RosbridgeProtocol
 

@@ -73,7 +73,6 @@ def _modes(progress: Progress) -> list[Row]:
 
 
 def make(quick: bool, progress: Progress) -> Found:
-    """Makes the runs."""
     rows, found = [], []
     for quantum in QUICK_QUANTA if quick else QUANTA:
         progress(f"largest passive K: Delta = {1e6 * quantum:g} um")

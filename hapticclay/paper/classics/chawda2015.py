@@ -182,7 +182,6 @@ def _chart(cutoffs: Cutoffs, smooth: list[float], rough: dict[float, list[float]
 
 
 def make(quick: bool, progress: Progress) -> Found:
-    """Makes the runs."""
     cutoffs, quanta = (QUICK_CUTOFFS, (MIDDLE,)) if quick else (CUTOFFS, QUANTA)
     lag, smooth = _lag(cutoffs, progress)
     noise, rough = _noise(cutoffs, quanta, progress)

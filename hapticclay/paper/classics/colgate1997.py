@@ -98,7 +98,6 @@ def _plane(found: list[tuple[str, VirtualWall, float]]) -> Chart:
 
 
 def make(quick: bool, progress: Progress) -> Found:
-    """Makes the runs."""
     found = list(_limits(quick, progress))
     rows = [
         row(

@@ -130,7 +130,6 @@ def _quantum(progress: Progress) -> Row:
 
 
 def make(quick: bool, progress: Progress) -> Found:
-    """Makes the runs."""
     rows, chart = _thresholds(quick, progress)
     if not quick:
         rows += [_stable_but_active(progress), _quantum(progress)]

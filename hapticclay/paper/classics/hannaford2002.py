@@ -148,7 +148,6 @@ def _observer(plain: Contact) -> Row:
 
 
 def make(quick: bool, progress: Progress) -> Found:
-    """Makes the runs."""
     rows, shown = _claims(quick, progress)
     plain, damped = shown["without"], shown["with"]
     rows.append(_observer(plain))

@@ -108,7 +108,6 @@ def _boundary(quick: bool, progress: Progress) -> tuple[list[Row], Chart]:
 
 
 def make(quick: bool, progress: Progress) -> Found:
-    """Makes the runs."""
     rows = _rule_rows(quick, progress)
     if not quick:
         rows.append(_hand_row(progress))
