@@ -141,9 +141,10 @@ def _node_for(hint: Any) -> Node:
     items = get_args(kind) if get_origin(kind) is tuple else ()
     if kind in (str, Path) and not others:
         return Verbatim(kind)
-    if items[1:] == (...,) or (items and get_origin(items[0]) is Annotated):
+    many = items[1:] == (...,)
+    if many or (items and get_origin(items[0]) is Annotated):
         each = [Annotated[(x, *notes)] if notes else x for x in items if x is not ...]
-        return Several([_option_node(x) for x in each], items[-1] is ...)
+        return Several([_option_node(x) for x in each], many)
     return node_of(hint)
 
 

@@ -47,7 +47,7 @@ class Compared:
     """One file: its scenario or wall, the theory of it, and its run.
 
     Attributes:
-        name: of the file.
+        name: name of the file.
         subject: the scenario, or the wall on its device.
         loop: one axis of a scenario; None for a wall.
         numbers: key numbers by name and unit; NaN where there is none.
@@ -149,7 +149,7 @@ def compare_files(
 
     Args:
         paths: two to MOST_COMPARED different files of one kind.
-        axis: of the arm, for scenarios.
+        axis: axis of the arm, for scenarios.
         progress: wraps the iterable of the files.
 
     Raises:

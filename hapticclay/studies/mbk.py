@@ -301,7 +301,7 @@ def arm_mbk(
     Args:
         loop: arm, servo, hand and sampling, or a scenario; its compensator and gain are ignored.
         box: hands.
-        axis: of a scenario, "x" or "y".
+        axis: axis of a scenario, "x" or "y".
         columns: number of B/M where runs search the border, 0 (theory alone) to 100.
         points: number of B/M of each line, 2 to 1001.
         samples: random members of the box tested in a sampled or delayed loop.

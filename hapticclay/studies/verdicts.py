@@ -36,7 +36,7 @@ class Case(NamedTuple):
 
     Attributes:
         wall: the wall, or the arm in clay.
-        scenario: of the run, in which more than the wall may have been changed.
+        scenario: scenario of the run; a trial may change more of it than the wall.
     """
 
     wall: Wall
@@ -51,9 +51,9 @@ class Reading(NamedTuple):
     """How the growth of runs is read.
 
     Attributes:
-        scale: of a case, the rates below which a mode does not count and growth is left open [1/s].
+        scale: rates below which a mode does not count, and growth is left open [1/s].
         short: growth rates of short runs.
-        long: of longer ones, none of them open.
+        long: growth rates of longer runs, none of them open.
     """
 
     scale: Callable[[Case], tuple[float, float]]

@@ -51,11 +51,11 @@ class LinearLaw:
     """A sampled controller around rest: s(k+1) = A s(k) + B y(k), torques = C s(k) + D y(k).
 
     Attributes:
-        A: of its n states, shape (n, n).
-        B: of the measurements y = (q1, q2 [rad], their rates [rad/s], hand force x, y [N]), shape
-            (n, 6).
-        C: torques of shoulder and elbow [N.m], shape (2, n).
-        D: shape (2, 6).
+        A: state matrix, of n states, shape (n, n).
+        B: input matrix, shape (n, 6). The inputs y are the measured angles of shoulder and elbow
+            [rad], their rates [rad/s], and the hand force x, y [N].
+        C: output matrix, shape (2, n). The outputs are the torques of shoulder and elbow [N.m].
+        D: feedthrough, shape (2, 6).
     """
 
     A: np.ndarray
@@ -379,7 +379,7 @@ class Plant:
         scenario: the run.
         rest: where it rests.
         b: physical clay [N.s/m].
-        states: of the controller.
+        states: number of states of the controller.
     """
 
     def __init__(self, scenario: Scenario, rest: Rest, b: float, states: int):
