@@ -314,8 +314,9 @@ class Clay:
             place: (x, y) [m].
             b: damping there, along x and y [N.s/m]; None for that of `at`.
         """
-        told = [x for kind in self.kinds for x in kind.here(self, place)]
-        return [*told, *told_pair("b = {}", self.at(*place).tolist() if b is None else b, "N.s/m")]
+        others = [x for kind in self.kinds for x in kind.here(self, place)]
+        b = self.at(*place).tolist() if b is None else b
+        return [*others, *told_pair("b = {}", b, "N.s/m")]
 
     def at(self, x: Any, y: Any) -> np.ndarray:
         """Damping of both axes at given places, without growth.
@@ -336,16 +337,15 @@ _ACROSS = Refusal(
 )
 
 
-def _damping_values(clay: Clay) -> list[float]:
-    return [v for law in clay.laws for v in law.damping.ravel().tolist()]
-
-
-def _rates(clay: Clay) -> list[float]:
-    return [v for law in clay.laws for v in law.rates.ravel().tolist()]
+def _words(form: str, name: str, unit: str) -> Callable[[Clay], tuple[Told, ...]]:
+    """A quantity of the cells of both axes."""
+    return lambda clay: told_values(
+        form, (v for law in clay.laws for v in getattr(law, name).ravel().tolist()), unit
+    )
 
 
 def _scaled(name: str) -> Callable[[Clay, float], Clay]:
-    """What multiplies a quantity of the laws of both axes."""
+    """Clay with a quantity of the laws of both axes multiplied."""
 
     def of(law: Any, factor: float) -> Any:
         given = getattr(law, name)
@@ -362,12 +362,12 @@ def _soft(clay: Clay) -> Soft:
 TRAITS = (
     Law(
         "viscous", "clay", lambda c: any(x.damping.any() for x in c.laws),
-        words=lambda c: told_values("b = {}", _damping_values(c), "N.s/m"),
+        words=_words("b = {}", "damping", "N.s/m"),
         force=lambda law, speed, _: law.damping * speed, scaled=_scaled("values"),
     ),
     Law(
         "growth", "clay", lambda c: c.grows, LEFT_OUT, seen_in_b=False, varies="time",
-        words=lambda c: told_values("grows by {}", _rates(c), "N.s/m per s"),
+        words=_words("grows by {}", "rates", "N.s/m per s"),
         scaled=_scaled("growth"),
     ),
     Law("cells", "clay", lambda c: any(isinstance(x, Grid) for x in c.laws)),
@@ -380,5 +380,5 @@ TRAITS = (
         words=lambda c: told_values("axes rotated by {}", (math.degrees(c.angle),), "degrees"),
     ),
 )  # fmt: skip
+# in the order of texts
 LAWS: tuple[Law, ...] = (*groove.TRAITS, *flow.TRAITS, *TRAITS, *spring.TRAITS)
-"""In the order in which texts tell them."""

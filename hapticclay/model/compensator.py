@@ -14,9 +14,6 @@ from ..errors import Bound, ParameterError
 from ..formulas.compensator import ORDER
 from .constants import C_DEN, C_NUM
 
-# floats of an axis: A, B, C, D of a realisation, each as for the highest order; and of a kick, see
-# `form_kick`: C Phi, what the force of the kick adds, Phi, Gamma
-# working space of `exponential`: two results, then a term of a series, its sum, and a matrix
 CANCELLED = 1e-12  # of a sum, relative to that of the magnitudes
 
 
@@ -175,9 +172,8 @@ def _from_roots(name: str, given: Iterable[complex]) -> tuple[float, ...]:
 def _from_state_space(A: Any, B: Any, C: Any, D: Any) -> tuple[Any, Any]:
     """Coefficients by way of the impulse response: D, C B, C A B, ...
 
-    Values that are zero up to rounding are set to zero, so that num has no spurious distant zeros.
-    If all but D are zero, the system is a gain: it has no state that is both controllable and
-    observable.
+    Values at rounding are set to zero, so that num has no spurious distant zeros. If all but D are
+    zero, the system is a gain.
     """
     v, row = np.ravel(B), np.ravel(C)
     A = np.reshape(A, (len(v), len(v)))
@@ -196,7 +192,7 @@ PRINTED = Compensator()
 
 
 def form_numbers(compensator: Compensator) -> list[float]:
-    """A realisation of C/K as plain numbers, padded with zeros to the highest order."""
+    """A, B, C, D of a realisation of C/K, row by row, padded with zeros to the highest order."""
     n = compensator.order
     A, B, C, D = compensator.state_space()
     a, b, c = np.zeros((ORDER, ORDER)), np.zeros(ORDER), np.zeros(ORDER)
@@ -205,7 +201,7 @@ def form_numbers(compensator: Compensator) -> list[float]:
 
 
 def moving_states(compensator: Compensator, v: float) -> list[float]:
-    """States of a compensator whose output moves at constant rate and is 0 now."""
+    """States of a compensator whose output is 0 and moves at v [m/s]; it needs an integrator."""
     n = compensator.order
     out = [0.0] * ORDER
     if v == 0.0:

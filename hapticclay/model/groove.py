@@ -21,8 +21,6 @@ from .traits import LEAST, LEFT_OUT, Block, Hold, Law, Refusal, Soft, Told
 CELLS = 20  # default number of cells in the width of the tool
 COARSEST = 8  # fewest cells in that width
 MOST_CELLS = 4_000_000
-# the front of the tool in sectors: by the share of |y| in |x| + |y| of their normals, in each
-# quadrant; half of the angle of each [rad]
 
 
 @part("groove.")

@@ -94,9 +94,9 @@ NOISE_BLOCK = 1024  # samples drawn at once
 
 
 def butterworth(cutoff: float, order: int, Ts: float) -> tuple[float, ...]:
-    """Butterworth low-pass filter of unit gain under a held input: x+ = A x + B u, y = x[0], exact.
+    """Butterworth low-pass [Hz] of unit gain under a held input: x+ = A x + B u, y = x[0], exact.
 
-    The poles lie on a circle of radius 2 pi cutoff (matrix exponential).
+    A row by row, then B; the poles lie on a circle of radius 2 pi cutoff (matrix exponential).
     """
     from scipy.linalg import expm
 
@@ -113,11 +113,7 @@ def butterworth(cutoff: float, order: int, Ts: float) -> tuple[float, ...]:
 
 
 class SampleNoise:
-    """Random effects on each sample, reproducible by seed and index; one stream per part.
-
-    Args:
-        parts: the hardware, with its seed.
-    """
+    """Random effects on each sample, reproducible by seed and index; one stream per part."""
 
     def __init__(self, parts: Hardware):
         self.parts = parts
@@ -126,7 +122,7 @@ class SampleNoise:
 
     @property
     def first(self) -> int:
-        """Index of the first sample that is still kept."""
+        """Index of the first sample that is kept."""
         return self._first
 
     def forget(self, first: int) -> None:
@@ -134,7 +130,10 @@ class SampleNoise:
         self._rows, self._first = self._rows[first - self._first :], first
 
     def table(self, first: int, n: int) -> np.ndarray:
-        """Random effects on n samples; the first sample of a run is on time and never lost."""
+        """Offset in time [s], whether lost (1 or 0), and force noise (x, y) [N] of n samples.
+
+        The first sample of a run is on time and never lost.
+        """
         blocks, at = [self._rows], first - self._first
         missing = at + n - len(self._rows)
         while missing > 0:

@@ -121,13 +121,6 @@ class Samples(Signal):
         return pieces.straight_pieces(t, np.concatenate((before, values)), slopes)
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
-        """As Signal.pieces.
-
-        Args:
-            begin: as there.
-            end: as there.
-            step: as there.
-        """
         first, last = np.searchsorted(self._rows[:, 0], (begin, end), "right")
         return self._rows[max(first - 1, 0) : max(last, 1)]
 
@@ -198,22 +191,9 @@ class Function(Signal):
         return np.array([self._at(x) for x in t.tolist()]).reshape(-1, 2)
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
-        """As Signal.pieces.
-
-        Args:
-            begin: as there.
-            end: as there.
-            step: as there.
-        """
         return pieces.interpolate(self._values, pieces.cell_edges(begin, end, 0.5 * step))
 
     def breaks(self, begin: float, end: float) -> np.ndarray:
-        """No known breaks.
-
-        Args:
-            begin: as Signal.breaks.
-            end: as Signal.breaks.
-        """
         return np.zeros(0)
 
     def _means(self, t: np.ndarray, h: np.ndarray) -> np.ndarray:

@@ -162,34 +162,19 @@ class Sum(Signal):
 
     @property
     def varies(self) -> bool:
-        """Whether any of them changes with time."""
         return any(part.varies for part in self.parts)
 
     @property
     def cosines(self) -> np.ndarray:
-        """Lines of all parts, shape (n, 5)."""
         return np.concatenate([x.cosines * (1.0, 1.0, 1.0, k, k) for x, k in self._terms()])
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
-        """As Signal.pieces.
-
-        Args:
-            begin: as there.
-            end: as there.
-            step: as there.
-        """
         terms = self._terms()
         return pieces.added_pieces(
             [x.pieces(begin, end, step) for x, _ in terms], [k for _, k in terms]
         )
 
     def breaks(self, begin: float, end: float) -> np.ndarray:
-        """As Signal.breaks.
-
-        Args:
-            begin: as there.
-            end: as there.
-        """
         return np.unique(np.concatenate([x.breaks(begin, end) for x in self.parts]))
 
     def _means(self, t: np.ndarray, h: np.ndarray) -> np.ndarray:
@@ -199,12 +184,6 @@ class Sum(Signal):
         return out
 
     def mean_of_multisines(self, t: Any, h: Any) -> Any:
-        """As Signal.mean_of_multisines.
-
-        Args:
-            t: as there.
-            h: as there.
-        """
         return sum(k * x.mean_of_multisines(t, h) for x, k in self._terms())
 
 
@@ -273,38 +252,18 @@ class Multisine(Signal):
 
     @property
     def cosines(self) -> np.ndarray:
-        """As Signal.cosines."""
         amplitude = np.tile(self.amplitude, (len(self.omega), 1))
         return np.column_stack((self.omega, self.phase, amplitude))
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
-        """None.
-
-        Args:
-            begin: as Signal.pieces.
-            end: as Signal.pieces.
-            step: as Signal.pieces.
-        """
         return pieces.NO_PIECES
 
     def mean(self, t: Any, h: Any) -> np.ndarray:
-        """As Signal.mean.
-
-        Args:
-            t: as there.
-            h: as there.
-        """
         t, h = np.asarray(t)[..., None], np.asarray(h)[..., None]
         lines = (multisine_line(self.omega, self.phase[:, i], t, h).sum(-1) for i in (0, 1))
         return np.stack([x * self.amplitude[i] for i, x in enumerate(lines)], -1)
 
     def mean_of_multisines(self, t: Any, h: Any) -> Any:
-        """As Signal.mean.
-
-        Args:
-            t: as there.
-            h: as there.
-        """
         return self.mean(t, h)
 
 

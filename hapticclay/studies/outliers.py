@@ -28,17 +28,11 @@ NAMED = 3  # times that a sentence names
 
 
 class Cleaned(NamedTuple):
-    """A column without its outliers.
+    """A column without its outliers."""
 
-    Attributes:
-        x: the column, with outliers replaced by a curve through the samples around, (n,).
-        bad: mask of the outliers, (n,).
-        steps: indices of the samples after a jump that does not return, (m,).
-    """
-
-    x: np.ndarray
-    bad: np.ndarray
-    steps: np.ndarray
+    x: np.ndarray  # with a curve through the samples around in place of outliers, (n,)
+    bad: np.ndarray  # mask of the outliers, (n,)
+    steps: np.ndarray  # indices of the samples after a jump that does not return, (m,)
 
 
 def robust_deviation(x: np.ndarray) -> float:

@@ -107,10 +107,9 @@ def polygon(wall: VirtualWall, turn: Turn, amplitude: Amplitude = 1e-4) -> Path:
 
 
 def imposed(wall: VirtualWall, path: Path, periods: int = 3, steps: int = PATH_STEPS) -> Scenario:
-    """Build the run in which a hand moves the device along a path.
+    """The run in which a hand supplies, kick by kick, the force that a path requires.
 
-    The hand supplies, kick by kick, the force that mass, damper, friction and wall require along
-    the path. The wall's force is its law applied to the path as measured by encoder and difference.
+    The wall's force is its law applied to the path as measured by encoder and difference.
     """
     return _imposed(wall, path, periods, steps)[0]
 

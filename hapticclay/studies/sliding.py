@@ -32,50 +32,28 @@ UNDITHERED = 0.4  # counts: rounding alone leaves 0.29, noise of 0.3 beside it 0
 
 
 class SampledClay(NamedTuple):
-    """The clay at the samples of a record.
+    """The clay at the samples of a record."""
 
-    Attributes:
-        flows: b, Fy, K and n at each, shape (n, 4).
-        dented: where an elastic law resists an indented tool at rest, by name of the law.
-    """
-
-    flows: np.ndarray
-    dented: dict[str, np.ndarray]
+    flows: np.ndarray  # b, Fy, K and n at each, shape (n, 4)
+    dented: dict[str, np.ndarray]  # by law: where it resists an indented tool at rest
 
 
 class Sliding(NamedTuple):
-    """Sliding samples.
+    """Samples that slide; positions and their splines where speeds are not known."""
 
-    Attributes:
-        t: their time [s].
-        sign: of their velocity.
-        f: force against the motion [N].
-        p: positions of these samples and of those between them [m]; empty where speeds are known.
-        v: speeds [m/s], or the coefficients of the motion.
-        slowest: least speed of a sliding sample [m/s].
-        motion: splines through the positions; None where speeds are known.
-        spacing: of their knots [s].
-        force_variance: variance of the force about a free curve [N^2]; nan without one.
-        position_variance: variance of a position [m^2].
-        position_correlation: position samples per independent sample.
-        position_tails: standard deviation of a position over that of normal noise with the same
-            median residual; far above 1, some positions have other errors than noise.
-        at: indices of these samples in the data.
-    """
-
-    t: np.ndarray
-    sign: np.ndarray
-    f: np.ndarray
-    p: np.ndarray
-    v: np.ndarray
-    slowest: float
-    motion: Motion | None
-    spacing: float
-    force_variance: float
-    position_variance: float
-    position_correlation: float
-    position_tails: float
-    at: np.ndarray
+    t: np.ndarray  # [s]
+    sign: np.ndarray  # of the velocity
+    f: np.ndarray  # against the motion [N]
+    p: np.ndarray  # of these samples and of those between them [m], or empty
+    v: np.ndarray  # speeds [m/s], or the coefficients of the motion
+    slowest: float  # least speed of a sliding sample [m/s]
+    motion: Motion | None  # splines through the positions
+    spacing: float  # of their knots [s]
+    force_variance: float  # about a free curve [N^2]; nan without one
+    position_variance: float  # [m^2]
+    position_correlation: float  # samples per independent one
+    position_tails: float  # deviation over that of normal noise with the same median
+    at: np.ndarray  # indices in the data
 
     @property
     def speeds(self) -> np.ndarray:

@@ -28,17 +28,11 @@ WINDOW = 5.0  # correlation times over which autocorrelations are summed (Sokal 
 
 
 class Stretch(NamedTuple):
-    """Samples fitted by one spline.
+    """Samples fitted by one spline."""
 
-    Attributes:
-        t: times [s], (n,), ascending.
-        bends: times at which the acceleration may jump [s], ascending.
-        kept: mask of the samples that count, (n,); None for all.
-    """
-
-    t: np.ndarray
-    bends: Sequence[float] = ()
-    kept: np.ndarray | None = None
+    t: np.ndarray  # [s], (n,), ascending
+    bends: Sequence[float] = ()  # times at which the acceleration may jump [s]
+    kept: np.ndarray | None = None  # mask of the samples that count, (n,); None for all
 
     @property
     def counted(self) -> np.ndarray:
@@ -49,15 +43,7 @@ class Stretch(NamedTuple):
 class Motion:
     """Quartic splines over time, one for each stretch, and their velocities.
 
-    Args:
-        stretches: one or more; their samples are concatenated.
-        spacing: approximate spacing of the knots [s].
-        sliding: indices of the samples whose velocity is used; None for all.
-        sign: direction of each of these, 1.0 or -1.0; None for 1.0.
-
-    Attributes:
-        size: number of coefficients.
-        counted: mask of the samples that count; the position at others is 0.
+    Of `sliding` samples (indices; None for all) the velocity is used, in the direction `sign`.
     """
 
     def __init__(
@@ -68,7 +54,7 @@ class Motion:
         sign: np.ndarray | None = None,
     ):
         places, velocities, first = [], [], []
-        self.size = 0
+        self.size = 0  # of the coefficients
         for stretch in stretches:
             P, V, at = _basis(stretch, spacing)
             places.append(P)
@@ -77,7 +63,7 @@ class Motion:
             self.size += int(at[-1]) + DEGREE + 1
         self._first, self._place = np.concatenate(first), np.concatenate(places)
         self.counted = np.concatenate([x.counted for x in stretches])
-        self._place[~self.counted] = 0.0
+        self._place[~self.counted] = 0.0  # samples that do not count have position 0
         velocity = np.concatenate(velocities)
         chosen = np.arange(len(velocity)) if sliding is None else sliding
         self._velocity, self._near = velocity[chosen], self._first[chosen]
@@ -169,12 +155,7 @@ def _basis(stretch: Stretch, spacing: float) -> tuple[np.ndarray, np.ndarray, np
 
 
 class Series(NamedTuple):
-    """Values to fit.
-
-    Attributes:
-        stretches: their samples.
-        y: the values, (n,), concatenated over the stretches.
-    """
+    """Values to fit over stretches."""
 
     stretches: Sequence[Stretch]
     y: np.ndarray
@@ -204,13 +185,9 @@ def chosen_spacing(series: Sequence[Series]) -> tuple[float, list[float]]:
 
 
 class Flowing(NamedTuple):
-    """A law of force as a function of the speed.
+    """A law of force as a function of the speed; its theta holds log K in place of K."""
 
-    Attributes:
-        names: of its parameters, some of Fy, K, n, b.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # some of Fy, K, n, b
 
     def force(self, theta: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Forces at some speeds [N]."""
@@ -232,44 +209,25 @@ class Flowing(NamedTuple):
 
 
 class Minimum(NamedTuple):
-    """The best joint fit of position and force.
+    """The best joint fit of position and force."""
 
-    Attributes:
-        theta: parameters of the law, with log K in place of K.
-        c: coefficients of the motion [m]; empty where the speed is known.
-        sum: sum of squares of the force without the contribution of velocity noise [N^2].
-        spread: inverse of the normal matrix of the parameters, (k, k); times the variance of a
-            force their covariance.
-        v: speeds [m/s], (n,).
-        rest: residual forces [N], (n,).
-    """
-
-    theta: np.ndarray
-    c: np.ndarray
-    sum: float
-    spread: np.ndarray
-    v: np.ndarray
-    rest: np.ndarray
+    theta: np.ndarray  # with log K in place of K
+    c: np.ndarray  # coefficients of the motion [m]; empty where the speed is known
+    sum: float  # of squared forces, without the part of velocity noise [N^2]
+    spread: np.ndarray  # inverse normal matrix of theta; its covariance per variance of a force
+    v: np.ndarray  # speeds [m/s], (n,)
+    rest: np.ndarray  # residual forces [N], (n,)
 
 
 class Joint(NamedTuple):
-    """Forces with positions or with known speeds.
+    """Forces to fit together with positions, or at known speeds."""
 
-    Attributes:
-        f: resisting forces [N], (n,), positive against the motion.
-        p: positions in the direction of motion [m], (n,); empty where the speed is known.
-        motion: splines; None where the speed is known.
-        start: coefficients fitted to the positions alone, or the known speeds [m/s].
-        ratio: variance of a force over that of a position [N^2/m^2].
-        slowest: speed below which laws are continued by their tangents [m/s].
-    """
-
-    f: np.ndarray
-    p: np.ndarray
-    motion: Motion | None
-    start: np.ndarray
-    ratio: float
-    slowest: float
+    f: np.ndarray  # against the motion [N], (n,)
+    p: np.ndarray  # in the direction of motion [m], (n,); empty where the speed is known
+    motion: Motion | None  # None where the speed is known
+    start: np.ndarray  # coefficients fitted to the positions alone, or the known speeds [m/s]
+    ratio: float  # variance of a force over that of a position [N^2/m^2]
+    slowest: float  # laws are continued by their tangents below this speed [m/s]
 
     def least(
         self,
