@@ -26,14 +26,14 @@ from .traits import (
     Column,
     Hold,
     Law,
+    Quantity,
     Refusal,
     Soft,
-    Told,
     check_traits,
+    local_quantity,
     multiplied,
     present,
-    told_pair,
-    told_values,
+    scene_quantity,
 )
 
 
@@ -303,11 +303,11 @@ class Clay:
         return out
 
     @property
-    def words(self) -> list[Told]:
+    def words(self) -> list[Quantity]:
         """Resistance of the clay over the whole scene."""
-        return [x for kind in self.kinds for x in kind.words(self)] or [Told("b = {}", (0.0,))]
+        return [x for kind in self.kinds for x in kind.words(self)] or [Quantity("b = {}", (0.0,))]
 
-    def here(self, place: tuple[float, float], b: Any = None) -> list[Told]:
+    def here(self, place: tuple[float, float], b: Any = None) -> list[Quantity]:
         """Resistance at a place; empty where there is none.
 
         Args:
@@ -316,7 +316,7 @@ class Clay:
         """
         others = [x for kind in self.kinds for x in kind.here(self, place)]
         b = self.at(*place).tolist() if b is None else b
-        return [*others, *told_pair("b = {}", b, "N.s/m")]
+        return [*others, *local_quantity("b = {}", b, "N.s/m")]
 
     def at(self, x: Any, y: Any) -> np.ndarray:
         """Damping of both axes at given places, without growth.
@@ -337,9 +337,9 @@ _ACROSS = Refusal(
 )
 
 
-def _words(form: str, name: str, unit: str) -> Callable[[Clay], tuple[Told, ...]]:
+def _words(form: str, name: str, unit: str) -> Callable[[Clay], tuple[Quantity, ...]]:
     """A quantity of the cells of both axes."""
-    return lambda clay: told_values(
+    return lambda clay: scene_quantity(
         form, (v for law in clay.laws for v in getattr(law, name).ravel().tolist()), unit
     )
 
@@ -377,7 +377,7 @@ TRAITS = (
     Law(
         "rotated axes", "clay", lambda c: c.angle != 0.0,
         refuses={"passivity controller": _ACROSS, "virtual coupling": _ACROSS},
-        words=lambda c: told_values("axes rotated by {}", (math.degrees(c.angle),), "degrees"),
+        words=lambda c: scene_quantity("axes rotated by {}", (math.degrees(c.angle),), "degrees"),
     ),
 )  # fmt: skip
 # in the order of texts

@@ -10,7 +10,7 @@ import numpy as np
 from ..arguments import part
 from ..errors import Bound, ParameterError
 from ..fields import JOINTS, Seed
-from .traits import LEFT_OUT, YES, Refusal, Told, Trait, present, told_values
+from .traits import LEFT_OUT, YES, Quantity, Refusal, Trait, present, scene_quantity
 
 STIFF = 1e12  # [N/m, N.s/m] upper bound of a coupling
 
@@ -153,70 +153,71 @@ class SampleNoise:
         return np.column_stack((late, lost, hiss))
 
 
-_UNSAMPLED = Refusal("hardware", "must be None unless control is 'sampled'")
-_SAMPLED = {"fast": _UNSAMPLED, "accurate": _UNSAMPLED}
+_UNSAMPLED = dict.fromkeys(
+    ("fast", "accurate"), Refusal("hardware", "must be None unless control is 'sampled'")
+)
 _HELD = {"physical": Refusal("render", "must be 'held' for a passivity controller or a coupling")}
 
 
-def _told_difference(x: Hardware) -> list[Told]:
-    window = [Told("over {} samples", (float(x.velocity_window),))] * (x.velocity_window > 1)
+def _difference_words(x: Hardware) -> list[Quantity]:
+    window = [Quantity("over {} samples", (float(x.velocity_window),))] * (x.velocity_window > 1)
     cutoff = x.velocity_filter
-    low_pass = [] if cutoff is None else [Told("low-pass {}", (cutoff,), "Hz")]
-    return [Told("velocity by difference"), *window, *low_pass]
+    low_pass = [] if cutoff is None else [Quantity("low-pass {}", (cutoff,), "Hz")]
+    return [Quantity("velocity by difference"), *window, *low_pass]
 
 
-def _told_converters(x: Hardware) -> list[Told]:
+def _converter_words(x: Hardware) -> list[Quantity]:
     bits = {"A/D": x.adc_bits, "D/A": x.dac_bits}
-    return [Told(f"{name} {{}}", (float(n),), "bits") for name, n in bits.items() if n]
+    return [Quantity(f"{name} {{}}", (float(n),), "bits") for name, n in bits.items() if n]
 
 
 PARTS = (  # name, whether hardware has it, how linear theory treats it, what refuses it, words
     ("jitter", lambda x: x.jitter > 0.0, LEFT_OUT, {},
-     lambda x: told_values("jitter {}", (x.jitter,), "s rms")),
+     lambda x: scene_quantity("jitter {}", (x.jitter,), "s rms")),
     ("dropouts", lambda x: x.dropout_probability > 0.0, LEFT_OUT, {},
-     lambda x: told_values("dropout probability {}", (x.dropout_probability,))),
+     lambda x: scene_quantity("dropout probability {}", (x.dropout_probability,))),
     ("encoder", lambda x: x.encoder is not None, LEFT_OUT, {},
-     lambda x: told_values("encoder {}", (x.encoder,), "counts per turn")),
+     lambda x: scene_quantity("encoder {}", (x.encoder,), "counts per turn")),
     ("velocity by difference", lambda x: x.velocity == "difference", LEFT_OUT, {},
-     _told_difference),
-    ("converters", lambda x: bool(x.adc_bits or x.dac_bits), LEFT_OUT, {}, _told_converters),
+     _difference_words),
+    ("converters", lambda x: bool(x.adc_bits or x.dac_bits), LEFT_OUT, {}, _converter_words),
     ("force noise", lambda x: x.force_noise > 0.0, LEFT_OUT, {},
-     lambda x: told_values("force noise {}", (x.force_noise,), "N rms")),
+     lambda x: scene_quantity("force noise {}", (x.force_noise,), "N rms")),
     ("force filter", lambda x: x.force_filter is not None, LEFT_OUT, {},
-     lambda x: told_values("force filter {}", (x.force_filter,), "Hz")),
+     lambda x: scene_quantity("force filter {}", (x.force_filter,), "Hz")),
     ("delay", lambda x: x.delay > 0.0, YES, {},
-     lambda x: told_values("delay {}", (x.delay,), "s")),
+     lambda x: scene_quantity("delay {}", (x.delay,), "s")),
     ("joint friction", lambda x: any(x.friction), LEFT_OUT, {},
-     lambda x: [Told(f"joint friction ({x.friction[0]:.4g}, {x.friction[1]:.4g})", (), "N.m")]),
+     lambda x: [Quantity(f"joint friction ({x.friction[0]:.4g}, {x.friction[1]:.4g})", (), "N.m")]),
     ("passivity controller", lambda x: x.passivity, LEFT_OUT, _HELD,
-     lambda x: [Told("passivity controller")]),
+     lambda x: [Quantity("passivity controller")]),
     ("virtual coupling", lambda x: x.coupling is not None, LEFT_OUT, _HELD,
      lambda x: [
-         Told("virtual coupling {}", (x.coupling.spring,), "N/m"),
-         Told("{}", (x.coupling.damper,), "N.s/m"),
+         Quantity("virtual coupling {}", (x.coupling.spring,), "N/m"),
+         Quantity("{}", (x.coupling.damper,), "N.s/m"),
      ]),
 )  # fmt: skip
 
 
-def _trait(name: str, of: Any, theory: str, refuses: dict[str, Refusal], words: Any) -> Trait:
+def _trait(name: str, has: Any, theory: str, refuses: dict[str, Refusal], words: Any) -> Trait:
     """The trait of scenes whose hardware has a part."""
     return Trait(
         name,
         "part",
-        lambda s: s.hardware is not None and of(s.hardware),
+        lambda s: s.hardware is not None and has(s.hardware),
         theory,
-        _SAMPLED | refuses,
+        _UNSAMPLED | refuses,
         lambda s: words(s.hardware),
     )
 
 
 def hardware_words(scenario: Any) -> str:
     """The parts of the hardware of a scenario, with units; "ideal" if there are none."""
-    found = [told.text() for x in present(scenario, TRAITS[1:]) for told in x.words(scenario)]
+    found = [x.text() for part in present(scenario, TRAITS[1:]) for x in part.words(scenario)]
     return ", ".join(found) or "ideal"
 
 
 TRAITS = (
-    Trait("hardware", "part", lambda s: s.hardware is not None, YES, _SAMPLED),
+    Trait("hardware", "part", lambda s: s.hardware is not None, YES, _UNSAMPLED),
     *(_trait(*part) for part in PARTS),
 )

@@ -147,18 +147,18 @@ class Function(Signal):
 
     def _at(self, t: float) -> tuple[float, float]:
         """Value at one time."""
-        told = f"f({t:.12g}) must be a pair (x, y) of finite numbers"
+        bound = f"f({t:.12g}) must be a pair (x, y) of finite numbers"
         try:
             given = self.f(t)
         except Exception as error:  # noqa: BLE001  # whatever a user's function may raise
             why = " ".join(f"{type(error).__name__}: {error}".split())
-            raise ParameterError("function.f", self.f, f"{told}, but raised {why}") from error
+            raise ParameterError("function.f", self.f, f"{bound}, but raised {why}") from error
         try:
             x, y = (float(v) for v in given)
         except (TypeError, ValueError):
-            raise ParameterError("function.f", self.f, f"{told}, not {given!r:.60}") from None
+            raise ParameterError("function.f", self.f, f"{bound}, not {given!r:.60}") from None
         if not (math.isfinite(x) and math.isfinite(y)):
-            raise ParameterError("function.f", self.f, f"{told}, not ({x}, {y})")
+            raise ParameterError("function.f", self.f, f"{bound}, not ({x}, {y})")
         return x, y
 
     def _together(self, t: np.ndarray) -> np.ndarray | None:

@@ -35,10 +35,10 @@ class Trait:
     has: Callable[[Any], bool]  # whether a scene has it; for a clay trait, the argument is the clay
     theory: str = YES  # how linear theory treats the part
     refuses: Mapping[str, Refusal] = field(default_factory=dict)  # by the name of the other part
-    words: Callable[[Any], Sequence[Told]] = _none  # its quantities, from the argument of `has`
+    words: Callable[[Any], Sequence[Quantity]] = _none  # its quantities, from the argument of `has`
 
 
-class Told(NamedTuple):
+class Quantity(NamedTuple):
     """A quantity of a part, for tables, titles and texts."""
 
     form: str  # words, with {} in place of the values
@@ -111,7 +111,7 @@ class Law(Trait):
     varies: str = ""  # what damping within a region depends on, "time" or "place"
     columns: tuple[Column, ...] = ()  # of a stretch, besides damping
     at: Callable[[Any, Any], Sequence[float]] = _none  # (law, (x, y) [m]): values of `columns`
-    here: Callable[[Any, Any], Sequence[Told]] = _none  # (clay, (x, y) [m]): of both axes
+    here: Callable[[Any, Any], Sequence[Quantity]] = _none  # (clay, (x, y) [m]): of both axes
     # (law, speed [m/s], indentation [m]): force of each cell [N]
     force: Callable[[Any, float, float], Any] | None = None
     holds: Callable[[Any, int], Hold | None] | None = None  # (clay, axis 0 or 1)
@@ -129,20 +129,20 @@ def multiplied(values: Any, factor: float, most: float, least: float = 0.0) -> A
     return min(max(values * factor, least), most) if values else values
 
 
-def told_values(form: str, values: Iterable[float], unit: str = "") -> tuple[Told, ...]:
+def scene_quantity(form: str, values: Iterable[float], unit: str = "") -> tuple[Quantity, ...]:
     """A quantity over a scene, or nothing if all its values are 0."""
     some = tuple(v for v in dict.fromkeys(values) if v)
-    return (Told(form, some, unit),) * bool(some)
+    return (Quantity(form, some, unit),) * bool(some)
 
 
-def told_pair(form: str, values: Sequence[float], unit: str = "") -> tuple[Told, ...]:
+def local_quantity(form: str, values: Sequence[float], unit: str = "") -> tuple[Quantity, ...]:
     """A quantity of both axes at a place: one number if they agree, nothing if both are 0."""
     x, y = map(float, values)
     if not (x or y):
         return ()
     if x == y:
-        return (Told(form, (x,), unit),)
-    return (Told(form.format(f"({x:.4g}, {y:.4g})"), (), unit),)
+        return (Quantity(form, (x,), unit),)
+    return (Quantity(form.format(f"({x:.4g}, {y:.4g})"), (), unit),)
 
 
 def present(scene: Any, traits: Iterable[T]) -> list[T]:

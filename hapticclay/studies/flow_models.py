@@ -11,14 +11,14 @@ import numpy as np
 from ..arguments import named
 from .outliers import robust_deviation
 from .sliding import Sliding
-from .trajectory import FIT_RANGES, Flowing, Joint, Minimum
+from .trajectory import FIT_RANGES, ForceLaw, JointFit, Minimum
 
-FLOW_LAWS: dict[str, Flowing] = {  # from simple to rich, named as `Flow.kind`
-    "viscous": Flowing(("b",)),
-    "Coulomb": Flowing(("Fy",)),
-    "Bingham": Flowing(("Fy", "b")),
-    "power law": Flowing(("K", "n")),
-    "Herschel-Bulkley": Flowing(("Fy", "K", "n")),
+FLOW_LAWS: dict[str, ForceLaw] = {  # from simple to rich, named as `Flow.kind`
+    "viscous": ForceLaw(("b",)),
+    "Coulomb": ForceLaw(("Fy",)),
+    "Bingham": ForceLaw(("Fy", "b")),
+    "power law": ForceLaw(("K", "n")),
+    "Herschel-Bulkley": ForceLaw(("Fy", "K", "n")),
 }
 RICHEST = "Herschel-Bulkley"
 FLOW_UNITS = {"Fy": "N", "K": "N/(m/s)^n", "n": "", "b": "N.s/m"}
@@ -82,15 +82,15 @@ def first_guesses(law: str, v: np.ndarray, f: np.ndarray) -> np.ndarray:
     return theta_of(best[1], law)
 
 
-def best_fit(joint: Joint, law: str, start: np.ndarray) -> tuple[Minimum, Minimum]:
+def best_fit(joint: JointFit, law: str, start: np.ndarray) -> tuple[Minimum, Minimum]:
     """Least-squares fits with Fy, b >= 0, and with Fy, b of any sign."""
     flowing = FLOW_LAWS[law]
-    free = found = joint.least(flowing, start)
+    free = found = joint.solve(flowing, start)
     held = np.zeros(len(start), dtype=bool)
     signed = np.array([x in ("Fy", "b") for x in flowing.names])
     while (bad := signed & (found.theta < 0.0)).any():
         held |= bad
-        found = joint.least(flowing, np.where(held, 0.0, found.theta), held.tolist())
+        found = joint.solve(flowing, np.where(held, 0.0, found.theta), held.tolist())
     return found, free
 
 
@@ -104,7 +104,7 @@ def outlying_forces(s: Sliding) -> np.ndarray:
     least = SMALLEST_OUTLIER / OUTLYING * float(np.median(np.abs(s.f)))
     out = np.zeros(len(v), dtype=bool)
     for _ in range(40):
-        joint = Joint(s.f[~out], s.p[:0], None, v[~out], 0.0, 0.5 * s.slowest)
+        joint = JointFit(s.f[~out], s.p[:0], None, v[~out], 0.0, 0.5 * s.slowest)
         found, _ = best_fit(joint, RICHEST, first_guesses(RICHEST, v[~out], s.f[~out]))
         force, slope, _ = FLOW_LAWS[RICHEST].slopes(found.theta, v)
         rest = np.abs(s.f - force)
@@ -120,7 +120,7 @@ def outlying_forces(s: Sliding) -> np.ndarray:
     return out
 
 
-def refit_nested(joint: Joint, found: dict[str, tuple[Minimum, Minimum]]) -> None:
+def refit_nested(joint: JointFit, found: dict[str, tuple[Minimum, Minimum]]) -> None:
     """Fit the richest law again from a simpler law that it contains, if that one fits better."""
     if RICHEST not in found:
         return
@@ -142,7 +142,7 @@ def student_quantile(level: float, freedom: float) -> float:
 
 
 def parameter_intervals(
-    joint: Joint, law: str, best: Minimum, free: Minimum, variance: float, quantile: float
+    joint: JointFit, law: str, best: Minimum, free: Minimum, variance: float, quantile: float
 ) -> tuple[FlowParameter, ...]:
     """Profile intervals: where the profiled sum of squares rises by quantile^2 variance."""
     names, out = FLOW_LAWS[law].names, []
@@ -157,7 +157,7 @@ def parameter_intervals(
 
 
 def _crossing(
-    joint: Joint,
+    joint: JointFit,
     law: str,
     free: Minimum,
     j: int,
@@ -176,7 +176,7 @@ def _crossing(
         step = x - float(theta[j])
         start = theta + spread[:, j] * (step / spread[j, j])
         start[j] = x
-        rise = joint.least(FLOW_LAWS[law], start, held, free.c).sum - free.sum
+        rise = joint.solve(FLOW_LAWS[law], start, held, free.c).sum - free.sum
         ratio = math.sqrt(max(rise, 0.0) / variance) / abs(target)
         if abs(ratio - 1.0) < 0.01 or (x in limits and ratio < 1.0):
             break

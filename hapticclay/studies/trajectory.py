@@ -184,7 +184,7 @@ def chosen_spacing(series: Sequence[Series]) -> tuple[float, list[float]]:
     return best[1:]
 
 
-class Flowing(NamedTuple):
+class ForceLaw(NamedTuple):
     """A law of force as a function of the speed; its theta holds log K in place of K."""
 
     names: tuple[str, ...]  # some of Fy, K, n, b
@@ -219,7 +219,7 @@ class Minimum(NamedTuple):
     rest: np.ndarray  # residual forces [N], (n,)
 
 
-class Joint(NamedTuple):
+class JointFit(NamedTuple):
     """Forces to fit together with positions, or at known speeds."""
 
     f: np.ndarray  # against the motion [N], (n,)
@@ -229,9 +229,9 @@ class Joint(NamedTuple):
     ratio: float  # variance of a force over that of a position [N^2/m^2]
     slowest: float  # laws are continued by their tangents below this speed [m/s]
 
-    def least(
+    def solve(
         self,
-        law: Flowing,
+        law: ForceLaw,
         theta: np.ndarray,
         held: Sequence[bool] = (),
         near: np.ndarray | None = None,
@@ -273,20 +273,20 @@ class Joint(NamedTuple):
         return self.ratio * float(np.sum((self.p - self.motion.place(c)) ** 2))
 
     def _look(
-        self, law: Flowing, theta: np.ndarray, c: np.ndarray
+        self, law: ForceLaw, theta: np.ndarray, c: np.ndarray
     ) -> tuple[float, np.ndarray, np.ndarray]:
         v = c if self.motion is None else self.motion.velocity(c)
         with np.errstate(over="ignore", invalid="ignore"):
             rest = self.f - self._continued(law, theta, v)[0]
             return float(rest @ rest) + self._position_sum(c), v, rest
 
-    def _continued(self, law: Flowing, theta: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _continued(self, law: ForceLaw, theta: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, ...]:
         """Forces and slopes of a law, continued by its tangent below the slowest speed."""
         force, slope, columns = law.slopes(theta, np.maximum(v, self.slowest))
         return force + slope * np.minimum(v - self.slowest, 0.0), slope, columns
 
     def _step(
-        self, law: Flowing, theta: np.ndarray, c: np.ndarray, free: np.ndarray
+        self, law: ForceLaw, theta: np.ndarray, c: np.ndarray, free: np.ndarray
     ) -> tuple[np.ndarray, Any, np.ndarray]:
         """Step of the free parameters and of the motion; spread of the parameters."""
         v = c if self.motion is None else self.motion.velocity(c)
