@@ -62,6 +62,7 @@ default_role = "py:obj"  # `name` in a docstring links to the name, where there 
 myst_heading_anchors = 4
 myst_enable_extensions = ["dollarmath"]
 myst_fence_as_directive = ["math"]  # as GitHub writes display formulas
+mathjax3_config = {"chtml": {"scale": 0.95}}  # letters as high as those of the text
 suppress_warnings = ["config.cache"]  # of functions in sphinx_gallery_conf
 nitpicky = True
 nitpick_ignore_regex = [

@@ -5,6 +5,8 @@ from . import ports as ports
 from . import studies as studies
 from . import theory as theory
 from . import walls as walls
+from .arms.joint_law import JointPD as JointPD
+from .arms.mjcf_arm import MjcfArm as MjcfArm
 from .errors import Bound as Bound
 from .errors import ParameterError as ParameterError
 from .errors import Warning as Warning

@@ -14,7 +14,7 @@ TABLE_STYLE = "border-collapse:collapse;margin:0.3em 0;color:inherit;background:
 FEW = 4  # numbers of a tuple that are all shown
 MANY_DIGITS = 1e4, 1e7  # sizes of numbers that are shown to the last whole digit
 _NUMBER = r"[-+]?\d[\d.]*(e[-+]\d+)?"
-NUMERIC = re.compile(rf"(< )?{_NUMBER}( (to|-) {_NUMBER})?( \S+)?|-|any|")
+NUMERIC = re.compile(rf"(< )?{_NUMBER}( (to|-) {_NUMBER})?( \S+)?|-|any")
 WIDEST = 80  # [characters] of a table whose headings stand on one line
 CELL_STYLE = (  # this grey is visible on white and on black
     "padding:0.15em 0.8em 0.15em 0;border:0;border-top:1px solid rgba(128,128,128,0.4);"
@@ -82,8 +82,9 @@ def text_table(
 
 
 def _are_numbers(cells: Iterable[str]) -> bool:
-    """Whether all texts are numbers or ranges, with or without a unit."""
-    return any(cells) and all(NUMERIC.fullmatch(x) for x in cells)
+    """Whether most texts are numbers or ranges, with or without a unit."""
+    matches = [NUMERIC.fullmatch(x) is not None for x in cells if x]
+    return 2 * sum(matches) > len(matches)
 
 
 def cell_text(x: Any, form: str = "") -> str:

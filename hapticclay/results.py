@@ -144,7 +144,12 @@ class Result:
         return with_schema(self.written_as, {**self.contents(), **units})
 
     def write(self, folder: Path, asked: Mapping[str, Any] | None = None) -> None:
-        """Writes folder/NAME.json: the summary, and the question that a command was asked."""
+        """Writes NAME.json, the summary, as a command does.
+
+        Args:
+            folder: where to.
+            asked: the question, which the file repeats.
+        """
         write_json({**self.summary(), **(asked or {})}, folder / f"{self.written_as}.json")
 
     def save(self, path: str | os.PathLike[str]) -> Path:

@@ -11,10 +11,11 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from ..errors import Bound
 from ..files import atomic
+from .unused import Unused, undrawn
 
 if TYPE_CHECKING:
     from ..results import Result
@@ -155,6 +156,8 @@ class FigureOptions:
     dpi: Annotated[float | None, Bound(10.0, 2400.0)] = None
     style: Literal["screen", "print", "print-wide"] = "screen"
     data: bool = False
+
+    unused: ClassVar[tuple[Unused, ...]] = (undrawn("no-plots"), undrawn("no-maps"))
 
 
 def save_figures(

@@ -2,20 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import dataclass
 
 from ..display import text_table
-from ..errors import Bound
-
-if TYPE_CHECKING:
-    from ..model.tool import Tool
-
-
-def _small_tool(name: str) -> float:
-    from ..model.materials import SMALL_TOOL
-
-    return getattr(SMALL_TOOL, name)
+from ..model.tool import SMALL_TOOL, Tool
+from .options import Prefixed
 
 
 @dataclass(frozen=True)
@@ -25,21 +16,13 @@ class MaterialsCommand:
     The force on a tool at the speed v is Fy + K v^n + b v; lowest and highest are the range of Fy.
 
     Attributes:
-        tool_width: Width of the tool [m].
-        tool_depth: Depth of the cut [m].
+        tool: The tool.
     """
 
-    tool_width: Annotated[float, Bound(unit="m")] = field(
-        default_factory=lambda: _small_tool("width")
-    )
-    tool_depth: Annotated[float, Bound(unit="m")] = field(
-        default_factory=lambda: _small_tool("depth")
-    )
+    tool: Prefixed[Tool] = SMALL_TOOL
 
     def __call__(self) -> int:
-        from ..model.tool import Tool
-
-        print(material_table(Tool(self.tool_width, self.tool_depth)))
+        print(material_table(self.tool))
         return 0
 
 

@@ -19,16 +19,17 @@ from typing import (
     get_type_hints,
 )
 
-from ..fields import UNSET, Node, field_descriptions, node_of, of_words
+from ..fields import Node, field_descriptions, node_of, of_words
 
 if TYPE_CHECKING:
     from ..scene.experiments import Experiment
 
 T = TypeVar("T")
-LOOSE, SCENARIO, RECORD = "loose", "scenario", "record"
+LOOSE, SCENARIO, RECORD, PREFIXED = "loose", "scenario", "record", "prefixed"
 Loose = Annotated[T, LOOSE]  # a word without a name
 ScenarioWord = Annotated[Any, SCENARIO]  # an experiment, or a scenario file
 RecordWord = Annotated[Any, RECORD]  # or a saved record
+Prefixed = Annotated[T, PREFIXED]  # a part: --tool-width for the width of a tool
 SET = "set"  # the option for the fields of a scenario
 SET_HELP = (
     "Any field of the scenario, part by part, as in --set arm.l1=0.3 servo.x.G.damping=50 "
@@ -75,6 +76,7 @@ class Option:
         part: field of the command in which the option lies; SCENARIO for those of an experiment, ""
             for the command's own.
         note: LOOSE, SCENARIO or RECORD for a word without a name; "" for others.
+        field: name of the field, without the prefix of a part.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Option:
     default: Any
     part: str = ""
     note: str = ""
+    field: str = ""
 
     @property
     def word(self) -> str:
@@ -105,26 +108,27 @@ class Option:
         return of_words(self.node, self.label, texts)
 
 
-def parts_of(kind: type) -> dict[str, type]:
-    """The dataclasses among the fields of a command, by the names of the fields."""
-    return {name: hint for name, hint in get_type_hints(kind).items() if is_dataclass(hint)}
+def parts_of(kind: type) -> dict[str, Any]:
+    """Defaults of the fields of a command that are dataclasses."""
+    return {f.name: f.default for f in dataclasses.fields(kind) if is_dataclass(f.default)}
 
 
-def options_of(kind: type, part: str = "") -> dict[str, Option]:
-    """The options of a dataclass, and of dataclasses among its fields, by name."""
+def options_of(
+    kind: type, part: str = "", start: Any = None, prefix: str = ""
+) -> dict[str, Option]:
+    """The options of a command by name; of a part of it, with the defaults of `start`."""
     hints, about = get_type_hints(kind, include_extras=True), field_descriptions(kind)
     out: dict[str, Option] = {}
     for field in dataclasses.fields(kind):
-        name, hint = field.name, hints[field.name]
-        if is_dataclass(hint):
-            out |= options_of(hint, name)  # type: ignore[arg-type]
-            continue
-        made = field.default_factory
-        default = field.default if made is UNSET else made()
+        hint, default = hints[field.name], getattr(start, field.name, field.default)
         notes = getattr(hint, "__metadata__", ())
+        if is_dataclass(default):
+            head = f"{field.name}_" if PREFIXED in notes else ""
+            out |= options_of(type(default), field.name, default, head)
+            continue
         note = next((x for x in (LOOSE, SCENARIO, RECORD) if x in notes), "")
-        node = _option_node(get_args(hint)[0] if note else hint)
-        out[name] = Option(name, node, about[name], default, part, note)
+        node, name = _option_node(get_args(hint)[0] if note else hint), prefix + field.name
+        out[name] = Option(name, node, about[field.name], default, part, note, field.name)
     return out
 
 
@@ -144,9 +148,10 @@ def _node_for(hint: Any) -> Node:
     items = get_args(kind) if get_origin(kind) is tuple else ()
     if kind in (str, Path) and not others:
         return Verbatim(kind)
-    if items[1:] == (...,) or (items and get_origin(items[0]) is Annotated):
+    many = items[1:] == (...,)
+    if many or (items and get_origin(items[0]) is Annotated):
         each = [Annotated[(x, *notes)] if notes else x for x in items if x is not ...]
-        return Several([_option_node(x) for x in each], items[-1] is ...)
+        return Several([_option_node(x) for x in each], many)
     return node_of(hint)
 
 
@@ -155,6 +160,6 @@ def experiment_options(kind: type[Experiment]) -> dict[str, Option]:
     from ..scene.experiments import parameters
 
     return {
-        name: Option(name, f.node, f.about, f.default, SCENARIO)
+        name: Option(name, f.node, f.about, f.default, SCENARIO, "", name)
         for name, f in parameters(kind).items()
     }

@@ -30,10 +30,11 @@ from .options import (
     options_of,
     parts_of,
 )
-from .unused import Unused, refuse_unused
+from .unused import Unused
 
 NEGATIVE = re.compile(r"^-(?=\.?\d|inf$|nan$)")  # no option: it gets a space in front
 EXPERIMENT, FILE = "experiment", "file"  # and RECORD: where a scenario comes from
+SET_WORDS = Several([Verbatim(str)], many=True)
 OF_SAMPLING = Unused(
     ("render",),
     "is of sampled control: give --control sampled too",
@@ -69,14 +70,16 @@ class Line:
     def command(self) -> Any:
         """The command with its options, ready to be called; files are read only now."""
         own = self._values("")
-        own |= {part: kind(**self._values(part)) for part, kind in parts_of(self.kind).items()}
+        for part, default in parts_of(self.kind).items():
+            own[part] = replace(default, **self._values(part))
         if self.origin:
             own[SCENARIO] = self._scenario(self._values(SCENARIO))
         return self.kind(**own)
 
     def _values(self, part: str) -> dict[str, Any]:
         """What was given of a part of the command."""
-        return {name: x for name, x in self.values.items() if self.options[name].part == part}
+        given = ((self.options[name], x) for name, x in self.values.items())
+        return {option.field: x for option, x in given if option.part == part}
 
     def _scenario(self, parameters: dict[str, Any]) -> Any:
         """The scenario, or the record."""
@@ -109,9 +112,11 @@ def read(words: Sequence[str]) -> Line:
     except cyclopts.CycloptsError as error:
         raise _refusal(error, line) from None
     given = {line.options[name]: texts for name, texts in bound.arguments.items() if texts != ()}
-    kinds = (line.kind, *parts_of(line.kind).values())
-    rules = (rule for kind in kinds for rule in getattr(kind, "unused", ()))
-    refuse_unused((*rules, OF_SAMPLING), _given_words(line, given))
+    owners = (line.kind, *parts_of(line.kind).values())
+    rules = (rule for owner in owners for rule in getattr(owner, "unused", ()))
+    by_word = _given_words(line, given)
+    for rule in (*rules, OF_SAMPLING):
+        rule.refuse(by_word)
     values = {
         option.name: texts if isinstance(texts, bool) else option.value(texts)
         for option, texts in given.items()
@@ -140,7 +145,7 @@ def begun(words: Sequence[str], whole: bool = True) -> tuple[Line, list[str]]:
     origin, source = _scenario_of(line, rest, at)
     of_scenario = experiment_options(EXPERIMENTS[source]) if origin == EXPERIMENT else {}
     if origin != RECORD:
-        of_scenario[SET] = Option(SET, Several([Verbatim(str)], many=True), SET_HELP, (), SCENARIO)
+        of_scenario[SET] = Option(SET, SET_WORDS, SET_HELP, (), SCENARIO, "", SET)
     own = {name: option for name, option in line.options.items() if name != SCENARIO}
     return replace(line, options=own | of_scenario, origin=origin, source=source), rest
 

@@ -14,7 +14,7 @@ from ..files import writable
 from ..model.constants import AXES
 from . import console
 from .options import ScenarioWord
-from .unused import Unused, undrawn
+from .unused import Unused
 
 if TYPE_CHECKING:
     from ..model.clay import Clay
@@ -62,7 +62,6 @@ class RunCommand:
         Unused(("integrator",), CHOSEN, ("error",)),
         Unused(("dt",), CHOSEN, ("error",), ("control=sampled",)),
         Unused(("dt",), CHOSEN, ("error", "Ts")),
-        *undrawn("no-plots"),
     )
 
     def __call__(self) -> int:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from ..errors import Bound, ParameterError
 from . import console
 from .options import Loose
-from .unused import Unused, undrawn
+from .unused import Unused
 
 if TYPE_CHECKING:
     from ..studies.sweep import Sweep
@@ -79,7 +79,6 @@ class SweepCommand:
         ),
         Unused(("seed",), "is of a sample: give --design lhs or sobol", (), ("spec", *SAMPLED)),
         Unused(("workers",), "is for this machine: leave it out with --scheduler", ("scheduler",)),
-        *undrawn("no-maps"),
     )
 
     def __call__(self) -> int:

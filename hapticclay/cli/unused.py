@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from ..errors import ParameterError
@@ -40,16 +40,11 @@ class Unused(NamedTuple):
 FIGURE_WORDS = "format", "dpi", "style", "data"
 
 
-def undrawn(*switches: str) -> tuple[Unused, ...]:
+def undrawn(switch: str) -> Unused:
     """Options of figures beside an option that leaves the figures out."""
-    why = "is for figures, which --{} leaves out: give one of the two"
-    return tuple(Unused(FIGURE_WORDS, why.format(x), (x,)) for x in switches)
-
-
-def refuse_unused(rules: Iterable[Unused], given: Given) -> None:
-    """Refuses options that would do nothing."""
-    for rule in rules:
-        rule.refuse(given)
+    return Unused(
+        FIGURE_WORDS, f"is for figures, which --{switch} leaves out: give one of the two", (switch,)
+    )
 
 
 def _is_given(word: str, given: Given) -> bool:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from ..errors import Bound
 from ..files import writable
+from ..model.tool import Tool
 from . import console
-from .options import RecordWord
+from .options import Prefixed, RecordWord
 from .run import simulate_with_progress
-from .view import tool_size
 
 Pixels = Annotated[int, Bound(1, 100_000)]
 
@@ -29,8 +29,7 @@ class VideoCommand:
         size: Width and height [pixels].
         plots: Show the running plots on the right, if there is room: from 320 x 100.
         smooth: Soften edges and shadows; takes twice as long without a graphics card.
-        tool_width: Width of the tool [m].
-        tool_depth: Depth of the cut [m].
+        tool: The tool.
     """
 
     scenario: RecordWord
@@ -40,17 +39,15 @@ class VideoCommand:
     size: tuple[Pixels, Pixels] = (960, 480)
     plots: bool = True
     smooth: bool = False
-    tool_width: Annotated[float, Bound(unit="m")] = field(default_factory=tool_size("width"))
-    tool_depth: Annotated[float, Bound(unit="m")] = field(default_factory=tool_size("depth"))
+    tool: Prefixed[Tool] = Tool()
 
     def __call__(self) -> int:
         from ..simulation.record import Record
-        from ..studies.removal import Tool
         from ..views import film
 
-        tool, record = Tool(self.tool_width, self.tool_depth), self.scenario
+        record = self.scenario
         options = film.FilmOptions(
-            self.camera, self.speed, self.size, self.plots, self.smooth, tool
+            self.camera, self.speed, self.size, self.plots, self.smooth, self.tool
         )
         writable(self.out.parent)
         film.ready(self.out, options)

@@ -5,34 +5,23 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-from ..errors import Bound, ParameterError
+from ..errors import ParameterError
 from ..files import writable
+from ..model.tool import Tool
 from . import console
 from .device_options import DeviceOptions
-from .options import RecordWord
+from .options import Prefixed, RecordWord
 from .run import deliver_record
-from .unused import FIGURE_WORDS, Unused, undrawn
+from .unused import FIGURE_WORDS, Unused
 
 if TYPE_CHECKING:
     from ..live.replay import Replay
     from ..live.session import Session
     from ..simulation.record import Record
-    from ..studies.removal import Tool
-
-
-def tool_size(name: str) -> Callable[[], float]:
-    """A function that returns the default of a field of Tool, which is imported only then."""
-
-    def size() -> float:
-        from ..studies.removal import TOOL
-
-        return getattr(TOOL, name)
-
-    return size
 
 
 HAND, SERVER = ("device",), ("device-server",)
@@ -49,8 +38,7 @@ class ViewCommand:
         scenario: The experiment, a scenario file, or the folder of a record.
         stiffness: Stiffness of the hand as a multiple of the spring of Th (Eq. 19); 1 is the
             paper's arm at rest.
-        tool_width: Width of the tool [m].
-        tool_depth: Depth of the cut [m].
+        tool: The tool.
         out: Folder for record.npz, summary.json and the plots; by default out/view/EXPERIMENT.
         every: Keep every n-th sample in the record.
         plots: Draw the plots.
@@ -65,8 +53,7 @@ class ViewCommand:
 
     scenario: RecordWord
     stiffness: float = 10.0
-    tool_width: Annotated[float, Bound(unit="m")] = field(default_factory=tool_size("width"))
-    tool_depth: Annotated[float, Bound(unit="m")] = field(default_factory=tool_size("depth"))
+    tool: Prefixed[Tool] = Tool()
     out: Path | None = None
     every: int = 10
     plots: bool = True
@@ -95,19 +82,16 @@ class ViewCommand:
         Unused(("device-rate", "coupling"), "is of your device: give --device too", (), HAND),
         Unused(("device-plane", "device-force"), "is of a device: give one too", (), HAND + SERVER),
         Unused(("stiffness",), "is of the hand at the mouse: your device is the hand", HAND),
-        *undrawn("no-plots"),
     )
 
     def __call__(self) -> int:
         from ..simulation.record import Record
-        from ..studies.removal import Tool
 
-        tool = Tool(self.tool_width, self.tool_depth)
         if isinstance(self.scenario, Record):
-            replay(self.scenario, tool, self.stream)
+            replay(self.scenario, self.tool, self.stream)
             return 0
         writable(self.out or Path("out/view"))
-        with self.devices.session(self.scenario, self.stiffness, tool, self.every) as session:
+        with self.devices.session(self.scenario, self.stiffness, self.tool, self.every) as session:
             self._play(session)
         if not session.recorded:
             print("nothing was recorded")

@@ -1,13 +1,9 @@
-"""MuJoCo, and the model of a scenario.
-
-MuJoCo is imported for any MUJOCO_GL: a run draws nothing, and views report their own errors.
-"""
+"""The model of a scenario."""
 
 import copy
 import ctypes
 import functools
 import math
-import os
 from pathlib import Path
 from typing import Any
 
@@ -15,21 +11,10 @@ import numpy as np
 
 from ..arguments import checked
 from ..model.arm import PAPER, Arm
+from ..physics import mujoco, warnings_caught
 from ..scene.scenario import Scenario
 
-try:
-    import mujoco
-except (AttributeError, ImportError, OSError, RuntimeError):  # each backend has its own
-    wanted = os.environ.get("MUJOCO_GL")
-    if wanted is None:
-        raise
-    os.environ["MUJOCO_GL"] = "disable"
-    try:
-        import mujoco
-    finally:
-        os.environ["MUJOCO_GL"] = wanted
-
-__all__ = ["mujoco"]
+__all__ = ["mujoco", "warnings_caught"]
 
 LINK2_SHARE = 0.4  # of I1, at most, that the mass of link 2 at the elbow takes; 0.396 in arm.xml
 OPTIONS = 32  # numbers before the gravity of a model, among which its timestep is
@@ -40,19 +25,6 @@ def mjcf_folder() -> Path:
     package = Path(__file__).resolve().parents[1]
     checkout = package.parent / "mjcf"
     return checkout if (checkout / "arm.xml").is_file() else package / "mjcf"
-
-
-class warnings_caught:
-    """Collects the engine's warnings instead of writing MUJOCO_LOG.TXT, for a `with`."""
-
-    def __enter__(self) -> list[str]:
-        caught: list[str] = []
-        self.before = mujoco.get_mju_user_warning()
-        mujoco.set_mju_user_warning(caught.append)
-        return caught
-
-    def __exit__(self, *error: object) -> None:
-        mujoco.set_mju_user_warning(self.before)
 
 
 @checked
@@ -133,8 +105,8 @@ def arm_at(q: tuple[float, float], arm: Arm = PAPER) -> tuple[np.ndarray, np.nda
 def timestep_view(model: mujoco.MjModel) -> np.ndarray:
     """A view of model.opt.timestep, shape (1,).
 
-    The engine shows its gravity as an array, which stands in the same record of options, behind the
-    timestep; where, is found by two values that are written there.
+    The engine shows its gravity as an array, which lies in the same record of options, after the
+    timestep. Two values written to the timestep find where that lies.
     """
     start = model.opt.gravity.ctypes.data - 8 * OPTIONS
     memory: Any = (ctypes.c_double * OPTIONS).from_address(start)

@@ -11,11 +11,10 @@ from ..errors import Bound, ParameterError, choice
 from ..formulas.constants import B_MAX
 from .constants import B_CONSTANT
 from .flow import Flow, FlowIndex
-from .tool import Tool
+from .tool import SMALL_TOOL, Tool
 
 KPA = 1e3  # [Pa]
 BEARING_LOW, BEARING_HIGH = 2.0 + math.pi, 9.0  # strip at the surface (Prandtl); deep square
-SMALL_TOOL = Tool(0.010, 0.005)
 
 TERZAGHI = "Terzaghi, Peck & Mesri 1996: half of the unconfined compressive strength"
 # Unconfined compressive strength q [kPa]; "hard", above 400, is omitted: it has no upper limit

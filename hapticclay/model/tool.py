@@ -15,9 +15,12 @@ class Tool:
     """The cutting tool at the handle.
 
     Attributes:
-        width: of its round footprint, across the motion [m], 0.004 to 0.1.
-        depth: of the cut [m], 0.0001 to 0.025.
+        width: diameter of its round footprint, across the motion [m], 0.004 to 0.1.
+        depth: depth of the cut [m], 0.0001 to 0.025.
     """
 
     width: Annotated[float, Bound(WIDTH_MIN, 0.1, "m")] = 0.02
     depth: Annotated[float, Bound(1e-4, 0.025, "m")] = 0.01
+
+
+SMALL_TOOL = Tool(0.010, 0.005)

@@ -183,7 +183,11 @@ class LoopReport(Result):
         return f"; {self.rate_needed:.4g} Hz would do"
 
     def text(self, form: str = "") -> str:
-        """The report, a quantity a line, and the headline."""
+        """The report, a quantity a line, and the headline.
+
+        Args:
+            form: as in `Result.text`.
+        """
         report = self.tables()["report"]
         values = [value for (value,) in report.values()]
         return f"{text_table({'loop': list(report), '': values}, form=form)}\n{self.headline()}"
@@ -193,7 +197,12 @@ class LoopReport(Result):
         return super().figures() if self.line_K else {}
 
     def write(self, folder: Path, asked: Mapping[str, Any] | None = None) -> None:
-        """Writes folder/loop.json with exact values, as `save` does."""
+        """Writes loop.json with exact values, as `save` does.
+
+        Args:
+            folder: where to.
+            asked: left out of the file.
+        """
         self.save(folder / "loop.json")
 
     def tables(self) -> Tables:

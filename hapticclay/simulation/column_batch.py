@@ -171,8 +171,8 @@ def _check_bounds(base: Scenario, name: str, column: np.ndarray) -> None:
     bounds = known[head].bounds_at(rest) if head in known else []
     if not bounds:
         with_fields(base, {name: float(column[0])})
-    told = [float(x.low) for x in bounds if not isinstance(x.low, str)]
-    low = min(told) if len(told) == len(bounds) > 0 else -np.inf  # else the scenario checks
+    lows = [float(x.low) for x in bounds if not isinstance(x.low, str)]
+    low = min(lows) if len(lows) == len(bounds) > 0 else -np.inf  # else the scenario checks
     high = max((x.high for x in bounds), default=np.inf)
     above = bool(bounds) and all(x.above for x in bounds)
     bad = ~(np.isfinite(column) & (column >= low) & (column <= high))

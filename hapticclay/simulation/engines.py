@@ -9,7 +9,7 @@ from ..kernel import native
 
 ENGINES = ("auto", "python", "native")
 LONG = 50_000  # steps that take Python more than a second
-_told = False
+_notice_given = False
 
 
 def engine_for(engine: str, steps: float = 0.0) -> str:
@@ -23,7 +23,7 @@ def engine_for(engine: str, steps: float = 0.0) -> str:
     if engine == "native":
         raise ParameterError("engine", engine, f"needs the compiled kernel ({why}): {remedy(why)}")
     if steps > LONG:
-        tell(why)
+        give_notice(why)
     return "python"
 
 
@@ -41,11 +41,11 @@ def made_by() -> str:
     return f"Python: no compiled kernel ({why}); {remedy(why)}" if why else "the compiled kernel"
 
 
-def tell(why: str) -> None:
+def give_notice(why: str) -> None:
     """Says once that runs are slow, why, and what helps."""
-    global _told
-    if not _told:
-        _told = True
+    global _notice_given
+    if not _notice_given:
+        _notice_given = True
         print(
             "hapticclay: Python makes the steps, some 15 times slower: "
             f"no compiled kernel ({why}); {remedy(why)}",

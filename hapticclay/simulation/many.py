@@ -156,14 +156,13 @@ class Differences(NamedTuple):
 
     def repeated(self, n: int) -> Differences:
         """Those of a single run, n times."""
+        columns = self.gain, self.force, self.origin, self.starts
+        gain, force, origin, starts = (np.repeat(x, n, axis=0) for x in columns)
+        servo = [dict.fromkeys(each, range(n)) for each in self.servo]
         hands = None if self.hands is None else np.repeat(self.hands, n, axis=0)
-        return Differences(
-            *(np.repeat(x, n, axis=0) for x in (self.gain, self.force, self.origin, self.starts)),
-            [dict.fromkeys(each, range(n)) for each in self.servo],
-            hands,
-            np.repeat(np.array(self.delays, float), n),
-            self.values and [np.repeat(x, n, axis=0) for x in self.values],
-        )
+        delays = np.repeat(np.array(self.delays, float), n)
+        values = self.values and [np.repeat(x, n, axis=0) for x in self.values]
+        return Differences(gain, force, origin, starts, servo, hands, delays, values)
 
 
 def differences_of(jobs: Sequence[Scenario]) -> Differences:

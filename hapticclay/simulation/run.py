@@ -108,7 +108,7 @@ class Snapshot(NamedTuple):
 class Kept(NamedTuple):
     """Samples that are kept: their indices, rows, and forces of the clay where it is not b v."""
 
-    index: np.ndarray
+    indices: np.ndarray
     rows: np.ndarray
     forces: np.ndarray
 
@@ -497,7 +497,7 @@ class Run:
                 raise SamplesNeeded
             self.is_quiet = False
             for x in self.kept:
-                self.watch.look(_for_monitor(x.rows), int(x.index[0]))
+                self.watch.look(_for_monitor(x.rows), int(x.indices[0]))
         return self.watch.look(_for_monitor(made), self.judged)
 
     def _keep(self, made: np.ndarray, good: int) -> None:
@@ -525,8 +525,8 @@ class Run:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The samples kept, by the names of Record's arrays."""
-        index, made, forces = zip(*self.kept, strict=True)
-        t = np.concatenate(index) * self.scenario.dt
+        indices, made, forces = zip(*self.kept, strict=True)
+        t = np.concatenate(indices) * self.scenario.dt
         if self.end_time is not None and len(t):
             t[-1] = self.end_time
         out = {

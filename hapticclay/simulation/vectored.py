@@ -91,8 +91,7 @@ class VectoredRuns:
     def restart(self, k: int, scenario: Scenario | None) -> None:
         """Restarts a run."""
         run = self.runs[k]
-        is_alone = run.drives is not None or run.row.is_called
-        if scenario is None and not self.changed[k] and not is_alone:
+        if scenario is None and not self.changed[k] and not run.prepares:
             run.restart()
             run.scenario = self.given[k]
             run.push_evenly((0.0, *run.scenario.steady_force, 0.0, 0.0))

@@ -54,7 +54,7 @@ class PushedLoop(Loop):
         push: velocity of the handle at the start [m/s]. If C has no integrator, no state of C
             matches a velocity; a constant force then replaces the push, one that gives a free
             handle this velocity in PUSH_TIME.
-        torque_limit: of the motors [N.m].
+        torque_limit: largest torques of the motors [N.m].
         arm: the two-link arm.
     """
 

@@ -47,7 +47,7 @@ class Compared:
     """One file: its scenario or wall, the theory of it, and its run.
 
     Attributes:
-        name: of the file.
+        name: name of the file.
         subject: the scenario, or the wall on its device.
         loop: one axis of a scenario; None for a wall.
         numbers: key numbers by name and unit; NaN where there is none.
@@ -118,10 +118,10 @@ class Comparison(Result):
         """Key numbers of each file."""
         names = dict.fromkeys(n for x in self.files for n in x.numbers)
         columns = {n: [x.numbers.get(n, math.nan) for x in self.files] for n in names}
-        told = {n: column for n, column in columns.items() if not all(map(math.isnan, column))}
-        side: dict[str, list[Any]] = {"": [*told, "outcome of its run"]}
+        known = {n: column for n, column in columns.items() if not all(map(math.isnan, column))}
+        side: dict[str, list[Any]] = {"": [*known, "outcome of its run"]}
         for i, x in enumerate(self.files):
-            side[x.name] = [*(column[i] for column in told.values()), x.record.status]
+            side[x.name] = [*(column[i] for column in known.values()), x.record.status]
         numbers = {"file": [x.name for x in self.files], **columns}
         return {"numbers": numbers, "side by side": side}
 
@@ -149,7 +149,7 @@ def compare_files(
 
     Args:
         paths: two to MOST_COMPARED different files of one kind.
-        axis: of the arm, for scenarios.
+        axis: axis of the arm, for scenarios.
         progress: wraps the iterable of the files.
 
     Raises:
@@ -260,15 +260,14 @@ def _passivity_margin(loop: Loop) -> float:
 def run_and_error(scenario: Scenario) -> tuple[Record, float]:
     """Runs a scenario, and again at half the step."""
     sampled = scenario.control == "sampled"
-    finer = replace(
-        scenario, dt=0.5 * scenario.dt, Ts=(scenario.Ts or scenario.dt) if sampled else None
-    )
-    fine = simulate(finer)  # runs first, so that the other's time excludes loading of compiled code
+    Ts = (scenario.Ts or scenario.dt) if sampled else None
+    # first, so that the run time of the other excludes loading of compiled code
+    finer = simulate(replace(scenario, dt=0.5 * scenario.dt, Ts=Ts))
     record = simulate(scenario)
-    n = min(len(record.t), (len(fine.t) + 1) // 2) - 1
-    if n < 1 or record.outcome.code != fine.outcome.code:
+    n = min(len(record.t), (len(finer.t) + 1) // 2) - 1
+    if n < 1 or record.outcome.code != finer.outcome.code:
         return record, math.nan
-    return record, float(np.abs(record.p[:n] - fine.p[::2][:n]).max())
+    return record, float(np.abs(record.p[:n] - finer.p[::2][:n]).max())
 
 
 def _felt_numbers(found: Compared) -> dict[str, float]:

@@ -147,12 +147,12 @@ def measure_impedance(
     Args:
         subject: a `Scenario`; a `PushedLoop`, its push and pose ignored; or a `VirtualWall` that
             acts everywhere.
-        axis: of a scenario, "x" or "y".
+        axis: axis of a scenario, "x" or "y".
         band: lowest and highest frequency [Hz].
-        lines: of the multisine, spread over the logarithm of frequency.
-        period: of the multisine [s], rounded up to whole samples that are quick to transform.
+        lines: number of lines of the multisine, spread over the logarithm of frequency.
+        period: length of the multisine [s], rounded up to samples that are quick to transform.
         amplitude: target rms of the motion [m].
-        seed: of the phases.
+        seed: seed of the phases.
 
     Raises:
         ParameterError: a value is out of its bounds; the loop is unstable with this hand; or the

@@ -245,13 +245,13 @@ def device_mbk(
     regions = {plane: renderable(wall, plane, points) for plane in PLANES}
     # away from the ends of a plane, where the borders meet
     shares = (np.arange(columns) + 0.5) / columns if columns else np.empty(0)
-    asked = [
+    searched = [
         (plane, float(region.x[0] + share * (region.x[-1] - region.x[0])))
         for plane, region in regions.items()
         for share in shares.tolist()
     ]
     found: dict[str, list[Border]] = {plane: [] for plane in PLANES}
-    for plane, x in progress(asked):
+    for plane, x in progress(searched):
         found[plane] += wall_borders(wall, plane, x)
     spread = dynamic_range(wall, 2.0 * math.pi * np.geomspace(low, high, points))
     return DeviceMBK(wall, regions, {k: tuple(v) for k, v in found.items()}, spread)
@@ -301,7 +301,7 @@ def arm_mbk(
     Args:
         loop: arm, servo, hand and sampling, or a scenario; its compensator and gain are ignored.
         box: hands.
-        axis: of a scenario, "x" or "y".
+        axis: axis of a scenario, "x" or "y".
         columns: number of B/M where runs search the border, 0 (theory alone) to 100.
         points: number of B/M of each line, 2 to 1001.
         samples: random members of the box tested in a sampled or delayed loop.

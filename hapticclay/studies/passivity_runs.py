@@ -137,9 +137,9 @@ class PassiveRegion:
     Attributes:
         wall: the fixed parts: device, B, M, velocity, window and filter.
         delays: delays over Ts.
-        Ts: of the lines [s], (n,).
+        Ts: control samples of the lines [s], (n,).
         limits: largest passive K by theory [N/m], one row per delay, (len(delays), n).
-        run_Ts: of the runs [s], (m,).
+        run_Ts: control samples of the runs [s], (m,).
         found: largest K at which no path of a hand draws energy, by runs [N/m], (len(delays), m).
     """
 
@@ -272,7 +272,7 @@ def arm_index(loop: PushedLoop | Scenario, axis: str = "x") -> IndexOverFrequenc
         loop: one axis, its hand ignored, or a scenario. In continuous time it is passive if Re Z >=
             0 at all frequencies. For a sampled loop Re Z holds for motion at one frequency; a hand
             that moves at several may meet less damping.
-        axis: of a scenario, "x" or "y".
+        axis: axis of a scenario, "x" or "y".
     """
     loop = replace(of_scenario(loop, axis), operator=None)
     omega = 2.0 * math.pi * np.geomspace(ARM_BAND[0] / 5.0, 5.0 * ARM_BAND[1], INDEX_POINTS)
@@ -379,13 +379,13 @@ def _index_by_run(wall: VirtualWall, turn: tuple[int, int]) -> float:
     from scipy.optimize import brentq
 
     b, omega = wall.device.damper, np.array([math.pi * turn[0] / (turn[1] * wall.Ts)])
-    asked = max(b - float(wall_limits.passivity_index(wall, omega * (1.0 - 1e-12))[0]), 1e-9)
+    needed = max(b - float(wall_limits.passivity_index(wall, omega * (1.0 - 1e-12))[0]), 1e-9)
 
     def energy(damper: float) -> float:
         other = replace(wall, device=replace(wall.device, damper=damper))
         return taken_energy(other, polygon(other, turn, WORST_AMPLITUDE))
 
-    low, high = 0.5 * asked, 2.0 * asked
+    low, high = 0.5 * needed, 2.0 * needed
     if energy(low) > 0.0 or energy(high) < 0.0:
         return math.nan
     return b - float(brentq(energy, low, high, rtol=1e-5))  # type: ignore[arg-type]

@@ -65,7 +65,7 @@ class RiskMap:
         """Confidence interval of each cell, shape (n, m) each.
 
         Args:
-            level: of confidence, 0 to 1.
+            level: confidence level, 0 to 1.
         """
         return clopper_pearson(self.events, self.runs, level)
 
@@ -107,7 +107,7 @@ class Instability(Result):
         """Probability of instability over all runs.
 
         Args:
-            level: of confidence, 0 to 1.
+            level: confidence level, 0 to 1.
         """
         judged = self.unstable[self.unstable != NOT_RUN]
         n, k = len(judged), int(judged.sum())

@@ -139,13 +139,13 @@ def stability_map(
 
 
 def _gain_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress) -> StabilityMap:
-    fine = np.geomspace(*DAMPINGS, LINE_POINTS).tolist()
+    dense = np.geomspace(*DAMPINGS, LINE_POINTS).tolist()
     x = np.geomspace(*DAMPINGS, columns).tolist()
     continuous = replace(loop, **TIMING)
     linear = continuous.linear
 
     def line(law: Callable[[float], float]) -> Line:
-        return fine, [law(b) for b in fine]
+        return dense, [law(b) for b in dense]
 
     def small_gain(b: float, K: float) -> bool:
         return bool(stability_margins.small_gain(replace(linear, b=b), K=K))
@@ -163,9 +163,9 @@ def _gain_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress)
         ("small gain (Eq. 13)", small_gain),
         ("passive: stable with every hand", passive),
     ):
-        y = [_largest_gain(lambda K, b=b, holds=holds: holds(b, K)) for b in fine]
+        y = [_largest_gain(lambda K, b=b, holds=holds: holds(b, K)) for b in dense]
         if any(y):
-            lines[name] = (fine, [v or math.nan for v in y])
+            lines[name] = (dense, [v or math.nan for v in y])
         else:
             notes.append(f"{name}: holds for no K in this range")
     middle = nominal_limit(continuous)
@@ -189,13 +189,13 @@ def _delay_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress
     Ts = loop.Ts or TS
     loop = replace(loop, Ts=Ts)
     low, high = 0.5 * Ts, 16.0 * Ts
-    fine = np.geomspace(low, high, LINE_POINTS // 2).tolist()
+    dense = np.geomspace(low, high, LINE_POINTS // 2).tolist()
     x = np.geomspace(low, high, columns).tolist()
     lines = {
-        "continuous time, late": (fine, [_unstable_damping(loop, None, d) for d in fine]),
+        "continuous time, late": (dense, [_unstable_damping(loop, None, d) for d in dense]),
         f"sampled every {1e3 * Ts:g} ms and late": (
-            fine,
-            [_unstable_damping(loop, Ts, d) for d in fine],
+            dense,
+            [_unstable_damping(loop, Ts, d) for d in dense],
         ),
     }
     limit, notes = list(lines)[-1], []
@@ -203,8 +203,8 @@ def _delay_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress
     if damper:
         name = "held clay passive (Colgate, Schenkel)"
         held = VirtualWall(device=Device(damper=damper), Ts=Ts)
-        limits = [wall_limits.passive_damping_limit(replace(held, delay=d)) for d in fine]
-        lines[name] = (fine, limits)
+        limits = [wall_limits.passive_damping_limit(replace(held, delay=d)) for d in dense]
+        lines[name] = (dense, limits)
     else:
         notes.append(UNDAMPED)
     exact = [_unstable_damping(loop, Ts, d) for d in x]
@@ -231,7 +231,7 @@ def _delay_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress
 
 
 def _gain_pose(loop: PushedLoop, columns: int, rows: int, progress: Progress) -> StabilityMap:
-    fine = np.linspace(-MAP_POSES, MAP_POSES, LINE_POINTS).tolist()
+    dense = np.linspace(-MAP_POSES, MAP_POSES, LINE_POINTS).tolist()
     x = np.linspace(-MAP_POSES, MAP_POSES, columns).tolist()
     loop_at = replace(loop, inertia_shaping=False)
     plain = [replace(loop_at, pose=(dx, 0.0)) for dx in x]
@@ -239,10 +239,10 @@ def _gain_pose(loop: PushedLoop, columns: int, rows: int, progress: Progress) ->
     nominal = nominal_limit(loop)
     how = f"sampled{_late(loop)}" if loop.Ts else "continuous time"
     lines = {
-        f"linear loop at the nominal pose, {how}": (fine, [nominal] * len(fine)),
+        f"linear loop at the nominal pose, {how}": (dense, [nominal] * len(dense)),
         f"linear loop at this pose, {how}": (
-            fine,
-            [boundary.pose_limit(replace(loop_at, pose=(dx, 0.0))) for dx in fine],
+            dense,
+            [boundary.pose_limit(replace(loop_at, pose=(dx, 0.0))) for dx in dense],
         ),
     }
     exact = {

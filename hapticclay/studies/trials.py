@@ -94,7 +94,7 @@ class Trials(Plan):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the parameters of a run: of the grid, the hand, and what varies."""
+        """Names of the parameters of a run: those of the grid, the hand, and what varies."""
         hand = tuple(f"operator.{n}" for n in HAND) if self.hands else ()
         return (*self.grid, *hand, *self.vary)
 

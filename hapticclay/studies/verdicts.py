@@ -35,7 +35,7 @@ class Case(NamedTuple):
     """A run to judge: a wall, or an arm in clay."""
 
     wall: Wall
-    scenario: Scenario  # of the run, in which more than the wall may have been changed
+    scenario: Scenario  # a trial may change more of it than the wall
 
 
 Cases = dict[int, Case]  # by index
@@ -141,7 +141,7 @@ def long_arms(cases: Cases, threads: int | None) -> Rates:
 def wall_scale(case: Case) -> tuple[float, float]:
     """Reading.scale of a wall."""
     n, _, slowest = case.wall.growth_reading()
-    return slowest, LEAST_MAP_CHANGE / (n * case.wall.Ts)
+    return slowest, LEAST_MAP_CHANGE / (n * case.wall.subject.Ts)
 
 
 def short_walls(cases: Cases, threads: int | None) -> Rates:
@@ -149,14 +149,14 @@ def short_walls(cases: Cases, threads: int | None) -> Rates:
     rate, span = long_walls(cases, threads, WALL_SPANS[0]), {}
     for i, x in cases.items():
         n, *_ = x.wall.growth_reading(WALL_SPANS[0])
-        span[i] = n * x.wall.Ts
+        span[i] = n * x.wall.subject.Ts
     return {i: x if abs(x) * span[i] >= LEAST_RUN_CHANGE else math.nan for i, x in rate.items()}
 
 
 def long_walls(cases: Cases, threads: int | None, span: float = WALL_SPANS[1]) -> Rates:
     """Growth rates of walls from longer runs."""
     # walls with as many steps per sample run together: their records keep one step per sample
-    steps = {i: round(x.wall.Ts / x.scenario.dt) for i, x in cases.items()}
+    steps = {i: round(x.wall.subject.Ts / x.scenario.dt) for i, x in cases.items()}
     rate = {}
     for every in sorted(set(steps.values())):
         members = [i for i in cases if steps[i] == every]
@@ -164,7 +164,7 @@ def long_walls(cases: Cases, threads: int | None, span: float = WALL_SPANS[1]) -
             some = [(i, cases[i]) for i in members[first : first + WALL_BATCH]]
             read = [x.wall.growth_reading(span) for _, x in some]
             jobs = [
-                replace(x.scenario, t_max=n * x.wall.Ts)
+                replace(x.scenario, t_max=n * x.wall.subject.Ts)
                 for (_, x), (n, *_) in zip(some, read, strict=True)
             ]
             records = simulate_batch(jobs, threads=threads, every=every)

@@ -352,19 +352,19 @@ class DeviceWall(Wall):
 
     def phrases(self) -> dict[str, str]:
         w, d = self.subject, self.subject.device
-        told = {"mass": f"m = {d.mass:g} kg", "damper": f"b = {d.damper:g} N.s/m"}
-        told |= timing_phrases(self)
+        phrases = {"mass": f"m = {d.mass:g} kg", "damper": f"b = {d.damper:g} N.s/m"}
+        phrases |= timing_phrases(self)
         if d.friction:
-            told["friction"] = f"fc = {d.friction:g} N"
+            phrases["friction"] = f"fc = {d.friction:g} N"
         if d.quantum:
-            told["quantum"] = f"Delta = {1e6 * d.quantum:g} um"
+            phrases["quantum"] = f"Delta = {1e6 * d.quantum:g} um"
         if w.velocity_window > 1:
-            told["velocity_window"] = f"window = {w.velocity_window} samples"
+            phrases["velocity_window"] = f"window = {w.velocity_window} samples"
         if w.velocity_filter:
-            told["filter"] = f"filter = {w.velocity_filter:g} Hz"
+            phrases["filter"] = f"filter = {w.velocity_filter:g} Hz"
         if w.unilateral:
-            told["surface"] = "surface"
-        return told
+            phrases["surface"] = "surface"
+        return phrases
 
     def felt_phrases(self, hand: str) -> list[str]:
         w = self.subject
@@ -463,8 +463,8 @@ def as_wall(subject: Any, axis: str = "x") -> Wall:
 
 def timing_phrases(wall: Wall) -> dict[str, str]:
     """Sample and delay in a title."""
-    told = {"Ts": f"Ts = {1e3 * (wall.Ts or 0.0):g} ms"}
-    return told | ({"delay": f"delay = {1e3 * wall.delay:g} ms"} if wall.delay else {})
+    phrases = {"Ts": f"Ts = {1e3 * (wall.Ts or 0.0):g} ms"}
+    return phrases | ({"delay": f"delay = {1e3 * wall.delay:g} ms"} if wall.delay else {})
 
 
 def sampling(wall: Wall) -> list[str]:

@@ -103,17 +103,17 @@ def _side_by_side(
 ) -> list[float]:
     """Results of searches that each need one run at a time; a batch has one run of each search."""
     results = [math.nan] * len(searches)
-    asked = {i: next(search) for i, search in enumerate(searches)}
-    while asked:
-        answers = judge([wall(i, x) for i, x in asked.items()])
-        going = {}
-        for i, answer in zip(asked, answers, strict=True):
+    pending = {i: next(search) for i, search in enumerate(searches)}
+    while pending:
+        answers = judge([wall(i, x) for i, x in pending.items()])
+        remaining = {}
+        for i, answer in zip(pending, answers, strict=True):
             try:
-                going[i] = searches[i].send(answer)
+                remaining[i] = searches[i].send(answer)
             except StopIteration as end:
                 results[i] = end.value
-        asked = going
-        show(1.0 - len(asked) / len(searches))
+        pending = remaining
+        show(1.0 - len(pending) / len(searches))
     return results
 
 

@@ -141,9 +141,9 @@ class ZRegion:
         close = boundary.BRACKET if self.linear else REST_RESOLVED
         for limit in self.limits:
             for B, K in zip(self.B, self.K, strict=True):
-                asked = limit.at(B)
-                if limit.kind == "sufficient" and K < (1.0 - close) * asked:
-                    out.append(f"{limit.name}: B = {B:.4g}, K = {K:.4g} < {asked:.4g}")
+                line = limit.at(B)
+                if limit.kind == "sufficient" and K < (1.0 - close) * line:
+                    out.append(f"{limit.name}: B = {B:.4g}, K = {K:.4g} < {line:.4g}")
         return out
 
 
@@ -178,12 +178,12 @@ class ZWidth(Result):
 
     def headline(self) -> str:
         """Largest stiffness and damping of each region, in one line."""
-        told = (
+        regions = (
             f"{f'{r.name}: ' if r.name else ''}K to {r.largest_K:.4g} N/m at B = {r.top_B:.4g}, "
             f"B to {r.largest_B:.4g} N.s/m"
             for r in self.regions
         )
-        return "; ".join(told)
+        return "; ".join(regions)
 
     def gap(self) -> float:
         """Largest relative gap between runs and exact lines; NaN if no loop is linear."""

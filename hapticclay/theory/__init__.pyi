@@ -20,6 +20,12 @@ from .hand_boxes import worst_case as worst_case
 from .impedance import Impedance as Impedance
 from .impedance import loop_impedance as loop_impedance
 from .impedance import loop_response as loop_response
+from .joint_gains import JointLimits as JointLimits
+from .joint_gains import joint_limits as joint_limits
+from .joint_poses import OverPoses as OverPoses
+from .joint_poses import over_poses as over_poses
+from .joint_walls import WallLimit as WallLimit
+from .joint_walls import wall_limit as wall_limit
 from .loop_passivity import clay_passivity as clay_passivity
 from .loop_passivity import passivity as passivity
 from .loops import Loop as Loop

@@ -51,11 +51,11 @@ class LinearLaw:
     """A sampled controller around rest: s(k+1) = A s(k) + B y(k), torques = C s(k) + D y(k).
 
     Attributes:
-        A: of its n states, shape (n, n).
-        B: of the measurements y = (q1, q2 [rad], their rates [rad/s], hand force x, y [N]), shape
-            (n, 6).
-        C: torques of shoulder and elbow [N.m], shape (2, n).
-        D: shape (2, 6).
+        A: state matrix, of n states, shape (n, n).
+        B: input matrix, shape (n, 6). The inputs y are the measured angles of shoulder and elbow
+            [rad], their rates [rad/s], and the hand force x, y [N].
+        C: output matrix, shape (2, n). The outputs are the torques of shoulder and elbow [N.m].
+        D: feedthrough, shape (2, 6).
     """
 
     A: np.ndarray
@@ -127,10 +127,10 @@ class ControllerStability(Result):
 
     def headline(self) -> str:
         """Verdict, largest stable gain and frequency, in one line."""
-        told = "stable" if self.stable else "unstable"
+        verdict = "stable" if self.stable else "unstable"
         if not self.high:
-            return f"{told} at every gain from {self.gains[0]:.4g} to {self.gains[-1]:.4g}"
-        band = f"{told} at gain {self.gain:.4g}; stable from {self.low:.4g} to {self.high:.4g}"
+            return f"{verdict} at every gain from {self.gains[0]:.4g} to {self.gains[-1]:.4g}"
+        band = f"{verdict} at gain {self.gain:.4g}; stable from {self.low:.4g} to {self.high:.4g}"
         return band + (
             f", where it oscillates at {self.omega / math.tau:.4g} Hz" if self.omega > 0.0 else ""
         )
@@ -281,7 +281,8 @@ class Rest:
 
     def _jacobian(self, q: np.ndarray) -> np.ndarray:
         """Velocity of the handle from the rates of the links, one column a link."""
-        return np.array(arm_law.jacobian(*q, self.scenario.arm.links)).reshape(2, 2).T
+        u = arm_law.jacobian(float(q[0]), float(q[1]), self.scenario.arm.links)
+        return np.array(u).reshape(2, 2).T
 
     @property
     def jacobian(self) -> np.ndarray:
@@ -309,9 +310,7 @@ class Rest:
     def _unrest(self, at: np.ndarray) -> np.ndarray:
         """Torques that nothing balances, and change of the state."""
         out = self.answer(self._measured(at))
-        out[:2] += arm_law.joint_torques(
-            *self._force(at[:2]), arm_law.jacobian(*at[:2], self.scenario.arm.links)
-        )
+        out[:2] += np.linalg.solve(JOINTS.T, self._jacobian(at[:2]).T @ self._force(at[:2]))
         out[2:] -= at[2:]
         return out
 
@@ -380,7 +379,7 @@ class Plant:
         scenario: the run.
         rest: where it rests.
         b: physical clay [N.s/m].
-        states: of the controller.
+        states: number of states of the controller.
     """
 
     def __init__(self, scenario: Scenario, rest: Rest, b: float, states: int):
@@ -419,8 +418,8 @@ class Plant:
         whole, part = whole_samples(parts.delay, self.Ts)
         differs = parts.velocity == "difference"
         window = 2 * parts.velocity_window * differs
-        smooth = 2 * (differs and parts.velocity_filter is not None)
-        filtered = 4 * (parts.force_filter is not None)
+        cutoff, sieve_cutoff = parts.velocity_filter if differs else None, parts.force_filter
+        smooth, filtered = 2 * (cutoff is not None), 4 * (sieve_cutoff is not None)
         at = np.cumsum([0, 2, 2, n, window, smooth, filtered, 2 * (1 + whole)])
         unit = np.eye(at[-1] + 2 + n)  # behind x, the torques and the state that the law returns
         angle, rate, state, past, slow, sieve, queue = (
@@ -430,15 +429,15 @@ class Plant:
         q, w = JOINTS @ angle, JOINTS @ rate
         if differs:
             w = (q - past[-2:]) / (parts.velocity_window * self.Ts)
-        if smooth:
-            keep = math.exp(-math.tau * parts.velocity_filter * self.Ts)
+        if cutoff is not None:
+            keep = math.exp(-math.tau * cutoff * self.Ts)
             w = keep * slow + (1.0 - keep) * w
         turning = self.place @ angle + self.rate @ rate + self.push @ oldest
         u = self.jacobian
         force = -(self.damper @ u @ rate + self.spring @ u @ angle + self.mass @ u @ turning)
         sieved = sieve
-        if filtered:
-            f = np.array(butterworth(parts.force_filter, parts.filter_order, self.Ts))
+        if sieve_cutoff is not None:
+            f = np.array(butterworth(sieve_cutoff, parts.filter_order, self.Ts))
             sieved = np.kron(np.eye(2), f[:4].reshape(2, 2)) @ sieve + np.kron(force, f[4:, None])
             force = sieve[::2]
         due = np.vstack((torques, queue))[2 * whole : 2 * whole + 2]

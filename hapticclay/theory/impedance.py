@@ -200,13 +200,15 @@ def _sampled_response(loop: Loop, omega: np.ndarray) -> tuple[np.ndarray, np.nda
     u_speed = per_force * f_speed + law[1] / W - (1.0 - physical) * b
     loop_gain = u_place * arm.held_place + u_speed * arm.held_speed
     loop_gain = loop_gain - per_force * share * arm.before
-    asked = (u_place * arm.place + u_speed * arm.speed + per_force * f_own) / (1.0 - loop_gain)
-    v = arm.speed * (1.0 + arm.hold * asked)
+    commanded = (u_place * arm.place + u_speed * arm.speed + per_force * f_own) / (1.0 - loop_gain)
+    v = arm.speed * (1.0 + arm.hold * commanded)
     fh = 1.0 - (th.mass * s + th.damper + th.spring / s) * v
     if physical:
         return v, fh, (b + k / s) * v
-    seen = b * (arm.speed + arm.held_speed * asked) + k * (arm.place + arm.held_place * asked)
-    return v, fh, arm.hold * seen
+    rendered = b * (arm.speed + arm.held_speed * commanded) + k * (
+        arm.place + arm.held_place * commanded
+    )
+    return v, fh, arm.hold * rendered
 
 
 @checked
@@ -231,10 +233,10 @@ def wall_response(wall: VirtualWall, omega: np.ndarray) -> Impedance:
     by_place, speed = wall_law(wall, omega * Ts)  # force per unit of each, measured
     place = wall.K + by_place
     held = place * arm.held_place + speed * arm.held_speed
-    asked = -(place * arm.place + speed * arm.speed) / (1.0 + held)
-    v = arm.speed * (1.0 + arm.hold * asked)
+    commanded = -(place * arm.place + speed * arm.speed) / (1.0 + held)
+    v = arm.speed * (1.0 + arm.hold * commanded)
     fh = 1.0 - (th.mass * s + th.damper + th.spring / s) * v
-    return Impedance(omega, fh / v, -arm.hold * asked / fh, wall.K / s + wall.B + wall.M * s)
+    return Impedance(omega, fh / v, -arm.hold * commanded / fh, wall.K / s + wall.B + wall.M * s)
 
 
 @checked

@@ -104,13 +104,13 @@ class PoseLimits:
         return self._loops[i, other]
 
     def _near(self, i: int, p: tuple[float, float], b: tuple[float, float]) -> float:
-        """As `at`, after MOST_KNOWN limits that of the likest clay and place."""
+        """As `at`; once MOST_KNOWN limits are known, that of the most similar clay and place."""
         if len(self.known[i]) < MOST_KNOWN:
             return self.at(i, p, b)
         here = np.array((*b, *p) if self._coupled else (b[i],))
         keys = np.array(list(self.known[i]))
-        unlike = np.abs(keys - here) / (np.ptp(keys, axis=0) + 1e-300)
-        return list(self.known[i].values())[int(unlike.sum(axis=1).argmin())]
+        difference = np.abs(keys - here) / (np.ptp(keys, axis=0) + 1e-300)
+        return list(self.known[i].values())[int(difference.sum(axis=1).argmin())]
 
     def least(self, i: int, low: tuple[float, float], high: tuple[float, float]) -> PlacedLimit:
         """The least gain limit over the places of a box.

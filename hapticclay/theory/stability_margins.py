@@ -180,7 +180,7 @@ def encirclements(n: Polynomial, d: Polynomial) -> tuple[int, int]:
     The contour passes poles on the axis on their right. The phase of 1 + L = (n + d)/d turns by
     half a turn along the axis for each root of n + d on the left and of d on the right, by minus
     half a turn for each of n + d on the right and of d on the left. The turns are counted exactly,
-    in rational arithmetic, so curves pass -1, and resonances are as sharp, as they will.
+    in rational arithmetic: however near to -1 the curve passes, however sharp its resonances.
     """
     n, d = exact_roots.exact(n), exact_roots.exact(d)
     P = exact_roots.count_right(d)

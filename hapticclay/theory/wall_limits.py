@@ -24,7 +24,7 @@ from .hand_boxes import Box, lattice
 
 MOST_STATES = 600  # largest order of a map whose eigenvalues are computed
 SLOWEST_TURN = 1e-7  # [rad] least omega Ts at which the passivity condition is evaluated
-TRIED_ANGLES = 4000  # values of omega Ts in this grid, used twice
+ANGLES = 4000  # values of omega Ts in this grid, used twice
 TOP_OMEGA = 1e7  # [rad/s]
 HUGE = 1e30  # [N/m] replaces infinity, which a search cannot subtract
 REFINED = 3  # rounds of the search within a box of hands
@@ -277,10 +277,10 @@ def colgate_schenkel_limit(wall: VirtualWall) -> float:
         """Least and largest passive K; none for nan."""
         late = np.exp(-1j * turn * whole)
         rest = wall_law(wall, turn)[0] * late
-        asked, more = _asked(wall, turn, rest), _asked(wall, turn, late)
+        needed, more = _damping_needed(wall, turn, rest), _damping_needed(wall, turn, late)
         q = 0.25 * part * (1.0 - part) * Ts * Ts
         p = b * more + 2.0 * q * (late.conj() * rest).real
-        c = b * asked + q * np.abs(rest) ** 2 - b * b  # q K^2 + p K + c <= 0
+        c = b * needed + q * np.abs(rest) ** 2 - b * b  # q K^2 + p K + c <= 0
         with np.errstate(all="ignore"):
             if not q:
                 edge = -c / p
@@ -309,11 +309,11 @@ def passive_damping_limit(wall: VirtualWall) -> float:
     """
     unit = replace(wall, K=0.0, B=1.0, M=0.0)
 
-    def spare(turn: np.ndarray) -> np.ndarray:
+    def excess(turn: np.ndarray) -> np.ndarray:
         return passivity_index(unit, turn / wall.Ts)
 
     turn, b = _turns(unit), wall.device.damper
-    needed = b - _lowest(spare, turn, spare(turn))
+    needed = b - _lowest(excess, turn, excess(turn))
     return b / needed if needed > 0.0 else math.inf
 
 
@@ -344,11 +344,11 @@ def passivity_index(wall: VirtualWall, omega: Any) -> np.ndarray:
     if np.any(by_speed):
         return np.full(turn.shape, -math.inf)
     H = (wall.K + by_place) * np.exp(-1j * turn * whole)
-    asked = _asked(wall, turn, H)
+    needed = _damping_needed(wall, turn, H)
     if part:
         q = part * (1.0 - part) * wall.Ts**2
-        asked = 0.5 * (asked + np.sqrt(asked**2 + q * np.abs(H) ** 2))
-    return wall.device.damper - asked
+        needed = 0.5 * (needed + np.sqrt(needed**2 + q * np.abs(H) ** 2))
+    return wall.device.damper - needed
 
 
 def worst_middle(wall: VirtualWall, turn: float) -> complex | None:
@@ -368,7 +368,7 @@ def worst_middle(wall: VirtualWall, turn: float) -> complex | None:
     return complex((straight + late / (2.0 * b))[0])
 
 
-def _asked(wall: VirtualWall, turn: np.ndarray, H: np.ndarray) -> np.ndarray:
+def _damping_needed(wall: VirtualWall, turn: np.ndarray, H: np.ndarray) -> np.ndarray:
     """Re{(1 - 1/z) (Ts - T' + T'/z) H}/(2 (1 - cos omega Ts)) [N.s/m], T' the delay's fraction."""
     part = _split_delay(wall)[1] * wall.Ts
     shape = (wall.Ts - part) + part * np.exp(-1j * turn)
@@ -378,8 +378,8 @@ def _asked(wall: VirtualWall, turn: np.ndarray, H: np.ndarray) -> np.ndarray:
 
 def _turns(wall: VirtualWall) -> np.ndarray:
     """omega Ts, dense enough for window and delay."""
-    n = TRIED_ANGLES + 40 * (wall.velocity_window + _split_delay(wall)[0])
-    slow = np.geomspace(SLOWEST_TURN, math.pi, TRIED_ANGLES)[:-1]
+    n = ANGLES + 40 * (wall.velocity_window + _split_delay(wall)[0])
+    slow = np.geomspace(SLOWEST_TURN, math.pi, ANGLES)[:-1]
     return np.union1d(slow, np.linspace(0.0, math.pi, n)[1:])
 
 
@@ -524,9 +524,9 @@ def hulin_boundary(
 
     def crossing(turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """B and K that put a pair of poles at z = exp(+-j turn): K + B (1 - 1/z)/Ts = -1/G."""
-        asked = -1.0 / _held(wall, turn).held_place
-        B = asked.imag * wall.Ts / np.sin(turn)
-        return B, asked.real - 2.0 * B / wall.Ts * np.sin(0.5 * turn) ** 2
+        needed = -1.0 / _held(wall, turn).held_place
+        B = needed.imag * wall.Ts / np.sin(turn)
+        return B, needed.real - 2.0 * B / wall.Ts * np.sin(0.5 * turn) ** 2
 
     def stiffness(turn: float) -> float:
         return float(crossing(np.array([turn]))[1][0])

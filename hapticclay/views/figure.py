@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..errors import ParameterError, choice, number
 from ..files import atomic
 from . import style as styles
@@ -151,22 +153,19 @@ def curves_drawn(figure: matplotlib.figure.Figure) -> dict[str, Table]:
     out: dict[str, Table] = {}
     axes: Any = figure.axes
     for ax in axes:
-        lines = [x for x in ax.lines if x.get_transform().contains_branch(ax.transData)]
-        lines = [x for x in lines if all(map(len, x.get_data()))]
-        straight = [x.get_transform() != ax.transData for x in lines]  # axhline and its like
-        lines = [x for x, some in zip(lines, straight, strict=True) if not some]
-        if not lines:
+        curves = [x for x in ax.lines if x.get_transform() == ax.transData]  # axhline is none
+        curves = [x for x in curves if all(map(len, x.get_data()))]
+        if not curves:
             continue
         x_name, y_name = ax.get_xlabel() or "x", ax.get_ylabel() or "y"
-        names = [str(x.get_label()) for x in lines]
+        names = [str(x.get_label()) for x in curves]
         names = [f"curve {i}" if n.startswith("_") else n for i, n in enumerate(names, 1)]
-        both = list(zip(names, (x.get_xydata() for x in lines), strict=True))
+        xy = [x.get_xydata() for x in curves]
+        x, y = np.concatenate(xy).T.tolist()
         out[f"panel{len(out) + 1}"] = {
-            "curve": [name for name, xy in both for _ in xy],
-            x_name: [float(p[0]) for _, xy in both for p in xy],
-            y_name if y_name != x_name else f"{y_name} (y)": [
-                float(p[1]) for _, xy in both for p in xy
-            ],
+            "curve": np.repeat(names, [len(each) for each in xy]).tolist(),
+            x_name: x,
+            y_name if y_name != x_name else f"{y_name} (y)": y,
         }
     return out
 

@@ -193,7 +193,7 @@ def frames(
     lens = Lens(stage, width - beside, height, camera, options.smooth)
     image = np.empty((height, width, 3), dtype=np.uint8)
     held = record.held().tolist()
-    own = None if record.ground is None else record.extra.get("removed")
+    recorded = None if record.ground is None else record.extra.get("removed")
     gap = "   " if width - beside >= ONE_LINE_WIDTH else "\n"
     try:
         done = 0
@@ -203,7 +203,7 @@ def frames(
             stage.push(record.fe[n - 1], all(held[n - 1]))
             title = f"t = {record.t[n - 1]:.2f} s"
             if stage.field >= 0:
-                volume = stage.removal.volume if own is None else float(own[n - 1])
+                volume = stage.removal.volume if recorded is None else float(recorded[n - 1])
                 title += f"{gap}removed {1e6 * volume:.1f} cm3"
             if still := held_words(held[n - 1]):
                 title += gap + still

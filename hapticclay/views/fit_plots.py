@@ -25,8 +25,8 @@ DOTS: Any = dict(mew=0.0, color=BLUE, alpha=0.45, zorder=2.2, rasterized=True)
 @figure_style()
 def fit_plot(fitted: Fitted) -> Figure:
     """Plots force against velocity with the law, and residuals over velocity, time and lag."""
-    shown = np.unique(np.linspace(0, len(fitted.v) - 1, DOTS_SHOWN).astype(int))
-    t, v, f, residuals = (x[shown] for x in (fitted.t, fitted.v, fitted.f, fitted.residuals))
+    drawn = np.unique(np.linspace(0, len(fitted.v) - 1, DOTS_SHOWN).astype(int))
+    t, v, f, residuals = (x[drawn] for x in (fitted.t, fitted.v, fitted.f, fitted.residuals))
     figure = Figure(figsize=figure_size(2, 10.2 if narrow() else 5.6))
     if narrow():
         axes = figure.subplot_mosaic("A;B;C;D", height_ratios=(2.2, 1.0, 1.0, 1.0))

@@ -36,8 +36,8 @@ def force_velocity_plot(record: Record) -> Figure:
     clay, main = record.scenario.clay, AXES.index(main_axis(record.scenario))
     assert clay is not None
     c, s = math.cos(clay.angle), math.sin(clay.angle)
-    own = np.array(((c, -s), (s, c)))  # columns: the clay's axes
-    v, fe, held = record.v @ own, record.fe @ own, record.held()
+    axes = np.array(((c, -s), (s, c)))  # columns: the clay's axes
+    v, fe, held = record.v @ axes, record.fe @ axes, record.held()
     across = clay.along_motion and not np.array_equal(record.b[:, 0], record.b[:, 1])
     whole = not (clay.varies or across)
     if not whole:
@@ -50,8 +50,8 @@ def force_velocity_plot(record: Record) -> Figure:
         if clay.angle:
             names = [f"velocity along its {a} axis [m/s]" for a in ("first", "second")]
         panels = {names[i]: (i, v[:, i], fe[:, i], held[:, i]) for i in (main, 1 - main)}
-        some = {n: x for n, x in panels.items() if clay.resists_otherwise(x[0]) and x[1].any()}
-        panels = some or dict([next(iter(panels.items()))])
+        resisting = {n: x for n, x in panels.items() if clay.resists_otherwise(x[0]) and x[1].any()}
+        panels = resisting or dict([next(iter(panels.items()))])
     met = {name: flows_met(record, x[0], whole) for name, x in panels.items()}
     flows = dict.fromkeys(flow for found in met.values() for flow in found)
     colors = dict(zip(flows, FLOW_COLORS, strict=False))
@@ -77,9 +77,9 @@ def flows_met(record: Record, i: int, whole: bool = True) -> dict[Flow, np.ndarr
     assert clay is not None
     b = record.b[:, i] if whole else np.zeros(len(record.t))
     rows = np.stack((*clay.laws[i].flows_at(*record.p.T), b), axis=-1)
-    some = np.flatnonzero((rows[:, 0] > 0.0) | (rows[:, 1] > 0.0))
-    kinds, which = np.unique(rows[some], axis=0, return_inverse=True)
-    met = {Flow(*x): some[which.ravel() == k] for k, x in enumerate(kinds.tolist())}
+    yielding = np.flatnonzero((rows[:, 0] > 0.0) | (rows[:, 1] > 0.0))
+    kinds, which = np.unique(rows[yielding], axis=0, return_inverse=True)
+    met = {Flow(*x): yielding[which.ravel() == k] for k, x in enumerate(kinds.tolist())}
     return dict(sorted(met.items(), key=lambda x: -len(x[1])))
 
 

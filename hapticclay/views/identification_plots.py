@@ -80,7 +80,7 @@ def _response_column(axes: Sequence[Axes], result: Identified, paper: bool | Non
     what, f = result.what, result.frequency
     line = np.geomspace(f[0] / 1.15, f[-1] * 1.15, 400)
     printed = identification.printed_form(what, result.axis)
-    known, fitted = (identification.response(what, x, line) for x in (printed, result.values))
+    theory, fitted = (identification.response(what, x, line) for x in (printed, result.values))
     clear = result.coherence >= identification.COHERENT
     measured = result.response[clear]
     share = result.deviation[clear] / np.abs(measured)
@@ -90,7 +90,7 @@ def _response_column(axes: Sequence[Axes], result: Identified, paper: bool | Non
     label = f"{'simulated arm' if result.scenario else 'measured'}, with 95 % bars"
     for ax, part, e in ((magnitude, _decibel, error[0]), (phase, _degrees, error[1])):
         if beside:
-            ax.plot(line, part(known), color=VERMILION, lw=stroke(2.2), label="printed")
+            ax.plot(line, part(theory), color=VERMILION, lw=stroke(2.2), label="printed")
         look: Any = dict(color=BLACK, ls=":", lw=stroke(1.2), label="fitted to the points")
         ax.plot(line, part(fitted), **look)
         ax.errorbar(f[clear], part(measured), e, label=label, **marks)

@@ -40,9 +40,9 @@ def gray_image(path: str | os.PathLike[str]) -> np.ndarray:
             raise ValueError(f"it has {size:.3g} values, more than {MOST_VALUES:.3g}")
         image = np.asarray(iio.imread(content, plugin="pillow"))
     except Exception as error:  # Pillow raises errors of many kinds for a damaged file
-        told = getattr(error, "strerror", None) or " ".join(str(error).split())
-        what = one_line(told, 200) or type(error).__name__
-        raise ParameterError("image", str(path), f"must be an image file ({what})") from None
+        reason = getattr(error, "strerror", None) or " ".join(str(error).split())
+        cause = one_line(reason, 200) or type(error).__name__
+        raise ParameterError("image", str(path), f"must be an image file ({cause})") from None
     if image.dtype.kind not in "ub" or image.ndim not in (2, 3):
         raise ParameterError("image", str(path), "must hold pixels of whole numbers")
     gray = image.astype(float) / (np.iinfo(image.dtype).max if image.dtype.kind == "u" else 1.0)

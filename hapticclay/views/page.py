@@ -271,9 +271,9 @@ class Page:
             new, self._shown = frames[self._shown :], len(frames)
             frame, point, q = frames[-1], session.point, session.angles
             plots_due = now - self._plot_time > PLOT_TIME
-            some = frames[:: max(1, len(frames) // PLOT_POINTS)] if plots_due else []
-            banner = self._banner() if plots_due else ""
-            status = self._status() if plots_due else ""
+            plotted = frames[:: max(1, len(frames) // PLOT_POINTS)] if plots_due else []
+            verdict = self._banner() if plots_due else ""
+            text = self._status() if plots_due else ""
             self.stage.carve([f.p for f in new])
         with self.server.atomic():
             self.stage.pose(q)
@@ -291,12 +291,12 @@ class Page:
                 self._clay.vertices = self._vertices()
         if plots_due:
             self._plot_time = now
-            t, p, v, fe, fh, _ = (np.array(x) for x in zip(*some, strict=True))
+            t, p, v, fe, fh, _ = (np.array(x) for x in zip(*plotted, strict=True))
             for i, plot in self._velocities.items():
                 plot.data = _by_position(100.0 * p[:, i], 100.0 * v[:, i])
             self._forces.data = (t, *(f[:, i] for i in self._velocities for f in (fh, fe)))
             removed = f"removed {1e6 * self.stage.removal.volume:.2f} cm\u00b3"
-            self.status.content, self.verdict.content = f"{status}  \n{removed}", banner
+            self.status.content, self.verdict.content = f"{text}  \n{removed}", verdict
 
     def _point_arrow(self, frame: Frame) -> None:
         """Shows the force of yielding clay."""

@@ -62,8 +62,8 @@ def _clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
             continue
         _shade(ax, x0, x1, y0, y1, share)
         right, bottom = min(x1, high[0]), max(y0, low[1])
-        shown = np.array((right - max(x0, low[0]), min(y1, high[1]) - bottom)) / (high - low)
-        if shown[0] > 0.12 and shown[1] > 0.08:
+        visible = np.array((right - max(x0, low[0]), min(y1, high[1]) - bottom)) / (high - low)
+        if visible[0] > 0.12 and visible[1] > 0.08:
             place = np.array((right, bottom)) + (-0.01, 0.01) * (high - low)
             text: Any = dict(ha="right", va="bottom", fontsize=points(8), color=GREY)
             name = "\n".join(clay_text(x.text()) for x in clay.here(middle))

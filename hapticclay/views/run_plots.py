@@ -67,17 +67,17 @@ def force_ratio_plot(record: Record, axis: str = "x") -> Figure:
     x = 100.0 * record.p[:, i]
     ax.plot(x, record.ratio(record.fh)[:, i], color=GREEN, label="operator, f$_h$/v")
     ax.plot(x, record.ratio(record.fe)[:, i], color=BLUE, label="clay, f$_e$/v")
-    own = 0.0  # steady damper of compensator and hand
+    damper = 0.0  # steady damper of compensator and hand
     if s.controller is None:
-        own = linear_loop.steady_damper(s.gain[i], s.compensators[i], s.servo[i])
-    own = own if math.isfinite(own) else 0.0
-    if own and s.operators[i] is None and s.muscle is None:
-        total = functools.partial(_from_damping, record, i, lambda b: own + b)
-        label = f"{own * s.gain[i]:.3g}/K + b"
+        damper = linear_loop.steady_damper(s.gain[i], s.compensators[i], s.servo[i])
+    damper = damper if math.isfinite(damper) else 0.0
+    if damper and s.operators[i] is None and s.muscle is None:
+        total = functools.partial(_from_damping, record, i, lambda b: damper + b)
+        label = f"{damper * s.gain[i]:.3g}/K + b"
         draw_stretches(ax, record, i, total, color=BLACK, ls=":", label=label)
     draw_stretches(ax, record, i, lambda piece: record.b[piece, i], label="b", **EXPECTED)
     ax.set_ylabel("force / velocity [N·s/m]")
-    top = own + float(np.max(record.b[:, i], initial=0.0)) or 1.0
+    top = damper + float(np.max(record.b[:, i], initial=0.0)) or 1.0
     ax.set_ylim(-0.04 * top, 1.35 * top)
     add_legend(figure)
     set_title(ax, *scenario_parts(s))

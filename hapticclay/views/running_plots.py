@@ -53,17 +53,17 @@ class RunningPlots:
         self._axes = self._canvas.copy_from_bbox(figure.bbox)
         self._curves = []
         for ax, x, y, color in curves:
-            known = np.flatnonzero(np.isfinite(y))
+            finite = np.flatnonzero(np.isfinite(y))
             with figure_style():
                 (line,) = ax.plot([], [], color=color, lw=stroke(1.4))
-            self._curves.append((line, known, x[known], y[known]))
+            self._curves.append((line, finite, x[finite], y[finite]))
 
     @figure_style()
     def draw(self, n: int) -> np.ndarray:
         """Draws the first samples of the run."""
         self._canvas.restore_region(self._axes)
-        for line, known, x, y in self._curves:
-            end = int(np.searchsorted(known, n))
+        for line, finite, x, y in self._curves:
+            end = int(np.searchsorted(finite, n))
             line.set_data(x[:end], y[:end])
             line.axes.draw_artist(line)
         return np.asarray(self._canvas.buffer_rgba())[..., :3]

@@ -102,20 +102,19 @@ def yield_map_plot(chart: YieldMap) -> Figure:
     bottom, top = 0.9 * min(c.K for c in chart.cells), chart.K[-1]
     Fy, K = np.geomspace(low / 1.3, 1.3 * high, 240), np.geomspace(bottom, top, 240)
     speed = np.array(chart.speed)
-    some = np.isfinite(speed)
+    cycles = np.isfinite(speed)
     critical = np.exp(np.interp(K, chart.K, np.log(np.maximum(chart.critical, 1e-12))))
-    each = np.where(
-        (K >= chart.least) & (K < chart.limit) & np.any(some),
-        np.exp(np.interp(K, np.array(chart.K)[some], np.log(speed[some]))) if some.any() else 1.0,
-        np.nan,
-    )
+    each = np.full(len(K), np.nan)  # speed of the limit cycle for Fy = 1 N
+    if cycles.any():
+        log_speed = np.interp(K, np.array(chart.K)[cycles], np.log(speed[cycles]))
+        each = np.where((K >= chart.least) & (K < chart.limit), np.exp(log_speed), np.nan)
     goes = push >= np.outer(np.where(K < chart.least, np.inf, critical), Fy)
     cycle = 1e3 * np.where(goes, np.outer(each, Fy), np.nan)
     grows = goes & (K >= chart.limit)[:, None]
     figure, ax = single(5.6, 7.4)
     ax.set(xscale="log", yscale="log", xlim=(Fy[0], Fy[-1]), ylim=(bottom, top))
-    known = cycle[np.isfinite(cycle)]
-    colors = LogNorm(known.min(), min(known.max(), 1e4)) if len(known) else LogNorm(1.0, 10.0)
+    speeds = cycle[np.isfinite(cycle)]
+    colors = LogNorm(speeds.min(), min(speeds.max(), 1e4)) if len(speeds) else LogNorm(1.0, 10.0)
     shaded = ax.pcolormesh(Fy, K, cycle, norm=colors, cmap="cividis", rasterized=True)
     ax.contourf(Fy, K, grows, levels=(0.5, 1.5), colors="none", hatches=["///"])
     edge = np.where(K < chart.least, np.nan, push / critical)

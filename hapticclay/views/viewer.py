@@ -177,9 +177,9 @@ def run_viewer() -> None:
     source, sink = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # output of the viewer
 
-    def ask(words: Any) -> Any:
+    def ask(message: Any) -> Any:
         try:
-            pickle.dump(words, sink)
+            pickle.dump(message, sink)
             sink.flush()
             return pickle.load(source)
         except (EOFError, OSError):

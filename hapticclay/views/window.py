@@ -76,30 +76,30 @@ class Window:
         """Shows one scenario until the window is closed or a key chooses another."""
         player = Player(self.play)
         self._anew()
-        with _viewer((self.play.scenario, self.play.tool)) as (heard, say):
+        with _viewer((self.play.scenario, self.play.tool)) as (answers, send):
             try:
                 while not ((until and until()) or self.other or player.error):
                     try:
-                        words = heard.get(timeout=POLL_TIME)
+                        message = answers.get(timeout=POLL_TIME)
                     except queue.Empty:
                         continue
-                    if words == 0 or (isinstance(words, int) and player.ident):
+                    if message == 0 or (isinstance(message, int) and player.ident):
                         return  # closed, or lost
-                    if not isinstance(words, tuple):
+                    if not isinstance(message, tuple):
                         if player.ident:  # keep what was recorded
-                            text = f"the window failed: {words}"
+                            text = f"the window failed: {message}"
                             warnings.warn(text, RuntimeWarning, stacklevel=3)
                             return
                         why = "the window cannot be opened"
-                        if isinstance(words, str):
-                            why = words.strip().rpartition("\n")[2].partition(": ")[2]
+                        if isinstance(message, str):
+                            why = message.strip().rpartition("\n")[2].partition(": ")[2]
                         display = os.environ.get("DISPLAY", "")
                         raise ParameterError("display", display, f"{why}: {INSTEAD}")
                     if not player.ident:
                         player.start()
                     with player.lock:
-                        sight = self.look(*words)
-                    say(sight)
+                        sight = self.look(*message)
+                    send(sight)
             finally:
                 if player.ident:
                     player.stop()
@@ -174,25 +174,25 @@ def _viewer(first: Any) -> Iterator[tuple[queue.SimpleQueue, Callable[[Any], Non
     )
     source, sink = process.stdout, process.stdin
     assert source and sink
-    heard: queue.SimpleQueue = queue.SimpleQueue()
+    answers: queue.SimpleQueue = queue.SimpleQueue()
 
     def listen() -> None:
-        cut_short = EOFError, OSError, pickle.UnpicklingError
-        with contextlib.suppress(*cut_short):
+        incomplete = EOFError, OSError, pickle.UnpicklingError
+        with contextlib.suppress(*incomplete):
             while True:
-                heard.put(pickle.load(source))
-        heard.put(process.wait())
+                answers.put(pickle.load(source))
+        answers.put(process.wait())
 
-    def say(words: Any) -> None:
-        with contextlib.suppress(OSError):  # it has ended, as `heard` tells
-            pickle.dump(words, sink)
+    def send(message: Any) -> None:
+        with contextlib.suppress(OSError):  # it has ended, as `answers` shows
+            pickle.dump(message, sink)
             sink.flush()
 
     listener = threading.Thread(target=listen, name="listener", daemon=True)
     listener.start()
     try:
-        say(first)
-        yield heard, say
+        send(first)
+        yield answers, send
     finally:
         process.kill()
         process.wait()

@@ -458,7 +458,7 @@ def test_each_experiment_has_its_own_folder_and_a_folder_holds_one_run(
         ("run --gain 1 0.5 --operator constant", "run constant --gain 1 0.5 --operator"),
         ("run --force -1 -2e-1 --no-plots free", "run free --force -1 -2e-1 --no-plots"),
         ("run --out constant variable", "run variable --out constant"),
-        ("view --tool-width 2 o", "view record o --tool-width 2"),
+        ("view --tool-width .02 o", "view record o --tool-width 2cm"),
         ("view --web variable --port=1", "view variable --web --port=1"),
         ("view --every 3", "view constant --every 3"),
         ("view", "view constant"),
@@ -698,3 +698,12 @@ def test_help_ends_in_the_narrowest_terminal(columns):
     env = {**os.environ, "COLUMNS": columns}
     out = subprocess.run(words, env=env, capture_output=True, text=True, timeout=120)
     assert out.returncode == 0 and "Usage" in out.stdout
+
+
+def test_a_part_of_a_command_keeps_its_defaults_beside_what_is_given():
+    for words, style in (([], "screen"), (["--style", "print"], "print")):
+        figures = parser.read(["reproduce", *words]).command().figures
+        assert (figures.format, figures.style) == (("svg",), style)
+    small = parser.read(["materials", "--tool-width", "2cm"]).command().tool
+    assert (small.width, small.depth) == (0.02, 0.005)
+    assert parser.read(["view", "--tool-depth", "5mm"]).command().tool == small

@@ -85,8 +85,8 @@ def test_every_option_with_units_takes_them(command):
         if not option.node.takes_numbers or not all(unit in SMALLER for unit in own):
             assert not any(own), (option.name, own)
             continue
-        words = [f"3.25 {SMALLER[unit][0]}" for unit in own]
-        exact = tuple(float(Decimal("3.25") * Decimal(SMALLER[unit][1])) for unit in own)
+        words = [f"12.5 {SMALLER[unit][0]}" for unit in own]
+        exact = tuple(float(Decimal("12.5") * Decimal(SMALLER[unit][1])) for unit in own)
         assert option.value(words) == (exact if count > 1 else exact[0]), option.name
 
 

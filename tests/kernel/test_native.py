@@ -119,7 +119,7 @@ def absent(request, monkeypatch):
     """An installation without a kernel that fits; what is said of it."""
     found = ABSENT[request.param]
     monkeypatch.setitem(sys.modules, "hapticclay.native.kernel.machine", found)
-    monkeypatch.setattr(engines, "_told", False)
+    monkeypatch.setattr(engines, "_notice_given", False)
     for cached in (compiled.machine, compiled.why_not):
         cached.cache_clear()
     yield compiled.why_not()

@@ -29,7 +29,7 @@ def lacking(made):
 
 def methods(kind):
     """Public methods of a class by name, those of its bases in this package too."""
-    for base in reversed(kind.__mro__):
+    for base in kind.__mro__:
         if base.__module__.startswith("hapticclay"):
             for name, made in vars(base).items():
                 made = getattr(made, "__func__", made)
@@ -47,7 +47,10 @@ def undocumented(made):
     for base in made.__mro__[1:]:
         told |= documented(base, "Args", "Attributes")
     out = {"": [n for n in names if n not in told and not n.startswith("_")]}
-    return out | {name: lacking(method) for name, method in methods(made)}
+    for name, method in methods(made):  # an override has the arguments of what it overrides
+        left = lacking(method)
+        out[name] = [n for n in left if n in out.get(name, left)]
+    return out
 
 
 @pytest.mark.parametrize("name", [n for n, x in public.NAMES.items() if callable(x)])

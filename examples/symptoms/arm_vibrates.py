@@ -1,0 +1,39 @@
+"""
+An arm that vibrates in teleoperation
+=====================================
+
+A leader of seven joints, its gains, 500 Hz and 2 ms of latency: the gains that each joint carries,
+all coupled; the delay left; the limits over the workspace; and the stiffest wall at the handle.
+"""
+
+import matplotlib.pyplot as plt
+
+import hapticclay as hc
+
+plt.style.use("hapticclay.views.figure")
+
+arm = hc.MjcfArm("mjcf/arms/leader_7.xml")
+law = hc.JointPD(
+    Kp=(240, 240, 240, 240, 24, 31, 25),  # N.m/rad
+    Kd=(3, 3, 3, 3, 0.2, 0.2, 0.2),  # N.m.s/rad
+    velocity="filter",
+    cutoff=90.0,  # rad/s
+)
+limits = hc.theory.joint_limits(arm, law, Ts="2 ms", delay="2 ms")
+print(limits.text())
+
+# %%
+# Faster, or with less delay, all gains may rise:
+for Ts, delay in ((2e-3, 2e-3), (1e-3, 1e-3), (1e-3, 0.0)):
+    found = hc.theory.joint_limits(arm, law, Ts, delay)
+    print(f"{1 / Ts:.0f} Hz, {1e3 * delay:.0f} ms late: all Kp up to {found.scale:.2f} times")
+
+# %%
+# The worst of some poses, and a wall along z:
+poses = hc.theory.over_poses(arm, law, 2e-3, 2e-3, poses=20)
+print(poses.headline())
+wall = hc.theory.wall_limit(arm, "z", 5.0, hc.Operator(), Ts=1e-3, delay=1e-3)
+print(wall.headline())
+
+limits.plot()
+plt.show()

@@ -1,0 +1,1 @@
+"""Arms from files: mechanisms that MuJoCo loads, and the laws that drive their joints."""

@@ -1,0 +1,332 @@
+"""From a file to a mechanism: joints, handle, pose and values per joint; what is refused."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..display import one_line
+from ..errors import ParameterError, is_series, nearest, number
+from .mechanism import Mechanism
+
+LIGHTEST = 1e-12  # [kg.m^2] least eigenvalue of M of a mechanism with an inverse
+TIED = 1e-6  # [rad or m] chains of a file that are open by more are closed, and it is noted
+BOUNDS = {  # least and largest value, units at a hinge and at a slide
+    "pose": (-1e3, 1e3, "rad", "m"),
+    "armature": (0.0, 1e3, "kg.m^2", "kg"),
+    "damping": (0.0, 1e6, "N.m.s/rad", "N.s/m"),
+    "friction": (0.0, 1e6, "N.m", "N"),
+}
+SLIDE = 2  # MuJoCo's number of a joint that slides
+IN_MODEL = {  # fields of the model with a value per degree of freedom
+    "armature": "dof_armature",
+    "damping": "dof_damping",
+    "friction": "dof_frictionloss",
+}
+
+
+class Loaded(NamedTuple):
+    """An arm's model, and what was chosen in it.
+
+    Attributes:
+        name: name of the model.
+        mechanism: joints, inertia, Jacobian.
+        fields: fields of the arm, as resolved.
+        torque_limits: largest torque of each joint [N.m], shape (n,).
+        ranges: range of each joint [rad or m], shape (n, 2).
+        notes: what the file leaves open.
+    """
+
+    name: str
+    mechanism: Mechanism
+    fields: dict[str, Any]
+    torque_limits: np.ndarray
+    ranges: np.ndarray
+    notes: tuple[str, ...]
+
+
+def load(arm: Any) -> Loaded:
+    """Loads the file of an arm, and resolves its fields.
+
+    Raises:
+        ParameterError: the file cannot be loaded, or holds no arm of this kind.
+    """
+    model, name = compiled(arm.file)
+    _refuse_joints(model)
+    _refuse_tendons(model)
+    site = _handle(model, arm.site)
+    joints = _arm_joints(model, arm.joints, site)
+    pose = _pose(model, arm.pose, joints)
+    names = tuple(model.joint(j).name for j in joints)
+    dofs = [int(model.jnt_dofadr[j]) for j in joints]
+    fields: dict[str, Any] = {"joints": names, "site": None if site is None else _name(model, site)}
+    for field, of in IN_MODEL.items():
+        values = getattr(model, of)
+        values[dofs] = _per_joint(model, field, getattr(arm, field), joints, values[dofs])
+        fields[field] = tuple(values[dofs].tolist())
+    mechanism = Mechanism(model, dofs, site, pose)
+    _check_mechanism(mechanism, names)
+    fields["pose"] = {model.joint(j).name: float(q) for j, q in enumerate(mechanism.pose)}
+    return Loaded(
+        name,
+        mechanism,
+        fields,
+        _torque_limits(model, joints),
+        _ranges(model, joints),
+        tuple(_notes(model, arm, mechanism, joints)),
+    )
+
+
+# ---- the file ------------------------------------------------------------------------------------
+
+
+def compiled(file: Any) -> tuple[Any, str]:
+    """The model of a file or spec, with scalar joints alone, and its name."""
+    from ..physics import mujoco, warnings_caught
+
+    with warnings_caught() as caught:
+        try:
+            spec = file.copy() if isinstance(file, mujoco.MjSpec) else _spec(file)
+            model = spec.compile()
+        except ParameterError:
+            raise
+        except ValueError as error:
+            raise _bad_file(file, one_line(error, 200)) from None
+    if caught:
+        raise _bad_file(file, one_line(caught[0], 200))
+    for array in ("body_mass", "body_inertia", "dof_armature", "dof_damping", "jnt_axis"):
+        if not np.isfinite(getattr(model, array)).all():
+            raise _bad_file(file, f"{array} is not finite")
+    return model, spec.modelname
+
+
+def _spec(file: Any) -> Any:
+    from ..physics import mujoco
+
+    if not isinstance(file, str | os.PathLike):
+        raise ParameterError("file", file, "must be an MJCF or URDF file, or an mujoco.MjSpec")
+    path = Path(file)
+    if not path.is_file():
+        raise ParameterError("file", str(path), "must be an MJCF or URDF file (there is none)")
+    return mujoco.MjSpec.from_file(str(path))
+
+
+def _bad_file(file: Any, why: str) -> ParameterError:
+    shown = str(file) if isinstance(file, str | os.PathLike) else "MjSpec"
+    return ParameterError("file", shown, f"must be a file that MuJoCo loads ({why})")
+
+
+def _refuse_joints(model: Any) -> None:
+    """Refuses joints that have more than one degree of freedom."""
+    from ..physics import mujoco
+
+    scalar = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+    for j in range(model.njnt):
+        if model.jnt_type[j] not in scalar:
+            kind = mujoco.mjtJoint(model.jnt_type[j]).name.removeprefix("mjJNT_").lower()
+            body = model.body(model.jnt_bodyid[j]).name
+            bound = f"must be a hinge or a slide, is {kind}: an arm stands on the world"
+            raise ParameterError(f"joint of {body or 'a body'}", model.joint(j).name, bound)
+
+
+def _refuse_tendons(model: Any) -> None:
+    """Tendons may tie joints; a tendon with mechanics of its own is refused."""
+    for i in range(model.ntendon):
+        own = [
+            name
+            for name in ("stiffness", "damping", "frictionloss", "armature")
+            if np.any(getattr(model, f"tendon_{name}")[i])
+        ]
+        if own:
+            bound = f"must have no {own[0]}: an arm's tendons may only tie joints"
+            raise ParameterError("tendon", model.tendon(i).name, bound)
+
+
+# ---- handle and joints ---------------------------------------------------------------------------
+
+
+def _name(model: Any, site: tuple[str, int]) -> str:
+    kind, number_ = site
+    return (model.site if kind == "site" else model.body)(number_).name
+
+
+def _handle(model: Any, wanted: str | None) -> tuple[str, int] | None:
+    """The site or body of the handle; None if the file has no site on a moving body."""
+    sites = {model.site(i).name: i for i in range(model.nsite)}
+    if wanted is None:
+        moving = [i for i in sites.values() if model.body_weldid[model.site_bodyid[i]]]
+        if len(moving) > 1:
+            bound = f"must be named: there are {', '.join(model.site(i).name for i in moving)}"
+            raise ParameterError("site", None, bound)
+        return ("site", moving[0]) if moving else None
+    if wanted in sites:
+        return "site", sites[wanted]
+    bodies = {model.body(i).name: i for i in range(1, model.nbody)}
+    if wanted in bodies:
+        return "body", bodies[wanted]
+    raise _unknown("site", wanted, [*sites, *bodies], "a site or body")
+
+
+def _unknown(field: str, word: Any, names: Sequence[str], kind: str) -> ParameterError:
+    near = nearest(word, names) if isinstance(word, str) else []
+    hint = f"; did you mean {near[0]!r}?" if near else f": {one_line(', '.join(names), 200)}"
+    return ParameterError(field, word, f"must be {kind} of the file{hint}")
+
+
+def _arm_joints(model: Any, wanted: Any, site: tuple[str, int] | None) -> list[int]:
+    """The arm's joints: those named, or those between the handle and the world."""
+    every = {model.joint(j).name: j for j in range(model.njnt)}
+    if wanted is not None:
+        if not is_series(wanted) or not len(list(wanted)):
+            raise ParameterError("joints", wanted, "must be a list of names of joints")
+        chosen = [every[full_name("joints", word, list(every))] for word in wanted]
+        if len(set(chosen)) < len(chosen):
+            raise ParameterError("joints", list(wanted), "must name each joint once")
+    else:
+        chosen = _driven(model, _chain(model, site))
+    if not chosen:
+        raise ParameterError("joints", None, "must be named: no joint moves the handle")
+    return chosen
+
+
+def _chain(model: Any, site: tuple[str, int] | None) -> list[int]:
+    """Joints between the handle and the world, from the base on; all without a handle."""
+    if site is None:
+        return list(range(model.njnt))
+    kind, number_ = site
+    body, out = int(model.site_bodyid[number_]) if kind == "site" else number_, []
+    while body:
+        first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
+        out = [*range(first, first + count), *out]
+        body = int(model.body_parentid[body])
+    return out
+
+
+def _driven(model: Any, chain: list[int]) -> list[int]:
+    """Joints that a closed chain's actuators drive; those of the chain if it is open."""
+    if not model.neq:
+        return chain
+    from ..physics import mujoco
+
+    at_joints = model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
+    return [int(j) for j in model.actuator_trnid[at_joints, 0]] or chain
+
+
+# ---- values --------------------------------------------------------------------------------------
+
+
+def _per_joint(
+    model: Any, field: str, given: Any, joints: Sequence[int], old: np.ndarray
+) -> list[float]:
+    """A value for each joint: given by name, or one for each; `old` for those not given."""
+    names = [model.joint(j).name for j in joints]
+    if given is None:
+        pairs: dict[int, Any] = {}
+    elif isinstance(given, Mapping):
+        pairs = {names.index(full_name(field, word, names)): x for word, x in given.items()}
+    elif is_series(given) and len(list(given)) == len(names):
+        pairs = dict(enumerate(given))
+    else:
+        bound = f"must be a number for each joint ({', '.join(names)}), or by name"
+        raise ParameterError(field, given, bound)
+    low, high, *units = BOUNDS[field]
+    out = [float(x) for x in old]
+    for i, x in pairs.items():
+        unit = units[int(model.jnt_type[joints[i]]) == SLIDE]
+        out[i] = number(f"{field}[{names[i]}]", x, low, high, unit=unit)
+    return out
+
+
+def full_name(field: str, word: Any, names: Sequence[str]) -> str:
+    """The joint that a word names, in full or by the only ending behind _ or /, as joint4.
+
+    Raises:
+        ParameterError: there is no such joint; the error suggests the nearest name.
+    """
+    ends = [n for n in names if isinstance(word, str) and n.endswith((f"_{word}", f"/{word}"))]
+    if word in names:
+        return word
+    if len(ends) != 1:
+        raise _unknown(field, word, names, "a joint")
+    return ends[0]
+
+
+def _pose(model: Any, given: Any, joints: list[int]) -> np.ndarray:
+    """Positions of all joints [rad or m]."""
+    start = np.array(model.qpos0, float)
+    keys = {model.key(i).name: i for i in range(model.nkey)}
+    if "home" in keys:
+        start = np.array(model.key_qpos[keys["home"]], float)
+    which = range(model.njnt) if isinstance(given, Mapping) else joints
+    start[which] = _per_joint(model, "pose", given, which, start[which])
+    return start
+
+
+def _torque_limits(model: Any, joints: list[int]) -> np.ndarray:
+    """Largest torque of each joint: its own limit, or that of its actuator."""
+    out = np.full(len(joints), math.inf)
+    for i, j in enumerate(joints):
+        if model.jnt_actfrclimited[j]:
+            out[i] = np.abs(model.jnt_actfrcrange[j]).min()
+    return out
+
+
+def _ranges(model: Any, joints: list[int]) -> np.ndarray:
+    free = np.array([-math.inf, math.inf])
+    return np.array([model.jnt_range[j] if model.jnt_limited[j] else free for j in joints])
+
+
+# ---- what is refused, and what is noted ----------------------------------------------------------
+
+
+def _check_mechanism(mechanism: Mechanism, names: Sequence[str]) -> None:
+    """Refuses constraints that leave the arm free or stuck, and joints without inertia."""
+    if mechanism.overclosed():
+        bound = "must be free to move each by itself: constraints of the file tie them"
+        raise ParameterError("joints", list(names), bound)
+    if free := mechanism.freedom():
+        bound = f"must move all that its constraints hold: {free} more joints are free"
+        raise ParameterError("joints", list(names), bound)
+    inertia = mechanism.linear(mechanism.pose[mechanism.dofs]).inertia
+    if not np.linalg.eigvalsh(inertia).min() > LIGHTEST:
+        light = names[int(np.diag(inertia).argmin())]
+        bound = (
+            "must have an inertia: the links behind it have none along its axis, nor has a rotor"
+        )
+        raise ParameterError("joint", light, bound)
+
+
+def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> list[str]:
+    """Sentences about what the file leaves open, and what of it takes no part."""
+    names = [model.joint(j).name for j in joints]
+    rotors = model.dof_armature[mechanism.dofs]
+    bare = [name for name, x in zip(names, rotors, strict=True) if not x]
+    whose = "given" if arm.armature is not None else "of the file"
+    notes = [f"rotor inertia (armature): {whose}"]
+    if bare:
+        notes[0] = (
+            f"no rotor inertia (armature) at {', '.join(bare)}: limits of geared joints are then "
+            "far too low"
+        )
+    if arm.pose is None:
+        homes = [model.key(i).name for i in range(model.nkey)]
+        notes.append(
+            f"pose: {'key frame home' if 'home' in homes else 'zero position'} of the file"
+        )
+    used = {*mechanism.dofs, *mechanism.following}
+    locked = [model.joint(j).name for j in range(model.njnt) if j not in used]
+    if locked:
+        notes.append(f"locked: {', '.join(locked)}")
+    if mechanism.following:
+        tied = [model.joint(j).name for j in mechanism.following]
+        notes.append(f"constraints, taken as rigid, move {', '.join(tied)}")
+    if model.nu:
+        notes.append(f"{model.nu} actuators of the file take no part")
+    if np.any(model.geom_contype | model.geom_conaffinity):
+        notes.append("contacts of the file take no part")
+    return notes

@@ -1,0 +1,187 @@
+"""Linear mechanics of a compiled MuJoCo model in the coordinates of an arm's joints.
+
+Each joint of the model belongs to the arm, follows it through equality constraints, or is locked.
+Constraints are projected out exactly, where the engine's own are soft.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import ParameterError
+
+STEP = 1e-5  # [rad or m] of differences of static torques: 1e-10 of them is rounding
+CLOSED = 1e-10  # [rad or m] a closed chain is closed within
+MOST_CLOSING = 50  # Newton steps that close a chain
+DEPENDENT = 1e-9  # of the largest singular value: smaller ones belong to redundant constraints
+
+
+class Linear(NamedTuple):
+    """An arm linearised at a pose, n joints.
+
+    Attributes:
+        inertia: M, rotors included [kg.m^2 or kg], shape (n, n).
+        damping: viscous damping of the joints [N.m.s/rad], shape (n, n).
+        stiffness: springs of the joints [N.m/rad], shape (n, n).
+        gravity_stiffness: change of the gravity torques with the joints [N.m/rad], shape (n, n).
+        weight_stiffness: the same for a unit mass at the handle [N.m/rad/kg], shape (n, n).
+        jacobian: velocity of the handle per joint rate [m], shape (3, n); of no use without handle.
+    """
+
+    inertia: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    gravity_stiffness: np.ndarray
+    weight_stiffness: np.ndarray
+    jacobian: np.ndarray
+
+
+class Mechanism:
+    """A compiled model with a choice of driven joints.
+
+    Attributes:
+        dofs: degree of freedom of each joint of the arm.
+        following: degrees of freedom that constraints move with the arm.
+        pose: position of each joint of the model that closes its chains at the arm's pose.
+    """
+
+    def __init__(self, model: Any, dofs: list[int], site: tuple[str, int] | None, pose: np.ndarray):
+        from ..physics import mujoco
+
+        self._mujoco, self._model, self._site = mujoco, model, site
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
+        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+        self._data = mujoco.MjData(model)
+        self.dofs = list(dofs)
+        self._start = self.pose = np.array(pose, float)
+        self.following: list[int] = []
+        self._place(self._start)
+        rows = self._constraints()[0]
+        moved = [i for i in range(model.nv) if np.any(rows[:, i])] if len(rows) else []
+        self.following = [i for i in moved if i not in self.dofs]
+        self.pose = self._closed(self._start)
+
+    # ---- one pose
+
+    def linear(self, q: np.ndarray) -> Linear:
+        """The arm linearised at joint positions [rad or m], shape (n,).
+
+        Raises:
+            ParameterError: constraints cannot be satisfied there.
+        """
+        place, model = self._at(q), self._model
+        follow = self._follow()
+        inertia = np.zeros((model.nv, model.nv))
+        self._mujoco.mj_fullM(model, self._data, inertia)
+        damping = follow.T @ (model.dof_damping[:, None] * follow)
+        jacobian = self._jacobian() @ follow
+        stiffness = self._stiffness(q)
+        self._place(place)
+        return Linear(follow.T @ inertia @ follow, damping, *stiffness, jacobian)
+
+    def static_torque(self, q: np.ndarray) -> np.ndarray:
+        """Torque that holds the arm against gravity [N.m], shape (n,)."""
+        self._at(q)
+        return self._static()[1]
+
+    def handle(self, q: np.ndarray) -> np.ndarray:
+        """Position of the handle in the frame of the world [m], shape (3,)."""
+        self._at(q)
+        kind, number = self._site or ("body", 0)
+        return np.array(getattr(self._data, "site_xpos" if kind == "site" else "xpos")[number])
+
+    def misfit(self, q: np.ndarray) -> float:
+        """How far constraints are from closed at the start for this pose, largest [rad or m]."""
+        place = self._start.copy()
+        place[self.dofs] = q
+        self._place(place)
+        return float(np.abs(self._constraints()[1]).max(initial=0.0))
+
+    # ---- the engine's terms
+
+    def _place(self, position: np.ndarray) -> None:
+        self._data.qpos[:], self._data.qvel[:] = position, 0.0
+        self._mujoco.mj_fwdPosition(self._model, self._data)
+        self._mujoco.mj_fwdVelocity(self._model, self._data)
+
+    def _at(self, q: np.ndarray) -> np.ndarray:
+        """Places the arm, its followers where constraints hold; returns all positions."""
+        position = self.pose.copy()
+        position[self.dofs] = q
+        return self._closed(position)
+
+    def _constraints(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of the equality constraints, shape (m, nv), and how far each is from closed."""
+        data, model = self._data, self._model
+        equal = data.efc_type[: data.nefc] == int(self._mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+        rows = np.array(data.efc_J).reshape(-1, model.nv)[: data.nefc][equal]
+        return rows, np.array(data.efc_pos[: data.nefc][equal])
+
+    def _closed(self, position: np.ndarray) -> np.ndarray:
+        """Moves the followers by Newton's method until the constraints hold."""
+        position = position.copy()
+        for _ in range(MOST_CLOSING):
+            self._place(position)
+            rows, gap = self._constraints()
+            if not self.following or np.abs(gap).max(initial=0.0) <= CLOSED:
+                return position
+            step = np.linalg.lstsq(rows[:, self.following], gap, rcond=None)[0]
+            position[self.following] -= step
+        raise ParameterError(
+            "pose", position[self.dofs].tolist(), "must be one at which the chain can be closed"
+        )
+
+    def _follow(self) -> np.ndarray:
+        """Rates of all joints per rate of the arm's, shape (nv, n); locked joints rest."""
+        out = np.zeros((self._model.nv, len(self.dofs)))
+        out[self.dofs, range(len(self.dofs))] = 1.0
+        if self.following:
+            rows = self._constraints()[0]
+            own, rest = rows[:, self.following], rows[:, self.dofs]
+            out[self.following] = -np.linalg.lstsq(own, rest, rcond=DEPENDENT)[0]
+        return out
+
+    def freedom(self) -> int:
+        """Followers that the constraints leave free, and so no joint of the arm moves."""
+        if not self.following:
+            return 0
+        own = self._constraints()[0][:, self.following]
+        return len(self.following) - int(np.linalg.matrix_rank(own, DEPENDENT * np.abs(own).max()))
+
+    def overclosed(self) -> bool:
+        """Whether constraints hold joints of the arm against each other."""
+        if not self.following:
+            return bool(np.any(self._constraints()[0][:, self.dofs]))
+        rows, follow = self._constraints()[0], self._follow()
+        return bool(np.abs(rows @ follow).max() > 1e-6 * np.abs(rows).max())
+
+    def _static(self) -> np.ndarray:
+        """Torques that hold springs, gravity, and a unit mass at the handle, shape (3, n)."""
+        data, up = self._data, -np.array(self._model.opt.gravity)
+        every = -data.qfrc_spring, data.qfrc_bias - data.qfrc_gravcomp, up @ self._jacobian()
+        return np.array(every) @ self._follow()
+
+    def _stiffness(self, q: np.ndarray) -> np.ndarray:
+        """Central differences of the static torques, shape (3, n, n)."""
+        columns = []
+        for j in range(len(self.dofs)):
+            sides = []
+            for sign in (1.0, -1.0):
+                there = np.array(q, float)
+                there[j] += sign * STEP
+                self._at(there)
+                sides.append(self._static())
+            columns.append((sides[0] - sides[1]) / (2.0 * STEP))
+        found = np.stack(columns, axis=2)
+        return 0.5 * (found + found.transpose(0, 2, 1))
+
+    def _jacobian(self) -> np.ndarray:
+        out = np.zeros((3, self._model.nv))
+        if self._site is not None:
+            kind, number = self._site
+            of = self._mujoco.mj_jacSite if kind == "site" else self._mujoco.mj_jacBody
+            of(self._model, self._data, out, None, number)
+        return out

@@ -1,0 +1,167 @@
+"""An arm from a file: its mechanism at a pose, and what the file leaves open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from ..arguments import named
+from ..errors import ParameterError, array_of, choice
+from .loading import load
+from .mechanism import Linear
+
+PerJoint = Mapping[str, float] | Sequence[float] | None
+
+
+@named
+@dataclass(frozen=True, eq=False, repr=False)
+class MjcfArm:
+    """An arm that MuJoCo loads: any chain of hinges and slides, open or closed by constraints.
+
+    Joints between the handle and the world are the arm's, unless `joints` names others; a joint
+    that equality constraints tie to them follows; all others are locked at the pose. Actuators,
+    contacts and joint limits of the file take no part. What the file leaves open is in `notes`.
+
+    Attributes:
+        file: MJCF or URDF file, or an mujoco.MjSpec.
+        site: site, or body, at which the hand holds the arm; None for the only site on a moving
+            body.
+        joints: names of the arm's joints, in the order of its gains; None for those between the
+            handle and the world. Then those in use.
+        pose: joint positions [rad or m] by name, or one for each joint of the arm; None for the
+            key frame "home", or the positions of the file. Then those of all joints, by name.
+        armature: reflected inertia of the rotors [kg.m^2], 0 to 1e3, by joint name, or one for
+            each joint of the arm; None for the file's. Then those of the arm's joints.
+        damping: viscous damping of the joints [N.m.s/rad], 0 to 1e6, likewise.
+        friction: Coulomb friction of the joints [N.m], 0 to 1e6, likewise.
+        gravity: "compensated" if the controller holds the arm against gravity, by the torque for
+            the measured joint positions; "acts" if nothing does.
+    """
+
+    file: Any
+    site: str | None = None
+    joints: Sequence[str] | None = None
+    pose: PerJoint = None
+    armature: PerJoint = None
+    damping: PerJoint = None
+    friction: PerJoint = None
+    gravity: Literal["compensated", "acts"] = "compensated"
+
+    def __post_init__(self):
+        choice("gravity", self.gravity, ("compensated", "acts"))
+        loaded = load(self)
+        for name, value in loaded.fields.items():
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "_loaded", loaded)
+
+    def __repr__(self) -> str:
+        return f"<MjcfArm {self.name}: {', '.join(self.names)}>"
+
+    @property
+    def name(self) -> str:
+        """Name of the model in the file."""
+        return self._loaded.name  # type: ignore[attr-defined]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the arm's joints."""
+        return self.joints  # type: ignore[return-value]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the file leaves open, and what of it takes no part, a sentence each."""
+        return self._loaded.notes  # type: ignore[attr-defined]
+
+    @property
+    def q(self) -> np.ndarray:
+        """Positions of the arm's joints at the pose [rad or m], shape (n,)."""
+        return np.array([self.pose[name] for name in self.names])  # type: ignore[index]
+
+    @property
+    def torque_limits(self) -> np.ndarray:
+        """Largest torque of each joint [N.m], inf for none, shape (n,)."""
+        return self._loaded.torque_limits.copy()  # type: ignore[attr-defined]
+
+    @property
+    def ranges(self) -> np.ndarray:
+        """Least and largest position of each joint [rad or m], infinite for none, shape (n, 2)."""
+        return self._loaded.ranges.copy()  # type: ignore[attr-defined]
+
+    def linear(self, q: Sequence[float] | None = None) -> Linear:
+        """The arm linearised at a pose: all that its linear theory needs.
+
+        Args:
+            q: joint positions [rad or m], shape (n,); None for the arm's pose.
+
+        Raises:
+            ParameterError: q is not n finite numbers, or its chains cannot be closed there.
+        """
+        return self._loaded.mechanism.linear(self._place(q))  # type: ignore[attr-defined]
+
+    def mass_matrix(self, q: Sequence[float] | None = None) -> np.ndarray:
+        """Inertia M(q) of the joints, rotors included [kg.m^2], shape (n, n).
+
+        Args:
+            q: joint positions [rad or m], shape (n,); None for the arm's pose.
+
+        Raises:
+            ParameterError: as `linear`.
+        """
+        return self.linear(q).inertia
+
+    def gravity_stiffness(self, q: Sequence[float] | None = None) -> np.ndarray:
+        """Change of the gravity torques with the joint positions [N.m/rad], shape (n, n).
+
+        Args:
+            q: joint positions [rad or m], shape (n,); None for the arm's pose.
+
+        Raises:
+            ParameterError: as `linear`.
+        """
+        return self.linear(q).gravity_stiffness
+
+    def jacobian(self, q: Sequence[float] | None = None) -> np.ndarray:
+        """Velocity of the handle along x, y, z per joint rate [m], shape (3, n).
+
+        Args:
+            q: joint positions [rad or m], shape (n,); None for the arm's pose.
+
+        Raises:
+            ParameterError: as `linear`, or the arm has no handle.
+        """
+        self.check_handle()
+        return self.linear(q).jacobian
+
+    def handle(self, q: Sequence[float] | None = None) -> np.ndarray:
+        """Position of the handle in the world [m], shape (3,).
+
+        Args:
+            q: joint positions [rad or m], shape (n,); None for the arm's pose.
+
+        Raises:
+            ParameterError: as `jacobian`.
+        """
+        self.check_handle()
+        return self._loaded.mechanism.handle(self._place(q))  # type: ignore[attr-defined]
+
+    def check_handle(self) -> None:
+        """Refuses an arm that has no handle.
+
+        Raises:
+            ParameterError: neither `site` nor the file names one.
+        """
+        if self.site is None:
+            bound = "must name a site or body at the handle: the file has no site on a moving body"
+            raise ParameterError("site", None, bound)
+
+    def _place(self, q: Sequence[float] | None) -> np.ndarray:
+        if q is None:
+            return self.q
+        place = array_of("q", q)
+        if place.shape != (len(self.names),) or not np.isfinite(place).all():
+            bound = f"must be {len(self.names)} finite numbers ({', '.join(self.names)})"
+            raise ParameterError("q", place.tolist(), bound)
+        return place

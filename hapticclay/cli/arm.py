@@ -1,0 +1,153 @@
+"""`hapticclay arm`: which gains, rate and delay the joints of an arm from a file carry."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from ..errors import Bound, ParameterError
+from ..files import writable
+from . import console, walls
+from .options import Loose
+
+if TYPE_CHECKING:
+    from ..arms.joint_law import JointPD
+    from ..arms.mjcf_arm import MjcfArm
+
+
+@dataclass(frozen=True)
+class ArmCommand:
+    """Judge the joints of an arm from its MJCF or URDF file, under the gains of its controller.
+
+    Prints the least and largest gain of each joint, all coupled, the frequency at which it buzzes,
+    the delay and rate left, and what to change first; with --wall the stiffest wall at the handle;
+    with --poses the same over the workspace. Exact for small motions about the pose: no runs.
+
+    Attributes:
+        file: MJCF or URDF file of the arm.
+        gains: File of the gains, .toml, .json or .yaml, as teleoperation projects keep them.
+        Kp: Stiffness of each joint [N.m/rad], in place of --gains.
+        Kd: Damping of each joint [N.m.s/rad].
+        rate: Control rate [Hz], by default 1000.
+        Ts: Control sample [s], in place of --rate.
+        delay: Latency from a sample to the torque computed from it [s].
+        velocity: How the rate of a joint is had, by default as the file of gains says, or exact.
+        cutoff: Cutoff of --velocity filter [rad/s].
+        runs: Where the gains act: in the host's loop at the rate, or in the drives' own.
+        site: Site or body at which the hand holds the arm.
+        joints: Joints of the arm, in the order of the gains; by default those before the handle.
+        pose: Joint positions, a number for each joint or NAME=POSITION [rad or m].
+        armature: Reflected inertia of the rotors, a number for each joint or NAME=INERTIA [kg.m^2].
+        gravity: Whether the controller holds the arm against gravity.
+        wall: Axis of the world along which a wall at the handle pushes.
+        B: Damping of that wall [N.s/m].
+        hand: Mass, damper and spring of a hand at the handle [kg, N.s/m, N/m].
+        poses: Number of poses, drawn within the ranges of the joints; 0 for the one pose alone.
+        seed: Seed of their draw.
+        out: Folder for the numbers and figures; by default out/arm/NAME.
+        figures: Format and style of the figures.
+    """
+
+    file: Loose[Path]
+    gains: Path | None = None
+    Kp: Annotated[tuple[float, ...], Bound(unit="N.m/rad")] = ()
+    Kd: Annotated[tuple[float, ...], Bound(unit="N.m.s/rad")] = ()
+    rate: Annotated[float | None, Bound(0.0, unit="Hz", above=True)] = None
+    Ts: Annotated[float | None, Bound(0.0, unit="s", above=True)] = None
+    delay: Annotated[float, Bound(0.0, 10.0, unit="s")] = 0.0
+    velocity: Literal["exact", "difference", "filter"] | None = None
+    cutoff: Annotated[float | None, Bound(0.0, unit="rad/s", above=True)] = None
+    runs: Literal["host", "drive"] | None = None
+    site: str | None = None
+    joints: tuple[str, ...] = ()
+    pose: tuple[str, ...] = ()
+    armature: tuple[str, ...] = ()
+    gravity: Literal["compensated", "acts"] = "compensated"
+    wall: Literal["x", "y", "z"] | None = None
+    B: Annotated[float, Bound(0.0, unit="N.s/m")] = 0.0
+    hand: walls.Hand | None = None
+    poses: Annotated[int, Bound(0, 100_000)] = 0
+    seed: Annotated[int, Bound(0, 2**63 - 1)] = 0
+    out: Path | None = None
+    figures: console.FigureOptions = console.FigureOptions()
+
+    def __call__(self) -> int:
+        arm = self._arm()
+        out = self.out or console.default_folder("arm", arm)
+        writable(out)
+        for found in list(self._answers(arm)):  # all is computed before a file is written
+            console.deliver(found, out, self.figures)
+        return 0
+
+    def _answers(self, arm: MjcfArm) -> Any:
+        """The limits of the gains, of a wall, and over poses: those that are asked for."""
+        from ..theory import joint_gains, joint_poses, joint_walls
+
+        if self.gains or self.Kp:
+            law = self._law()
+            yield joint_gains.joint_limits(arm, law, self._Ts, self.delay)
+            if self.poses:
+                timing = self._Ts, self.delay
+                yield joint_poses.over_poses(arm, law, *timing, self.poses, self.seed)
+        elif not self.wall:
+            raise ParameterError("gains", None, "must be given, or --Kp and --Kd, or --wall")
+        elif self.poses:
+            raise ParameterError("poses", self.poses, "needs gains: give --gains, or --Kp and --Kd")
+        if self.wall:
+            hand = walls.operator_of(self.hand)
+            velocity = "difference" if self.velocity == "difference" else "exact"
+            timing = self._Ts, self.delay
+            yield joint_walls.wall_limit(arm, self.wall, self.B, hand, *timing, velocity)
+
+    @property
+    def _Ts(self) -> float:
+        if self.Ts is not None and self.rate is not None:
+            raise ParameterError("rate", self.rate, "is 1/Ts: give --Ts or --rate")
+        return self.Ts if self.Ts is not None else 1.0 / (self.rate or 1000.0)
+
+    def _arm(self) -> MjcfArm:
+        from ..arms.mjcf_arm import MjcfArm
+
+        return MjcfArm(
+            self.file,
+            site=self.site,
+            joints=self.joints or None,
+            pose=_per_joint("pose", self.pose),
+            armature=_per_joint("armature", self.armature),
+            gravity=self.gravity,
+        )
+
+    def _law(self) -> JointPD:
+        from ..arms.joint_law import JointPD
+
+        given = {
+            name: getattr(self, name)
+            for name in ("velocity", "cutoff", "runs")
+            if getattr(self, name) is not None
+        }
+        if self.gains and (self.Kp or self.Kd):
+            raise ParameterError("gains", str(self.gains), "is a file of Kp and Kd: give one")
+        if self.gains:
+            return JointPD.load(self.gains, **given)
+        return JointPD(self.Kp, self.Kd, **given)
+
+
+def _per_joint(name: str, words: Sequence[str]) -> Any:
+    """Values in order, or by the name of the joint, NAME=VALUE; None for none."""
+    if not words:
+        return None
+    pairs = [word.partition("=") for word in words]
+    named = [bool(equals) for _, equals, _ in pairs]
+    if any(named) and not all(named):
+        raise ParameterError(name, " ".join(words), "must be numbers, or NAME=NUMBER, not both")
+    values = [_number(value if equals else word) for word, equals, value in pairs]
+    return dict(zip([p[0] for p in pairs], values, strict=True)) if all(named) else values
+
+
+def _number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text

@@ -1,0 +1,97 @@
+"""Gains at which an eigenvalue of a joint loop lies on the unit circle, exact to rounding.
+
+Further torque -u A x of a response x = T tau puts an eigenvalue on z of the circle where -1/u is an
+eigenvalue of A T(z). So candidates are where an eigenvalue of A T turns real: its imaginary part
+changes sign between two angles of a grid and is refined there. At z = -1 all is real.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+ROUNDS = 60  # of the refinement
+EXACT = 1e-14  # imaginary part over size of an eigenvalue that counts as real
+REAL = 1e-7  # the same where refinement ended
+
+Response = Callable[[np.ndarray], np.ndarray]  # angles (m,) -> matrices (m, k, k)
+Sign = Callable[[np.ndarray], np.ndarray]  # eigenvalues -> real numbers whose zeros are sought
+
+
+class Crossing(NamedTuple):
+    """A change u of a gain that puts an eigenvalue on the circle, at an angle theta [rad]."""
+
+    change: float
+    theta: float
+
+
+def crossings(response: Response, angles: np.ndarray) -> list[Crossing]:
+    """All changes of a gain whose A T is the response, between the least angle and pi, sorted."""
+    theta, x = zeros(response, angles, np.imag)
+    x_pi = np.linalg.eigvals(response(np.array([math.pi])))[0]
+    theta, x = np.concatenate([theta, np.full(len(x_pi), math.pi)]), np.concatenate([x, x_pi])
+    good = (np.abs(x.imag) <= REAL * np.abs(x)) & (x.real != 0.0)
+    found = zip((-1.0 / x.real[good]).tolist(), theta[good].tolist(), strict=True)
+    return sorted(Crossing(*each) for each in found)
+
+
+def zeros(response: Response, angles: np.ndarray, sign: Sign) -> tuple[np.ndarray, np.ndarray]:
+    """Angles at which a number of an eigenvalue of a response changes sign, and the eigenvalue."""
+    values = _branches(np.linalg.eigvals(response(angles)))
+    signs = sign(values)
+    i, branch = np.nonzero(signs[:-1] * signs[1:] < 0.0)
+    ends = angles[i], angles[i + 1]
+    return _refined(response, sign, ends, (values[i, branch], values[i + 1, branch]))
+
+
+def _branches(values: np.ndarray) -> np.ndarray:
+    """Eigenvalues in an order in which each follows from the one before, shape (m, k)."""
+    if values.shape[1] == 1:
+        return values
+    from scipy.optimize import linear_sum_assignment
+
+    out = values.copy()
+    for a, b in zip(out[:-1], out[1:], strict=True):
+        _, order = linear_sum_assignment(np.abs(a[:, None] - b[None, :]))
+        b[:] = b[order]
+    return out
+
+
+def _refined(
+    response: Response,
+    sign: Sign,
+    ends: tuple[np.ndarray, np.ndarray],
+    values: tuple[np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Zeros between ends, and the eigenvalue there: the Illinois method."""
+    (low, high), (a, b) = (x.copy() for x in ends), (x.copy() for x in values)
+    weight_a, weight_b = np.ones(len(low)), np.ones(len(low))
+    theta, x = low.copy(), a.copy()
+    open_, moved = np.arange(len(low)), np.zeros(len(low), int)
+    for _ in range(ROUNDS):
+        if not len(open_):
+            break
+        fa, fb = weight_a[open_] * sign(a[open_]), weight_b[open_] * sign(b[open_])
+        between = (low[open_] * fb - high[open_] * fa) / (fb - fa)
+        theta[open_] = np.clip(between, low[open_], high[open_])
+        x[open_] = _nearest(np.linalg.eigvals(response(theta[open_])), a[open_], b[open_])
+        found = sign(x[open_])
+        same = np.sign(found) == np.sign(sign(a[open_]))
+        left, right = open_[same], open_[~same]
+        low[left], a[left], weight_a[left] = theta[left], x[left], 1.0
+        high[right], b[right], weight_b[right] = theta[right], x[right], 1.0
+        weight_b[left] *= np.where(moved[left] > 0, 0.5, 1.0)  # an end that stays twice counts half
+        weight_a[right] *= np.where(moved[right] < 0, 0.5, 1.0)
+        moved[left], moved[right] = 1, -1
+        done = np.abs(found) <= EXACT * np.abs(x[open_])
+        open_ = open_[~done & (high[open_] - low[open_] > 1e-15 * high[open_])]
+    return theta, x
+
+
+def _nearest(values: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Of the eigenvalues at each angle, that nearest to the branch's two known ones."""
+    gap = np.abs(values - a[:, None]) + np.abs(values - b[:, None])
+    return values[np.arange(len(values)), gap.argmin(axis=1)]

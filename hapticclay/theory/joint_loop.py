@@ -1,0 +1,194 @@
+"""The sampled loop of n joints at a pose: a matrix, and responses on the unit circle.
+
+Between samples M q'' + D q' + S q = tau is linear. At sample k the host measures q_k and has the
+rate v_k; its torque tau_k = -(P q_k + R v_k) acts after `delay` and is held for Ts (zero-order
+hold; a fraction of a sample splits the hold). The map from sample to sample is exact for small
+motions about the pose. Friction, encoder counts, torque limits and the links' elasticity are left
+out.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from ..errors import ParameterError
+from . import linear_loop
+
+MOST_STATES = 1200  # largest order of a map whose eigenvalues are computed
+AT_REST = 1e-6  # modes this near to z = 1 may be rest
+FREE = 1e-9  # of the largest stiffness: smaller ones are none
+ROUNDING = 1e-10  # of an eigenvalue
+
+
+@dataclass(frozen=True, eq=False)
+class JointLoop:
+    """Joints, and the torque that a host holds.
+
+    Attributes:
+        inertia: M [kg.m^2], shape (n, n).
+        damping: D of what acts between samples [N.m.s/rad], shape (n, n).
+        stiffness: S likewise [N.m/rad], shape (n, n).
+        position: P of the held torque [N.m/rad], shape (n, n).
+        rate: R of the held torque [N.m.s/rad], shape (n, n).
+        Ts: control sample [s].
+        delay: from a sample to its torque [s].
+        velocity: how the rate is had.
+        cutoff: of the filter behind the difference [rad/s].
+    """
+
+    inertia: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    position: np.ndarray
+    rate: np.ndarray
+    Ts: float
+    delay: float = 0.0
+    velocity: Literal["exact", "difference", "filter"] = "exact"
+    cutoff: float | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.inertia)
+
+    @cached_property
+    def _hold(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Transition of (q, q') over a sample, response to the torque due in it, to the one before.
+
+        Shapes (2n, 2n), (2n, n), (2n, n).
+        """
+        share = self._late[1]
+        whole, late = self._transition(self.Ts), self._transition((1.0 - share) * self.Ts)
+        return whole[0], late[1], whole[1] - late[1]
+
+    def _transition(self, t: float) -> tuple[np.ndarray, np.ndarray]:
+        from scipy.linalg import expm
+
+        n, inverse = self.n, np.linalg.inv(self.inertia)
+        a = np.zeros((3 * n, 3 * n))
+        a[:n, n : 2 * n] = np.eye(n)
+        a[n : 2 * n] = np.hstack([-inverse @ self.stiffness, -inverse @ self.damping, inverse])
+        e = expm(a * t)
+        return e[: 2 * n, : 2 * n], e[: 2 * n, 2 * n :]
+
+    @cached_property
+    def _late(self) -> tuple[int, float]:
+        """Whole samples of the delay, and the rest as a share of a sample."""
+        return linear_loop.whole_samples(self.delay, self.Ts)
+
+    # ---- the matrix
+
+    def map(self) -> np.ndarray:
+        """State matrix x(k+1) = A x(k): q, q', the last q, the filtered rate, torques to come.
+
+        Raises:
+            ParameterError: the delay makes it larger than 1,200 states.
+        """
+        n, (whole, share) = self.n, self._late
+        measured = {"exact": 0, "difference": 1, "filter": 2}[self.velocity]
+        queue = whole + (share > 0.0)
+        size = n * (2 + measured + queue)
+        if size > MOST_STATES:
+            most = (MOST_STATES // n - 4) * self.Ts
+            raise ParameterError("delay", self.delay, f"must be at most {most:g} s at this rate")
+        unit = np.eye(size).reshape(-1, n, size)  # rows of each group of n states
+        q, w, memory, queued = unit[0], unit[1], unit[2 : 2 + measured], unit[2 + measured :]
+        keep, gain = self._filter
+        v = w if not measured else gain * (q - memory[0]) + (keep * memory[1] if keep else 0.0)
+        torques = [-(self.position @ q + self.rate @ v), *queued]
+        step, now, before = self._hold
+        out = np.zeros((size, size))
+        out[: 2 * n] = step @ np.vstack([q, w]) + now @ torques[whole]
+        if share > 0.0:
+            out[: 2 * n] += before @ torques[whole + 1]
+        rest = [*[q, v][:measured], *torques[:queue]]
+        if rest:
+            out[2 * n :] = np.vstack(rest)
+        return out
+
+    @property
+    def _filter(self) -> tuple[float, float]:
+        """v_k = keep v_k-1 + gain (q_k - q_k-1)."""
+        if self.cutoff is None:
+            return 0.0, 1.0 / self.Ts
+        return 1.0 / (1.0 + self.cutoff * self.Ts), self.cutoff / (1.0 + self.cutoff * self.Ts)
+
+    @cached_property
+    def structural(self) -> int:
+        """Directions of motion without stiffness, which rest anywhere."""
+        total = self.stiffness + self.position
+        size = np.linalg.svd(total, compute_uv=False)
+        scale = max(np.abs(self.stiffness).max(), np.abs(self.position).max())
+        return int(np.sum(size <= FREE * scale)) if scale else self.n
+
+    def eigenvalues(self) -> np.ndarray:
+        """Eigenvalues of the map, largest first, without those of rest anywhere (z = 1)."""
+        z = np.linalg.eigvals(self.map())
+        for _ in range(2 * self.structural):
+            i = int(np.abs(z - 1.0).argmin())
+            if abs(z[i] - 1.0) > AT_REST:
+                break
+            z = np.delete(z, i)
+        return z[np.argsort(-np.abs(z), kind="stable")]
+
+    def radius(self) -> float:
+        """Largest size of an eigenvalue: below 1 the loop is stable."""
+        return float(np.abs(self.eigenvalues()).max(initial=0.0))
+
+    def stable(self) -> bool:
+        """Whether all motion but rest decays."""
+        return self.radius() < 1.0 + ROUNDING
+
+    # ---- on the unit circle
+
+    def responses(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Position and measured rate per torque added to the host's, both (m, n, n), of the loop.
+
+        At z = exp(i theta), theta of shape (m,), > 0 and <= pi.
+        """
+        q, v = self.open_responses(theta)
+        back = np.linalg.inv(np.eye(self.n) + self.position @ q + self.rate @ v)
+        return q @ back, v @ back
+
+    def open_responses(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Position and measured rate per held torque, both (m, n, n), of the joints alone."""
+        n, (step, now, before), (whole, share) = self.n, self._hold, self._late
+        z = np.exp(1j * theta)[:, None, None]
+        given = now + before / z if share > 0.0 else now
+        x = np.linalg.solve(z * np.eye(2 * n) - step, given * z**-whole)
+        q, w = x[:, :n], x[:, n:]
+        keep, gain = self._filter
+        return q, w if self.velocity == "exact" else gain * (1.0 - 1.0 / z) / (1.0 - keep / z) * q
+
+    def at_rest(self) -> np.ndarray:
+        """Position per constant torque added to the host's [rad/(N.m)], shape (n, n)."""
+        return np.linalg.pinv(self.stiffness + self.position, FREE)
+
+    # ---- the same with other numbers
+
+    def with_delay(self, delay: float) -> JointLoop:
+        """The loop with another delay [s]."""
+        return replace(self, delay=delay)
+
+    def feeding(self, position: np.ndarray, rate: np.ndarray) -> JointLoop:
+        """The loop with more feedback in the held torque, shapes (n, n)."""
+        return replace(self, position=self.position + position, rate=self.rate + rate)
+
+
+def grid(loop: JointLoop) -> np.ndarray:
+    """Angles of a search, > 0 and <= pi: even, by factors, and dense at resonances."""
+    whole = loop._late[0]
+    even = np.linspace(0.0, math.pi, 400 * (1 + whole // 8) + 1)[1:]
+    found = [even, np.geomspace(1e-6, 1.0, 400)]
+    if loop.n * (4 + whole) <= MOST_STATES // 3:
+        z = np.linalg.eigvals(loop.map())
+        z = z[(np.abs(z) > 0.5) & (z.imag >= 0.0)]
+        near = np.tan(np.linspace(-1.5, 1.5, 15))
+        found.append((np.angle(z)[:, None] + np.abs(1.0 - np.abs(z))[:, None] * near).ravel())
+    every = np.concatenate(found)
+    return np.unique(every[(every > 0.0) & (every <= math.pi)])

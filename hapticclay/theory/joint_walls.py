@@ -1,0 +1,179 @@
+"""The stiffest wall that an arm from a file renders at its handle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+
+from ..arguments import checked, named
+from ..arms.mechanism import Linear
+from ..arms.mjcf_arm import MjcfArm
+from ..errors import Bound, ParameterError
+from ..model.operator import NO_HAND, Operator
+from ..results import Result, Tables
+from .client_loop import Delay, Sample
+from .joint_families import Circle, Family, Limit
+from .joint_gains import IGNORED
+from .joint_loop import JointLoop
+
+AXES = ("x", "y", "z")
+LINE = 40  # dampings of the line of limits
+MOST_B = 2.2  # of mass/(Ts + delay): no wall is stable at more damping
+STILL = 1e-9  # [m] least motion of the handle per joint rate
+Axis = Literal["x", "y", "z"]
+
+
+@named
+@dataclass(frozen=True, repr=False, eq=False)
+class WallLimit(Result):
+    """The stiffest wall at the handle of an arm, along one axis of the world.
+
+    Attributes:
+        axis: axis of the wall.
+        K: largest stable stiffness [N/m]; inf for no limit, 0 or NaN if none is stable.
+        low: least stable stiffness [N/m], mostly 0.
+        frequency: frequency of the buzz there [Hz].
+        mass: mass of arm and hand along the axis, as a push on the handle meets it [kg].
+        B: damping of the wall [N.s/m].
+        Ts: control sample [s].
+        delay: from a sample to its torques [s].
+        line_B: dampings from 0 to that at which no wall is stable [N.s/m].
+        line_K: largest stable stiffness at them [N/m]: the Z-width of the arm along the axis.
+        assumed: what the verdict rests on, and what it leaves out, a sentence each.
+    """
+
+    drawn_by = "hapticclay.views.joint_plots:wall_plot"
+    written_as = "wall"
+
+    def remarks(self) -> Sequence[str]:
+        """What the verdict rests on."""
+        return [self.headline(), *self.assumed]
+
+    axis: str
+    K: float
+    low: float
+    frequency: float
+    mass: float
+    B: float
+    Ts: float
+    delay: float
+    line_B: np.ndarray
+    line_K: np.ndarray
+    assumed: tuple[str, ...] = ()
+
+    def headline(self) -> str:
+        """The limit in one line."""
+        at = f"{1.0 / self.Ts:.4g} Hz, {1e3 * self.delay:.3g} ms late"
+        least = f"{self.low:.4g} to " if self.low > 0.0 else "up to "
+        return (
+            f"wall along {self.axis} at {at}, B = {self.B:g} N.s/m: {least}{self.K:.4g} N/m "
+            f"({self.frequency:.3g} Hz, {self.mass:.3g} kg at the handle)"
+        )
+
+    def tables(self) -> Tables:
+        """The limit, and what is felt along the axis."""
+        row = {
+            "axis": self.axis,
+            "largest K [N/m]": self.K,
+            "least K [N/m]": self.low,
+            "buzz [Hz]": self.frequency,
+            "mass [kg]": self.mass,
+            "B [N.s/m]": self.B,
+            "Ts [s]": self.Ts,
+            "delay [s]": self.delay,
+        }
+        line = {"B [N.s/m]": self.line_B, "largest K [N/m]": self.line_K}
+        return {"wall": {name: [x] for name, x in row.items()}, "line": line}
+
+
+def held_arm(linear: Linear, operator: Operator) -> Linear:
+    """The arm with a hand at its handle: mass, damper and spring along x, y and z.
+
+    Gravity acts on the mass, too: it is held as the arm's own weight is.
+    """
+    square = linear.jacobian.T @ linear.jacobian
+    return linear._replace(
+        inertia=linear.inertia + operator.mass * square,
+        damping=linear.damping + operator.damper * square,
+        stiffness=linear.stiffness + operator.spring * square,
+        gravity_stiffness=linear.gravity_stiffness + operator.mass * linear.weight_stiffness,
+    )
+
+
+@checked
+def wall_limit(
+    arm: MjcfArm,
+    axis: Axis,
+    B: Annotated[float, Bound(0.0, 1e6, "N.s/m")],
+    operator: Operator | None,
+    Ts: Sample,
+    delay: Delay = 0.0,
+    velocity: Literal["exact", "difference"] = "exact",
+) -> WallLimit:
+    """Exact limit of the stiffness of a wall at the handle of an arm, at its pose.
+
+    The wall pulls with -(K x + B v) along the axis, by torques J' f of the joints, from x = J q and
+    v = J w at the samples. The hand acts at the handle along all axes.
+
+    Args:
+        arm: the arm at its pose; it has a handle.
+        axis: axis of the world along which the wall pushes.
+        B: damping of the wall [N.s/m], 0 to 1e6.
+        operator: the hand; None for none.
+        Ts: control sample [s], 1e-6 to 1.
+        delay: from a sample to the torques computed from it [s], 0 to 10.
+        velocity: how the rate of the joints is had.
+
+    Raises:
+        ParameterError: the arm has no handle, the handle cannot move along the axis, or a value is
+            out of its bounds.
+    """
+    arm.check_handle()
+    linear = held_arm(arm.linear(), operator or NO_HAND)
+    along = linear.jacobian[AXES.index(axis)]
+    if not np.abs(along).max() > STILL:
+        raise ParameterError("axis", axis, "must be one along which the handle can move")
+    forward = linear.gravity_stiffness * float(arm.gravity == "compensated")
+    still = np.zeros_like(linear.inertia)
+    loop = JointLoop(
+        linear.inertia,
+        linear.damping,
+        linear.stiffness + linear.gravity_stiffness,
+        -forward,
+        still,
+        Ts,
+        delay,
+        velocity,
+    )
+    mass = float(1.0 / (along @ np.linalg.solve(linear.inertia, along)))
+    limit = _limit(loop, along, B)
+    line_B = np.linspace(0.0, max(MOST_B * mass / (Ts + delay), 1.2 * B), LINE)
+    line_K = np.array([_limit(loop, along, b).high for b in line_B.tolist()])
+    return WallLimit(
+        axis,
+        limit.high,
+        limit.low,
+        limit.theta / (2.0 * math.pi * Ts),
+        mass,
+        B,
+        Ts,
+        delay,
+        line_B,
+        np.nan_to_num(line_K, nan=0.0, posinf=math.inf),
+        (*arm.notes, IGNORED),
+    )
+
+
+def _limit(loop: JointLoop, along: np.ndarray, B: float) -> Limit:
+    """Stable stiffness of a wall with damping B [N/m]."""
+    square, column = np.outer(along, along), along[:, None]
+    damped = loop.feeding(0.0 * square, B * square)
+
+    def stiffer(K: float) -> JointLoop:
+        return damped.feeding(K * square, 0.0 * square)
+
+    return Family(Circle(damped), "position", column, column, 0.0, stiffer).limit()

@@ -1,0 +1,86 @@
+"""Figures of what the joints of an arm carry."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from ..theory.joint_gains import JointLimits
+from ..theory.joint_poses import OverPoses
+from ..theory.joint_walls import WallLimit
+from .palette import BLACK, BLUE, VERMILION
+from .panels import label_axes, set_title, single
+from .style import figure_size, figure_style, points, stroke
+
+DECADES = 1.0  # that an axis shows beyond the gains, where one has no limit
+ELEVATION, AZIMUTH = 22.0, -58.0  # [deg] of the view of a workspace
+PER_JOINT = 0.32  # [inch] of height
+
+
+@figure_style()
+def limits_plot(found: JointLimits) -> Figure:
+    """Plots the stable interval of each joint's gains, and the present ones in it."""
+    n = len(found.names)
+    figure = Figure(figsize=figure_size(2, 1.4 + PER_JOINT * n))
+    stiff, damped = figure.subplots(1, 2, sharey=True)
+    _intervals(stiff, found.stiffness, found.Kp, "Kp [N.m/rad]")
+    _intervals(damped, found.damping, found.Kd, "Kd [N.m.s/rad]")
+    for i, (high, buzz) in enumerate(zip(found.Kp[:, 1], found.Kp_buzz, strict=True)):
+        if math.isfinite(buzz):
+            text = f" {buzz:.3g} Hz"
+            stiff.text(high, i, text, va="center", fontsize=points(8.0))
+    stiff.set_yticks(range(n), found.names)
+    stiff.invert_yaxis()
+    set_title(stiff, "stable gains (bars), present gains (dots), frequency beyond them")
+    return figure
+
+
+def _intervals(ax: Axes, present: np.ndarray, limits: np.ndarray, label: str) -> None:
+    """A bar from the least to the largest gain of each joint, a dot at the present one."""
+    finite = np.concatenate([present[present > 0.0], limits[np.isfinite(limits) & (limits > 0.0)]])
+    low = finite.min(initial=1e3) * 10.0**-DECADES
+    high = finite.max(initial=1e-3) * 10.0**DECADES
+    for i, (a, b) in enumerate(np.clip(limits, low, high).tolist()):
+        ax.barh(i, b - a, left=a, height=0.5, color=BLUE, alpha=0.35)
+    inside = (limits[:, 0] <= present) & (present < limits[:, 1])
+    colors = [BLACK if x else VERMILION for x in inside]
+    ax.scatter(np.maximum(present, low), range(len(present)), color=colors, zorder=3)
+    ax.set(xscale="log", xlim=(low, high))
+    label_axes(ax, label)
+
+
+@figure_style()
+def wall_plot(found: WallLimit) -> Figure:
+    """Plots the largest stiffness over the damping of the wall."""
+    figure, ax = single(3.2)
+    ax.plot(found.line_B, found.line_K, color=BLUE)
+    ax.plot(found.B, found.K, "o", color=BLACK)
+    ax.set_ylim(0.0)
+    label_axes(ax, "wall damping B [N.s/m]", "largest stable K [N/m]")
+    set_title(ax, f"walls along {found.axis} at the handle", "the dot is the wall asked for")
+    return figure
+
+
+@figure_style(axes_grid=False)
+def poses_plot(found: OverPoses) -> Figure:
+    """Plots the largest factor of all gains where the handle is, the worst pose marked."""
+    figure = Figure(figsize=figure_size(2, 4.0))
+    left, right = figure.add_gridspec(1, 2, width_ratios=(1.3, 1.0))
+    space = figure.add_subplot(left, projection="3d")
+    marks = space.scatter(*found.p.T, c=found.scale, cmap="viridis")  # type: ignore[misc]
+    space.scatter(*found.p[found.worst], s=90, facecolors="none", edgecolors=VERMILION)
+    space.view_init(ELEVATION, AZIMUTH)
+    space.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+    for axis in (space.xaxis, space.yaxis, space.zaxis):
+        axis.set_major_locator(MaxNLocator(4))
+    figure.colorbar(marks, ax=space, shrink=0.6, pad=0.16, label="largest factor of all Kp")
+    share = figure.add_subplot(right)
+    share.hist(found.scale[np.isfinite(found.scale)], bins=24, color=BLUE, alpha=0.6)
+    share.axvline(1.0, color=VERMILION, lw=stroke(1.2))
+    share.set(xlabel="largest factor of all Kp", ylabel="poses")
+    set_title(share, f"{len(found.q)} poses", "the worst is circled")
+    return figure

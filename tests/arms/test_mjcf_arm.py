@@ -1,0 +1,200 @@
+"""Arms from files: their mechanics against other derivations, and what is refused."""
+
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hapticclay as hc
+
+CARDS = Path(__file__).parents[2] / "mjcf" / "arms"
+NAMES = ("planar_2r", "five_bar", "haptic_3", "leader_7")
+
+
+def card(name, **kw):
+    return hc.MjcfArm(CARDS / f"{name}.xml", **kw)
+
+
+@given(q=st.tuples(*[st.floats(-2.5, 2.5)] * 2))
+@settings(max_examples=30, deadline=None)
+def test_the_planar_arm_is_its_formula(q):
+    """M of two links from their kinetic energy, by hand; J from the positions."""
+    arm, (q1, q2), l1, l2 = card("planar_2r"), q, 0.24, 0.35
+    rho, rotor = 2700.0, 0.0008
+    m1 = rho * math.pi * (0.02**2 - 0.018**2) * l1
+    m2 = rho * math.pi * (0.0125**2 - 0.0105**2) * l2
+    i1 = m1 * (3 * (0.02**2 + 0.018**2) + l1**2) / 12 + m1 * (l1 / 2) ** 2 + 1.0 * l1**2
+    i2 = m2 * (3 * (0.0125**2 + 0.0105**2) + l2**2) / 12
+    c, r = math.cos(q2), l2 / 2
+    inner = i2 + m2 * r**2
+    M = np.array(
+        [
+            [i1 + m2 * (l1**2 + 2 * l1 * r * c) + inner, inner + m2 * l1 * r * c],
+            [inner + m2 * l1 * r * c, inner],
+        ]
+    )
+    # the file has six digits of masses, five of inertias
+    np.testing.assert_allclose(arm.mass_matrix(q), M + rotor * np.eye(2), rtol=3e-5)
+    s1, s12 = math.sin(q1), math.sin(q1 + q2)
+    c1, c12 = math.cos(q1), math.cos(q1 + q2)
+    J = [[-l1 * s1 - l2 * s12, -l2 * s12], [l1 * c1 + l2 * c12, l2 * c12], [0.0, 0.0]]
+    np.testing.assert_allclose(arm.jacobian(q), J, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_jacobian_is_that_of_the_positions(name):
+    """Central differences of the handle's place, followers of a closed chain moved along."""
+    arm, h = card(name), 1e-5
+    for j in range(len(arm.names)):
+        step = h * np.eye(len(arm.names))[j]
+        slope = (arm.handle(arm.q + step) - arm.handle(arm.q - step)) / (2.0 * h)
+        np.testing.assert_allclose(arm.jacobian()[:, j], slope, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_inertia_is_kinetic_energy(name):
+    """Twice the energy that the engine finds, at rates that keep the chain closed."""
+    arm, random = card(name), np.random.default_rng(1)
+    model = mujoco.MjModel.from_xml_path(str(CARDS / f"{name}.xml"))
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    data = mujoco.MjData(model)
+    at = {model.joint(j).name: j for j in range(model.njnt)}
+    data.qpos[:] = [arm.pose[x] for x in at]
+    for _ in range(5):
+        w, h = random.normal(size=len(arm.names)), 1e-6
+        there = hc.MjcfArm(
+            CARDS / f"{name}.xml", pose=dict(zip(arm.names, arm.q + h * w, strict=True))
+        )
+        data.qvel[:] = [(there.pose[x] - arm.pose[x]) / h for x in at]
+        mujoco.mj_forward(model, data)
+        assert w @ arm.mass_matrix() @ w == pytest.approx(2.0 * data.energy[1], rel=1e-4)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_gravity_stiffness_is_the_curvature_of_the_energy(name):
+    arm, h = card(name), 1e-3
+    n, model = len(arm.names), mujoco.MjModel.from_xml_path(str(CARDS / f"{name}.xml"))
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+
+    def energy(q):
+        there = hc.MjcfArm(CARDS / f"{name}.xml", pose=dict(zip(arm.names, q, strict=True)))
+        data = mujoco.MjData(model)
+        data.qpos[:] = [there.pose[model.joint(j).name] for j in range(model.njnt)]
+        mujoco.mj_forward(model, data)
+        return data.energy[0]
+
+    e = np.eye(n)
+    found = [
+        [
+            sum(s * t * energy(arm.q + h * (s * e[i] + t * e[j])) for s in (1, -1) for t in (1, -1))
+            / (4.0 * h * h)
+            for j in range(n)
+        ]
+        for i in range(n)
+    ]
+    np.testing.assert_allclose(arm.gravity_stiffness(), found, atol=2e-5)
+
+
+def test_values_by_name_and_by_place():
+    arm = card("leader_7", armature={"joint3": 0.2}, damping=[0.1] * 7, pose={"joint2": "30 deg"})
+    assert arm.armature == (0.0081, 0.0081, 0.2, 0.16, 0.01, 0.01, 0.0049)
+    assert arm.damping == (0.1,) * 7
+    assert arm.pose["joint2"] == pytest.approx(math.pi / 6)
+    plain = card("leader_7", pose=arm.pose)
+    gap = arm.mass_matrix() - plain.mass_matrix()
+    np.testing.assert_allclose(gap, np.diag([0.0, 0.0, 0.04, 0.0, 0.0, 0.0, 0.0]), atol=1e-15)
+
+
+def test_what_a_file_leaves_open_is_said():
+    spec = mujoco.MjSpec.from_file(str(CARDS / "leader_7.xml"))
+    for joint in spec.joints:
+        joint.armature = 0.0
+    notes = " ".join(hc.MjcfArm(spec).notes)
+    assert "joint1, joint2" in notes and "no rotor inertia" in notes
+    assert "key frame home" in notes
+    notes = " ".join(card("five_bar").notes)
+    assert "constraints" in notes and "right_elbow, left_elbow" in notes and "2 actuators" in notes
+
+
+BODY = (
+    '<body name="b"><joint name="j"/><inertial pos="1 0 0" mass="1" diaginertia="1 1 1"/>{}</body>'
+)
+SITE = '<site name="handle"/>'
+
+
+def xml(body, rest=""):
+    return f"<mujoco><worldbody>{body}</worldbody>{rest}</mujoco>"
+
+
+REFUSED = {
+    "no such file": ("nothing.xml", {}, "there is none"),
+    "not a model": ("<a/>", {}, "MuJoCo loads"),
+    "no mass": (xml('<body><joint/><geom size="1" mass="0"/></body>'), {}, "mass and inertia"),
+    "a free joint": (
+        xml(BODY.format(SITE).replace('<joint name="j"/>', "<freejoint/>")),
+        {},
+        "is free",
+    ),
+    "a ball joint": (
+        xml(BODY.format(SITE).replace('name="j"', 'name="j" type="ball"')),
+        {},
+        "is ball",
+    ),
+    "a springy tendon": (
+        xml(
+            BODY.format(SITE),
+            '<tendon><fixed name="t" stiffness="1"><joint joint="j" coef="1"/></fixed></tendon>',
+        ),
+        {},
+        "stiffness",
+    ),
+    "no such site": (xml(BODY.format(SITE)), {"site": "handel"}, "did you mean 'handle'"),
+    "two sites": (xml(BODY.format(SITE + '<site name="b"/>')), {}, "must be named"),
+    "no such joint": (xml(BODY.format(SITE)), {"joints": ["k"]}, "must be a joint"),
+    "a joint twice": (xml(BODY.format(SITE)), {"joints": ["j", "j"]}, "each joint once"),
+    "wrong name of a pose": (xml(BODY.format(SITE)), {"pose": {"jj": 1.0}}, "did you mean 'j'"),
+    "too many positions": (xml(BODY.format(SITE)), {"pose": [0.0, 1.0]}, "for each joint"),
+    "a pose that is NaN": (xml(BODY.format(SITE)), {"pose": [math.nan]}, "finite"),
+    "negative armature": (xml(BODY.format(SITE)), {"armature": [-1.0]}, ">= 0"),
+    "a unit of another kind": (xml(BODY.format(SITE)), {"damping": ["1 m"]}, "m"),
+    "no joint": (
+        xml('<body><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>' + SITE + "</body>"),
+        {},
+        "joint",
+    ),
+    "gravity": (xml(BODY.format(SITE)), {"gravity": "off"}, "compensated, acts"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_refused_in_one_line(case, tmp_path):
+    text, given, told = REFUSED[case]
+    file = tmp_path / "arm.xml"
+    if text.startswith("<"):
+        file.write_text(text)
+    with pytest.raises(hc.ParameterError, match=told) as error:
+        hc.MjcfArm(file if text.startswith("<") else tmp_path / text, **given)
+    assert "\n" not in str(error.value)
+
+
+def test_an_open_chain_held_in_itself_is_refused(tmp_path):
+    """Both joints of a pair that a constraint ties cannot be driven one by one."""
+    file = tmp_path / "arm.xml"
+    inner = BODY.format(BODY.format(SITE).replace('"b"', '"c"').replace('"j"', '"k"'))
+    file.write_text(xml(inner, '<equality><joint joint1="j" joint2="k"/></equality>'))
+    with pytest.raises(hc.ParameterError, match="constraints of the file tie them"):
+        hc.MjcfArm(file, joints=["j", "k"])
+    assert hc.MjcfArm(file, joints=["j"]).names == ("j",)
+
+
+def test_without_handle_the_joints_are_judged_alone(tmp_path):
+    file = tmp_path / "arm.xml"
+    file.write_text(xml(BODY.format("")))
+    arm = hc.MjcfArm(file, armature=[0.1])
+    assert hc.theory.joint_limits(arm, hc.JointPD([1.0], [0.1]), 1e-3).stable
+    with pytest.raises(hc.ParameterError, match="site or body at the handle"):
+        arm.jacobian()

@@ -1,0 +1,49 @@
+"""`hapticclay arm`: the table, the files, and what it refuses in one line."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from hapticclay.cli.app import main
+
+CARDS = Path(__file__).parents[2] / "mjcf" / "arms"
+TWO = str(CARDS / "planar_2r.xml")
+GAINS = ["--Kp", "100", "50", "--Kd", "1", "0.5"]
+
+
+def test_limits_wall_and_poses(tmp_path, capsys):
+    words = ["arm", TWO, *GAINS, "--rate", "500", "--delay", "1ms", "--wall", "x", "--B", "2"]
+    assert main([*words, "--poses", "3", "--out", str(tmp_path)]) == 0
+    text = capsys.readouterr().out
+    assert "shoulder" in text and "first to change" in text and "wall along x" in text
+    assert {x.name for x in tmp_path.iterdir()} == {
+        f"{name}.{kind}" for name in ("limits", "wall", "poses") for kind in ("json", "png")
+    }
+    found = json.loads((tmp_path / "limits.json").read_text())
+    assert found["tables"]["joints"]["joint"] == ["shoulder", "elbow"]
+
+
+@pytest.mark.parametrize(
+    "words, told",
+    [
+        (["nothing.xml", *GAINS], "there is none"),
+        ([TWO], "must be given, or --Kp and --Kd"),
+        ([TWO, "--Kp", "100", "--Kd", "1"], "2 numbers, one for each joint"),
+        ([TWO, "--Kp", "1", "2", "--Kd", "1"], "as Kp (2)"),
+        ([TWO, *GAINS, "--pose", "shouldr=1"], "did you mean 'shoulder'"),
+        ([TWO, *GAINS, "--pose", "1", "elbow=2"], "not both"),
+        ([TWO, *GAINS, "--rate", "500", "--Ts", "1ms"], "give --Ts or --rate"),
+        ([TWO, *GAINS, "--wall", "z"], "along which the handle can move"),
+        ([TWO, "--wall", "x", "--poses", "3"], "needs gains"),
+        ([TWO, *GAINS, "--velocity", "filter"], "velocity 'filter'"),
+        ([TWO, *GAINS, "--dely", "1ms"], "did you mean --delay"),
+        ([TWO, *GAINS, "--delay", "1mm"], "s"),
+    ],
+)
+def test_refused_in_one_line(words, told, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["arm", *words]) == 2
+    error = capsys.readouterr().err
+    assert told in error and error.count("\n") == 1
+    assert not list(tmp_path.iterdir())

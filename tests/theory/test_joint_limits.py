@@ -1,0 +1,325 @@
+"""Limits of joint loops: against another map, other theory, and the engine's own runs."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hapticclay as hc
+from hapticclay.arms.mechanism import Linear
+from hapticclay.theory.joint_families import Circle, Family
+from hapticclay.theory.joint_gains import Study, delay_left, joint_loop
+from hapticclay.theory.wall_limits import stiffness_band
+from tests.oracles import joints
+
+CARDS = Path(__file__).parents[2] / "mjcf" / "arms"
+LEADER_KP = (240.0, 240.0, 240.0, 240.0, 24.0, 31.0, 25.0)
+LEADER_KD = (3.0, 3.0, 3.0, 3.0, 0.2, 0.2, 0.2)
+LEADER_LAW = hc.JointPD(LEADER_KP, LEADER_KD, velocity="filter", cutoff=90.0)
+
+
+def leader(**kw):
+    return hc.MjcfArm(CARDS / "leader_7.xml", **kw)
+
+
+def drawn(seed):
+    """A loop of one to three joints, with all that may stand in it."""
+    random = np.random.default_rng(seed)
+    n, Ts = int(random.integers(1, 4)), 10.0 ** random.uniform(-3.5, -2.0)
+    root = random.normal(size=(n, n))
+    M = root @ root.T + 0.1 * np.eye(n)
+    D = np.diag(random.choice([0.0, 0.3, 2.0], n))
+    S = np.diag(random.choice([0.0, 5.0, -2.0], n))
+    kind = str(random.choice(["exact", "difference", "filter"]))
+    law = hc.JointPD(
+        tuple(random.uniform(0.0, 0.4, n) / Ts),
+        tuple(random.uniform(0.05, 1.0, n)),
+        velocity=kind,
+        cutoff=10.0 ** random.uniform(1.0, 3.0) if kind == "filter" else None,
+        friction=[(0.1, 2.0, 0.05)] * n if random.random() < 0.3 else None,
+    )
+    delay = Ts * float(random.choice([0.0, 0.4, 1.0, 2.7]))
+    zero = np.zeros((n, n))
+    return Linear(M, D, S, zero, zero, np.zeros((3, n))), law, Ts, delay
+
+
+def other_radius(linear, law, Ts, delay, Kp=None, Kd=None):
+    Kp, Kd = (law.Kp if Kp is None else Kp), (law.Kd if Kd is None else Kd)
+    gains = np.diag(Kp), np.diag(Kd) - np.diag(law.slopes)
+    arm = linear.inertia, linear.damping, linear.stiffness
+    return joints.radius(arm, gains, Ts, delay, law.velocity, law.cutoff)
+
+
+@given(seed=st.integers(0, 10**6))
+@settings(max_examples=60, deadline=None)
+def test_the_map_is_that_of_pieces_of_motion(seed):
+    linear, law, Ts, delay = drawn(seed)
+    loop = joint_loop(linear, law, Ts, delay, False)
+    found = np.abs(np.linalg.eigvals(loop.map())).max()
+    # eigenvalues of matrices of some 20 states with defective zeros: 1e-9 is far above rounding
+    assert found == pytest.approx(other_radius(linear, law, Ts, delay), rel=1e-9)
+
+
+@given(seed=st.integers(0, 10**6))
+@settings(max_examples=40, deadline=None)
+def test_the_other_map_turns_unstable_at_each_limit(seed):
+    """The upper end of each interval: the radius passes 1 within 1e-5 of the gain."""
+    linear, law, Ts, delay = drawn(seed)
+    loop = joint_loop(linear, law, Ts, delay, False)
+    e = np.eye(len(law))
+    for kind, gains in (("Kp", law.Kp), ("Kd", law.Kd)):
+        for j in range(len(law)):
+
+            def changed(u, kind=kind, j=j):
+                now = {"Kp": np.array(law.Kp), "Kd": np.array(law.Kd)}
+                now[kind] = now[kind] + u * e[j]
+                return joint_loop(linear, law, Ts, delay, False, (now["Kp"], now["Kd"]))
+
+            of = "position" if kind == "Kp" else "rate"
+            column = e[:, j : j + 1]
+            limit = Family(Circle(loop), of, column, column, gains[j], changed).limit()
+            if not math.isfinite(limit.high) or limit.high <= 1e-6:
+                continue
+            for share, stable in ((1.0 - 1e-5, True), (1.0 + 1e-5, False)):
+                now = np.array(gains)
+                now[j] = limit.high * share
+                size = other_radius(linear, law, Ts, delay, **{kind: now})
+                assert bool(size < 1.0 + 1e-11) is stable, (kind, j, limit, size)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.5e-3, 2e-3])
+@pytest.mark.parametrize("B", [0.0, 3.0])
+def test_one_joint_is_the_wall_on_a_bare_device(B, delay):
+    """A slide of a mass with a damper: the theory of walls has its band of stiffness."""
+    wall = hc.VirtualWall(
+        device=hc.Device(0.3, 1.5), Ts=1e-3, B=B, delay=delay, velocity="difference"
+    )
+    one = np.ones((1, 1))
+    linear = Linear(0.3 * one, 1.5 * one, 0 * one, 0 * one, 0 * one, np.zeros((3, 1)))
+    law = hc.JointPD([100.0], [B], velocity="difference")
+
+    def changed(u):
+        return joint_loop(linear, law, 1e-3, delay, False, (np.array([100.0 + u]), np.array([B])))
+
+    circle = Circle(joint_loop(linear, law, 1e-3, delay, False))
+    limit = Family(circle, "position", one, one, 100.0, changed).limit()
+    low, high = stiffness_band(wall)
+    assert limit.high == pytest.approx(high, rel=1e-9)
+    assert limit.low == pytest.approx(low, abs=1e-6)
+
+
+def grows(arm, law, Ts, seconds):
+    """Whether a run of the engine leaves its pose: RK4, torques a sample late, gravity held."""
+    model = mujoco.MjModel.from_xml_path(str(arm.file))
+    model.dof_frictionloss[:], model.jnt_limited[:] = 0.0, 0
+    model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, 0.5 * Ts
+    data, static = mujoco.MjData(model), mujoco.MjData(model)
+    data.qpos[:] = arm.q + 1e-7 * np.random.default_rng(0).normal(size=model.nv)
+    rate, last, sizes, late = np.zeros(model.nv), data.qpos.copy(), [], None
+    for _ in range(round(seconds / Ts)):
+        q = data.qpos.copy()
+        rate, last = (rate + law.cutoff * (q - last)) / (1.0 + law.cutoff * Ts), q
+        static.qpos[:] = q
+        mujoco.mj_fwdPosition(model, static)
+        mujoco.mj_fwdVelocity(model, static)
+        torque = static.qfrc_bias - np.array(law.Kp) * (q - arm.q) - np.array(law.Kd) * rate
+        data.qfrc_applied[:] = torque if late is None else late
+        mujoco.mj_step(model, data, 2)
+        late = torque
+        sizes.append(np.abs(data.qpos - arm.q).max())
+        if not sizes[-1] < 1e-2:
+            return True
+    last_quarter = len(sizes) // 4
+    return max(sizes[-last_quarter:]) > max(sizes[-2 * last_quarter : -last_quarter])
+
+
+@pytest.mark.parametrize("joint", [0, 2, 4, 6])
+def test_the_engine_flips_at_the_limit(joint):
+    """Half a percent on each side of the largest Kp of a joint, seven joints coupled."""
+    arm, Ts = leader(), 2e-3
+    high = hc.theory.joint_limits(arm, LEADER_LAW, Ts, Ts).Kp[joint, 1]
+    verdicts = []
+    for share in (0.995, 1.005):
+        Kp = list(LEADER_KP)
+        Kp[joint] = share * high
+        verdicts.append(grows(arm, replace(LEADER_LAW, Kp=tuple(Kp)), Ts, 3.0))
+    assert verdicts == [False, True]
+
+
+def test_published_gains_of_a_leader():
+    """Limits to the digits to which an independent program found them."""
+    found = hc.theory.joint_limits(leader(), LEADER_LAW, "2 ms", "2 ms")
+    for j, (high, buzz) in enumerate(
+        [
+            (1334, 12.0),
+            (1057, 12.1),
+            (776, 11.8),
+            (869, 12.1),
+            (313, 26.1),
+            (314, 24.2),
+            (34.4, 12.1),
+        ]
+    ):
+        digits = 0.5 if high > 100 else 0.05  # of the last printed digit
+        assert found.Kp[j, 1] == pytest.approx(high, abs=1.1 * digits)
+        assert found.Kp_buzz[j] == pytest.approx(buzz, abs=0.055)
+    assert found.scale == pytest.approx(1.361, abs=5.5e-4)
+    assert found.delay_left == pytest.approx(1.35e-3, abs=5.5e-6)
+    assert found.Kd_scale == pytest.approx((0.530, 9.40), rel=6e-4)
+    assert found.Kd[6] == pytest.approx((0.096, 2.00), rel=3e-3)
+    assert found.joint == "joint7" and found.stable
+
+
+@pytest.mark.parametrize("kind", ["armature", "damping"])
+def test_sensitivities_are_slopes_of_limits(kind):
+    """Central differences of whole limits, whose error is of second order in the step."""
+    arm, column = leader(), ("armature", "damping").index(kind)
+    found = hc.theory.joint_limits(arm, LEADER_LAW, 2e-3, 2e-3)
+    for j in (1, 6):
+        base = np.array(getattr(arm, kind))
+        h = 1e-3 * max(base[j], 0.01)
+        sides = [
+            hc.theory.joint_limits(
+                replace(arm, **{kind: tuple(base + s * h * np.eye(7)[j])}), LEADER_LAW, 2e-3, 2e-3
+            )
+            for s in (1, -1)
+        ]
+        slope = (sides[0].Kp[j, 1] - sides[1].Kp[j, 1]) / (2 * h)
+        assert found.Kp_change[j, column] == pytest.approx(slope, rel=2e-3)
+        slope = (sides[0].scale - sides[1].scale) / (2 * h)
+        assert found.scale_change[j, column] == pytest.approx(slope, rel=2e-3, abs=1e-4)
+
+
+def test_delay_and_rate_left_are_where_stability_ends():
+    study = Study(leader(), LEADER_LAW, 2e-3, 2e-3)
+    found = hc.theory.joint_limits(leader(), LEADER_LAW, 2e-3, 2e-3)
+    left = delay_left(study.loop)
+    assert left == found.delay_left
+    for share, stable in ((1 - 1e-6, True), (1 + 1e-6, False)):
+        assert study.remade(delay=2e-3 + share * left).stable() is stable
+        assert study.remade(Ts=share / found.slowest_rate).stable() is stable
+
+
+def test_a_long_delay_is_found_on_the_circle():
+    """A slow, well damped joint: some hundred samples, as the other map has it."""
+    one = np.ones((1, 1))
+    linear = Linear(one, 8.0 * one, 0 * one, 0 * one, 0 * one, np.zeros((3, 1)))
+    loop = joint_loop(linear, hc.JointPD([9.0], [0.0]), 5e-3, 0.0, False)
+    left = delay_left(loop)
+    # continuous: P e^{-s T}/(s (s + 8)) with a phase of -pi at |.| = 1; the hold adds Ts/2
+    w = math.sqrt((-64.0 + math.sqrt(64.0**2 + 4.0 * 81.0)) / 2.0)
+    assert left + 2.5e-3 == pytest.approx((math.pi / 2 - math.atan(w / 8.0)) / w, rel=1e-5)
+    arm = one, 8.0 * one, 0 * one
+    gains = 9.0 * one, 0 * one
+    assert joints.radius(arm, gains, 5e-3, left * (1 - 1e-4)) < 1.0
+    assert joints.radius(arm, gains, 5e-3, left * (1 + 1e-4)) > 1.0
+
+
+def test_a_drive_hardly_limits_its_gains():
+    law = replace(LEADER_LAW, runs="drive")
+    found = hc.theory.joint_limits(leader(), law, 2e-3, 2e-3)
+    host = hc.theory.joint_limits(leader(), LEADER_LAW, 2e-3, 2e-3)
+    assert found.stable and (found.Kp[:, 1] > 5.0 * host.Kp[:, 1]).all()
+
+
+def test_friction_fed_forward_has_a_largest_slope():
+    """A slope above the limit makes the loop unstable, one below does not."""
+    plain = hc.theory.joint_limits(leader(), LEADER_LAW, 1e-3, 1e-3)
+    for share, stable in ((0.999, True), (1.001, False)):
+        rows = [(0.0, 1.0, 0.0)] * 6 + [(share * plain.friction_slope[6], 1.0, 0.0)]
+        law = replace(LEADER_LAW, friction=tuple(rows))
+        assert hc.theory.joint_limits(leader(), law, 1e-3, 1e-3).stable is stable
+
+
+@pytest.mark.parametrize("axis", "xyz")
+def test_a_wall_at_the_handle_is_stable_below_its_limit(axis):
+    """The other map, with the hand and the wall written out along the Jacobian."""
+    arm, hand, B, Ts = leader(), hc.Operator(0.25, 2.0, 6.0), 5.0, 1e-3
+    found = hc.theory.wall_limit(arm, axis, B, hand, Ts, Ts, "difference")
+    J, n = arm.jacobian(), 7
+    along, square = J["xyz".index(axis)], J.T @ J
+    weight = np.zeros((n, n))
+    for j in range(n):
+        h = 1e-5 * np.eye(n)[j]
+        weight[:, j] = 9.81 * (arm.jacobian(arm.q + h)[2] - arm.jacobian(arm.q - h)[2]) / 2e-5
+    gravity = arm.gravity_stiffness() + hand.mass * 0.5 * (weight + weight.T)
+    M = arm.mass_matrix() + hand.mass * square
+    D = np.diag(arm.damping) + hand.damper * square
+    S = hand.spring * square + gravity
+    for share, stable in ((0.9999, True), (1.0001, False)):
+        P = share * found.K * np.outer(along, along) - gravity
+        z = np.linalg.eigvals(
+            joints.sample_map((M, D, S), (P, B * np.outer(along, along)), Ts, Ts, "difference")
+        )
+        size = np.abs(z[np.abs(z - 1.0) > 1e-6]).max()
+        assert bool(size < 1.0) is stable
+
+
+def test_over_poses():
+    arm = leader()
+    found = hc.theory.over_poses(arm, LEADER_LAW, 2e-3, 2e-3, poses=12, seed=3)
+    ranges = arm.ranges
+    assert ((ranges[:, 0] <= found.q) & (found.q <= ranges[:, 1])).all()
+    at = hc.theory.joint_limits(replace(arm, pose=found.worst_pose), LEADER_LAW, 2e-3, 2e-3)
+    assert at.scale == pytest.approx(found.scale.min(), rel=1e-9)
+    assert at.joint == found.names[found.first[found.worst]]
+    np.testing.assert_allclose(found.p[4], arm.handle(found.q[4]), atol=1e-12)
+    again = hc.theory.over_poses(arm, LEADER_LAW, 2e-3, 2e-3, poses=12, seed=3)
+    assert (again.scale == found.scale).all()
+
+
+GAINS = {
+    "openarm.yaml": (
+        "LeaderArmParam:\n  Kp: [1,2,3,4,5,6,7,8]\n  Kd: [1,1,1,1,1,1,1,1]\n"
+        "  Fc: [1,1,1,1,1,1,1,1]\n"
+        "  k: [2,2,2,2,2,2,2,2]\n  Fv: [0.5,0,0,0,0,0,0,0]\n  Fo: [0,0,0,0,0,0,0,0]\n"
+    ),
+    "plain.toml": "Kp = [1, 2]\nKd = [0.1, 0.2]\nvelocity = 'filter'\ncutoff = 90\n",
+    "lerobot.json": '{"follower": {"position_kp": [1, 2], "position_kd": [0.1, 0.2]}}',
+    "servo.json": '{"position_p_coefficient": [16], "position_d_coefficient": [32]}',
+}
+
+
+def test_gains_under_the_names_of_projects(tmp_path):
+    for name, text in GAINS.items():
+        (tmp_path / name).write_text(text)
+    open_arm = hc.JointPD.load(tmp_path / "openarm.yaml", velocity="filter", cutoff=90.0)
+    assert open_arm.Kp == (1, 2, 3, 4, 5, 6, 7)
+    assert open_arm.slopes == pytest.approx((0.7, 0.2, 0.2, 0.2, 0.2, 0.2, 0.2))  # Fc 0.1 k + Fv
+    assert hc.JointPD.load(tmp_path / "plain.toml").cutoff == 90.0
+    assert hc.JointPD.load(tmp_path / "lerobot.json").Kd == (0.1, 0.2)
+    assert hc.JointPD.load(tmp_path / "servo.json").Kp == (16.0,)
+
+
+@pytest.mark.parametrize(
+    "name, text, told",
+    [
+        ("g.txt", "", "must be a file"),
+        ("g.toml", "Kp = [1]", "holds none"),
+        ("g.json", '{"a": {"Kp": [1], "Kd": [1]}, "b": {"Kp": [1], "Kd": [1]}}', "holds a, b"),
+        ("g.yaml", "a: [1", "cannot be read"),
+        ("g.json", '{"Kp": [1, 2], "Kd": [1]}', "for each joint"),
+        ("g.json", '{"Kp": ["x"], "Kd": [1]}', "finite number"),
+        ("g.json", '{"Kp": [-1], "Kd": [1]}', ">= 0"),
+        ("g.toml", "Kp = [nan]\nKd = [1]", "finite number"),
+    ],
+)
+def test_gains_that_are_refused(tmp_path, name, text, told):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(hc.ParameterError, match=told) as error:
+        hc.JointPD.load(tmp_path / name)
+    assert "\n" not in str(error.value)
+
+
+def test_a_law_of_another_arm_is_refused():
+    with pytest.raises(hc.ParameterError, match="7 numbers, one for each joint .joint1"):
+        hc.theory.joint_limits(leader(), hc.JointPD([1.0], [1.0]), 1e-3)
+    with pytest.raises(hc.ParameterError, match="velocity 'filter'"):
+        hc.JointPD([1.0], [1.0], velocity="filter")
+    with pytest.raises(hc.ParameterError, match="left out without"):
+        hc.JointPD([1.0], [1.0], cutoff=3.0)
