@@ -46,9 +46,6 @@ def slab(resists: float | Flow, start: float | None = None, end: float | None = 
         start: lower border on x [m]; None for clay without borders.
         end: upper border on x [m], given with start.
 
-    Returns:
-        The clay.
-
     Raises:
         ParameterError: a value is out of bounds, or only one border is given.
     """
@@ -75,7 +72,7 @@ def slab(resists: float | Flow, start: float | None = None, end: float | None = 
 
 
 def extent(clay: Clay | None, i: int) -> list[tuple[float, float]]:
-    """Intervals of coordinate i that contain clay, judged by that coordinate alone."""
+    """Ascending intervals [m] of coordinate i that contain clay, judged by i alone."""
     out: list[tuple[float, float]] = []
     for law in clay.laws if clay else ():
         if AXES[i] in law.along:
@@ -319,14 +316,11 @@ class Clay:
         return [*others, *local_quantity("b = {}", b, "N.s/m")]
 
     def at(self, x: Any, y: Any) -> np.ndarray:
-        """Damping of both axes at given places, without growth.
+        """Damping of both axes at given places, without growth [N.s/m], shape (2, ...).
 
         Args:
             x: coordinates [m], any shape.
             y: coordinates [m], any shape that broadcasts with x.
-
-        Returns:
-            [N.s/m], shape (2, ...).
         """
         b = self.x.at(x, y)
         return np.stack([b, b if self.y is self.x else self.y.at(x, y)])

@@ -128,13 +128,11 @@ class Compensator:
         return None
 
     def state_space(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        """A realisation of C/K: z' = A z + B f, delta = C z + D f.
+        """A realisation A, B, C, D of C/K: z' = A z + B f, delta = C z + D f.
 
-        Controllable form. Time is scaled so that the fastest pole is 1 rad/s, which preserves the
-        digits of fast and slow poles. For the printed compensator, see `lag`, time is in seconds.
-
-        Returns:
-            A, shape (order, order), B and C, shape (order,), and D.
+        Controllable form, with vectors B and C. Time is scaled so that the fastest pole is 1 rad/s,
+        which preserves the digits of fast and slow poles; for the printed compensator, see `lag`,
+        it is in seconds.
         """
         n = self.order
         den = np.array(self.den)

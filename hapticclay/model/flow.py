@@ -66,13 +66,10 @@ class Flow:
         return [*_flow_quantities([self.Fy], [self.K], [self.n]), *b]
 
     def force(self, v: Any) -> np.ndarray:
-        """Resisting force on a moving tool; 0 at rest, where any force up to Fy may act.
+        """Resisting force [N], of the sign of v; 0 at rest, where any up to Fy may act.
 
         Args:
             v: velocity [m/s], of either sign, any shape.
-
-        Returns:
-            [N], of the sign of v.
         """
         v = np.asarray(v, dtype=float)
         return np.sign(v) * (self.Fy + self.K * np.abs(v) ** self.n) + self.b * v

@@ -71,7 +71,7 @@ CORRELATED = 2.0  # samples per independent sample, above which a warning is giv
 @named
 @dataclass(frozen=True)
 class FittedLaw:
-    """One candidate.
+    """A law fitted to a motion, beside other candidates.
 
     Attributes:
         law: its name, in FLOW_LAWS.
@@ -215,7 +215,6 @@ class Fitted(Result):
         return [line, *(f"warning: {x}" for x in self.warnings)]
 
     def figures(self) -> dict[str, Any]:
-        """The law and its samples."""
         tables = self.tables()
         shown = {name: tables[name] for name in ("samples", "parameters")}  # fit.csv: samples
         return {"fit": figure_of(self, tables=shown)}

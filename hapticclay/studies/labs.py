@@ -94,7 +94,6 @@ class Lab(Result):
         return ["", self.found, "", *(f"{i}. {q}" for i, q in enumerate(self.questions, 1))]
 
     def figures(self) -> dict[str, Any]:
-        """The charts."""
         return {chart.name: figure_of(chart) for chart in self.charts}
 
     def contents(self) -> dict[str, Any]:

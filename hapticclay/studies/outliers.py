@@ -41,7 +41,7 @@ def robust_deviation(x: np.ndarray) -> float:
 
 
 def cleaned(x: np.ndarray, count: float = 0.0) -> Cleaned:
-    """A column that is smooth but for noise, without its outliers."""
+    """An evenly sampled column, smooth but for noise; `count`: its quantum, 0 for none."""
     given, bad = np.asarray(x, dtype=float), np.zeros(len(x), dtype=bool)
     now, at = given, _jumps(given, count)
     for _ in range(5):  # small outliers stand beside large ones
@@ -75,7 +75,7 @@ def runs_of(mask: np.ndarray) -> list[tuple[int, int]]:
 
 
 def sentence(column: str, t: Sequence[float] | np.ndarray, samples: int, why: str) -> str:
-    """A warning about samples that are left out."""
+    """A warning about samples that are left out, at times t [s]."""
     are = "are" if len(t) > 1 else "is"
     return f"{len(t)} of {samples} {column}s {are} left out, at t = {times(t)} s: {why}"
 

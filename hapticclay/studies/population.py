@@ -102,13 +102,12 @@ class Hands:
         return np.array([[1.0, md, ms], [md, 1.0, ds], [ms, ds, 1.0]])
 
     def spread_over(self, u: np.ndarray) -> np.ndarray:
-        """Maps uniform samples to hands with the population's correlation (a Gaussian copula).
+        """Masses [kg], dampers [N.s/m] and springs [N/m] for samples, shape (n, 3).
+
+        A Gaussian copula gives them the correlation of the population.
 
         Args:
             u: samples of the unit cube, 0 < u < 1, shape (n, 3).
-
-        Returns:
-            Mass [kg], damper [N.s/m] and spring [N/m], shape (n, 3).
         """
         z = normal_score(u)
         if any(self.correlation):

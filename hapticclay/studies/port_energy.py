@@ -182,7 +182,8 @@ def _wall_force(wall: VirtualWall, place: np.ndarray, t: np.ndarray, h: float) -
 def taken_energy(wall: VirtualWall, path: Path, periods: int = 3, steps: int = PATH_STEPS) -> float:
     """Energy that the device absorbs from the hand over a period of a path, by a run [J].
 
-    It is the integral of fh v over the run, minus the negligible energy stored in the mass.
+    It is the integral of fh v over the run, minus the negligible energy stored in the mass. A
+    negative one proves that the wall is active.
 
     Args:
         wall: the wall with its K, without a hand of its own; not "exact" in velocity with B or M.
@@ -190,9 +191,6 @@ def taken_energy(wall: VirtualWall, path: Path, periods: int = 3, steps: int = P
         periods: number of periods in the mean.
         steps: engine steps per sample, with steps of at least 1e-6 s; along a zigzag damping and
             friction are too low by one part in this number.
-
-    Returns:
-        The energy; a negative one proves that the wall is active.
     """
     scenario, first = _imposed(wall, path, periods, steps)
     found = simulate(scenario)
@@ -213,16 +211,14 @@ def passivity_limit(wall: VirtualWall, steps: int = PATH_STEPS) -> float:
 
     The paths are polygons at several frequencies up to pi/Ts and at the worst frequency by theory.
     With friction or an encoder a large and a small zigzag are added, which isolate the damper and
-    one encoder edge. For each path the sign of the energy determines K. Other paths may draw energy
-    at a lower K, so the result is an upper bound of the true limit.
+    one encoder edge. For each path the sign of the energy determines K; 0 stands for a wall that is
+    active at any K, inf for one that no path shows active up to 1e9 N/m. Other paths may draw
+    energy at a lower K, so the result is an upper bound of the true limit.
 
     Args:
         wall: all but K, without a hand of its own; not "exact" in velocity with B or M, nor with a
             surface.
         steps: engine steps per sample, see `taken_energy`.
-
-    Returns:
-        K; 0 if the wall is active at any K, inf if no path shows it active up to 1e9 N/m.
 
     Raises:
         ParameterError: the wall has a hand, a surface, or B or M on an exact velocity, where the

@@ -144,7 +144,7 @@ class Removal:
 def removed(
     record: Record, width: float = TOOL.width, depth: float = TOOL.depth, cell: float | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Volume of clay that a tool at the handle has removed in a run, to 0.5 % of it.
+    """Volume [m^3] of clay removed by a tool at the handle, to 0.5 %, and its rate [m^3/s], (n,).
 
     In clay that stays cut (`Clay.groove`) it is the volume removed in the run by its own tool.
 
@@ -153,12 +153,6 @@ def removed(
         width: diameter of the tool [m]; not used in clay that stays cut.
         depth: depth of the cut [m]; not used in clay that stays cut.
         cell: largest cell of the map [m]; None for 1/32 of the width, which the accuracy requires.
-
-    Returns:
-        (volume [m^3], rate [m^3/s]), at the samples of the record, shape (n,) each.
-
-    Raises:
-        ParameterError: a value is out of its bounds.
     """
     p = record.p
     tool = Tool(width, depth)

@@ -20,7 +20,7 @@ from .trajectory import (
     correlation_time,
 )
 
-LEAST_SLIDING = 50  # samples that slide ...
+LEAST_SLIDING = 50  # samples that slide
 FAST = 10.0  # [m/s]: no hand is as fast
 LEAST_SIGNAL = 5.0  # standard deviations above which a velocity counts as motion ...
 DEVIATIONS = 60  # samples for the estimate of the usual deviation
@@ -116,7 +116,7 @@ def check_one_law(met: SampledClay, inside: np.ndarray) -> None:
 def sliding_at_known_speed(
     t: np.ndarray, v: np.ndarray, f: np.ndarray, inside: np.ndarray
 ) -> Sliding:
-    """Moving samples of known velocity whose velocity changes little in a step."""
+    """Moving samples whose known velocity changes little in a step."""
     change = np.abs(np.diff(v, prepend=v[:1]))
     change = np.maximum(change, np.append(change[1:], 0.0))
     speed = np.abs(v)
@@ -139,7 +139,7 @@ def _too_few(count: int) -> ParameterError:
 def sliding_along_positions(
     t: np.ndarray, p: Cleaned, f: np.ndarray, inside: np.ndarray, out: np.ndarray
 ) -> Sliding:
-    """Sliding stretches and the splines along them."""
+    """Samples of sliding stretches, without outliers `out` of the force, and their splines."""
     inside, good, p = _unbroken(inside, p), ~p.bad, p.x - p.x.mean()
     usable, count = good & ~out, quantum(p[good])
     runs = [(a, b) for a, b in runs_of(inside) if b - a >= LEAST_STRETCH]
@@ -246,7 +246,7 @@ def _slowest(motion: Motion, runs: list[tuple[int, int]], margin: int, sigma: fl
 def _between_rests(
     direction: np.ndarray, start: int, stop: int, margin: int
 ) -> list[tuple[int, int]]:
-    """Parts of a run without rests, which last longer than a knot's width, and its like around."""
+    """Parts of a run between rests; a rest longer than a knot's width loses that margin too."""
     rests = [(a + start, b + start) for a, b in runs_of(direction[start:stop] == 0.0)]
     out, begin = [], start
     for a, b in rests:
@@ -268,7 +268,7 @@ def quantum(x: np.ndarray) -> float:
 
 
 def driving_forces(f: np.ndarray, p: Cleaned | None, v: np.ndarray | None) -> np.ndarray:
-    """Mask of the forces that drive the motion, (n,)."""
+    """Mask of the forces that drive the motion, (n,), by known velocities or by positions."""
     if v is None:
         assert p is not None
         v = np.gradient(p.x)

@@ -72,7 +72,7 @@ class Motion:
         self._gram = self._products(self._place, self._first)
 
     def place(self, c: np.ndarray) -> np.ndarray:
-        """Positions at the samples [m]."""
+        """Positions at the samples [m], from coefficients."""
         return np.einsum("ij,ij->i", self._place, c[_nearby(self._first)])
 
     def velocity(self, c: np.ndarray) -> np.ndarray:
@@ -84,7 +84,7 @@ class Motion:
         return _solved(self._gram, self._gathered(self._place, self._first, p))
 
     def deviation(self, some: np.ndarray) -> np.ndarray:
-        """Standard deviation of velocities per standard deviation of the positions [1/s]."""
+        """Deviation of some velocities, by index, over that of the positions [1/s]."""
         rows = np.zeros((self.size, len(some)))
         for k, i in enumerate(some.tolist()):
             rows[_nearby(self._near[i : i + 1])[0], k] = self._velocity[i]
@@ -93,7 +93,11 @@ class Motion:
     def eliminated(
         self, ratio: float, slope: np.ndarray, columns: np.ndarray, rest: np.ndarray, p: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The coefficients' part of a Gauss-Newton step, normal equations A c + G theta = g."""
+        """A^-1 g, A^-1 G and G of a Gauss-Newton step, with normal equations A c + G theta = g.
+
+        `slope` and `columns` are changes of the forces by velocity and by theta, `rest` and `p`
+        residuals of force and position, `ratio` the weight of a squared position.
+        """
         A = ratio * self._gram + self._products(self._velocity, self._near, slope * slope)
         g = ratio * self._gathered(self._place, self._first, p)
         g += self._gathered(self._velocity, self._near, slope * rest)
@@ -162,7 +166,7 @@ class Series(NamedTuple):
 
 
 def chosen_spacing(series: Sequence[Series]) -> tuple[float, list[float]]:
-    """Best spacing of the knots of splines for some series, by Akaike's criterion."""
+    """Spacing of knots [s] by Akaike's criterion, and the residual variance of each series."""
     times = [x.t for x in series[0].stretches]
     finest = LEAST_PER_KNOT * float(np.median(np.diff(times[0])))
     longest = max(2.0 * finest, *(float(t[-1] - t[0]) for t in times))
@@ -190,11 +194,11 @@ class ForceLaw(NamedTuple):
     names: tuple[str, ...]  # some of Fy, K, n, b
 
     def force(self, theta: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Forces at some speeds [N]."""
+        """Forces [N] at speeds [m/s], above 0."""
         return self.slopes(theta, v)[0]
 
     def slopes(self, theta: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Forces, and how they change with speed and parameters."""
+        """Forces [N], (n,), and their derivatives by speed, (n,), and by theta, (n, k)."""
         a = dict(zip(self.names, theta.tolist(), strict=True))
         force = np.full(len(v), a.get("Fy", 0.0))
         slope = np.full(len(v), a.get("b", 0.0))
@@ -236,7 +240,7 @@ class JointFit(NamedTuple):
         held: Sequence[bool] = (),
         near: np.ndarray | None = None,
     ) -> Minimum:
-        """Least sum of squares over parameters and motion, by the Gauss-Newton method."""
+        """Least sum of squares by the Gauss-Newton method, from theta and coefficients `near`."""
         k = len(law.names)
         free = ~np.array(held, dtype=bool) if len(held) else np.ones(k, dtype=bool)
         low, high = np.array([FIT_RANGES[x] for x in law.names]).T
@@ -308,8 +312,8 @@ class JointFit(NamedTuple):
 def correlation_time(x: np.ndarray) -> float:
     """Samples per independent sample: 1 + 2 sum of the autocorrelations; 1 for white noise.
 
-    The sum runs over a window that grows until it holds WINDOW correlation times (A. Sokal 1997). A
-    value that differs from 1 by less than twice its standard deviation is set to 1.
+    The window grows until it holds WINDOW correlation times (A. Sokal 1997). A value within twice
+    its standard deviation of 1 is set to 1.
     """
     from scipy.fft import irfft, next_fast_len, rfft
 
