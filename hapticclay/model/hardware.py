@@ -156,7 +156,7 @@ class SampleNoise:
 _UNSAMPLED = dict.fromkeys(
     ("fast", "accurate"), Refusal("hardware", "must be None unless control is 'sampled'")
 )
-_HELD = {"physical": Refusal("render", "must be 'held' for a passivity controller or a coupling")}
+_HELD = Refusal("render", "must be 'held' for a passivity controller or a coupling")
 
 
 def _difference_words(x: Hardware) -> list[Quantity]:
@@ -171,35 +171,20 @@ def _converter_words(x: Hardware) -> list[Quantity]:
     return [Quantity(f"{name} {{}}", (float(n),), "bits") for name, n in bits.items() if n]
 
 
-PARTS = (  # name, whether hardware has it, how linear theory treats it, what refuses it, words
-    ("jitter", lambda x: x.jitter > 0.0, LEFT_OUT, {},
-     lambda x: scene_quantity("jitter {}", (x.jitter,), "s rms")),
-    ("dropouts", lambda x: x.dropout_probability > 0.0, LEFT_OUT, {},
-     lambda x: scene_quantity("dropout probability {}", (x.dropout_probability,))),
-    ("encoder", lambda x: x.encoder is not None, LEFT_OUT, {},
-     lambda x: scene_quantity("encoder {}", (x.encoder,), "counts per turn")),
-    ("velocity by difference", lambda x: x.velocity == "difference", LEFT_OUT, {},
-     _difference_words),
-    ("converters", lambda x: bool(x.adc_bits or x.dac_bits), LEFT_OUT, {}, _converter_words),
-    ("force noise", lambda x: x.force_noise > 0.0, LEFT_OUT, {},
-     lambda x: scene_quantity("force noise {}", (x.force_noise,), "N rms")),
-    ("force filter", lambda x: x.force_filter is not None, LEFT_OUT, {},
-     lambda x: scene_quantity("force filter {}", (x.force_filter,), "Hz")),
-    ("delay", lambda x: x.delay > 0.0, YES, {},
-     lambda x: scene_quantity("delay {}", (x.delay,), "s")),
-    ("joint friction", lambda x: any(x.friction), LEFT_OUT, {},
-     lambda x: [Quantity(f"joint friction ({x.friction[0]:.4g}, {x.friction[1]:.4g})", (), "N.m")]),
-    ("passivity controller", lambda x: x.passivity, LEFT_OUT, _HELD,
-     lambda x: [Quantity("passivity controller")]),
-    ("virtual coupling", lambda x: x.coupling is not None, LEFT_OUT, _HELD,
-     lambda x: [
-         Quantity("virtual coupling {}", (x.coupling.spring,), "N/m"),
-         Quantity("{}", (x.coupling.damper,), "N.s/m"),
-     ]),
-)  # fmt: skip
+def _friction_words(x: Hardware) -> list[Quantity]:
+    shoulder, elbow = x.friction
+    return [Quantity(f"joint friction ({shoulder:.4g}, {elbow:.4g})", (), "N.m")]
 
 
-def _trait(name: str, has: Any, theory: str, refuses: dict[str, Refusal], words: Any) -> Trait:
+def _coupling_words(x: Any) -> list[Quantity]:
+    spring, damper = x.coupling.spring, x.coupling.damper
+    return [
+        Quantity("virtual coupling {}", (spring,), "N/m"),
+        Quantity("{}", (damper,), "N.s/m"),
+    ]
+
+
+def _trait(name: str, has: Any, words: Any, theory: str = LEFT_OUT, **refuses: Refusal) -> Trait:
     """The trait of scenes whose hardware has a part."""
     return Trait(
         name,
@@ -211,6 +196,17 @@ def _trait(name: str, has: Any, theory: str, refuses: dict[str, Refusal], words:
     )
 
 
+def _field_trait(name: str, field: str, unit: str = "", theory: str = LEFT_OUT) -> Trait:
+    """The trait of a part that is one number, 0 or None without it."""
+    form = f"{field.replace('_', ' ')} {{}}"
+    return _trait(
+        name,
+        lambda x: bool(getattr(x, field)),
+        lambda x: scene_quantity(form, (getattr(x, field),), unit),
+        theory,
+    )
+
+
 def hardware_words(scenario: Any) -> str:
     """The parts of the hardware of a scenario, with units; "ideal" if there are none."""
     found = [x.text() for part in present(scenario, TRAITS[1:]) for x in part.words(scenario)]
@@ -219,5 +215,20 @@ def hardware_words(scenario: Any) -> str:
 
 TRAITS = (
     Trait("hardware", "part", lambda s: s.hardware is not None, YES, _UNSAMPLED),
-    *(_trait(*part) for part in PARTS),
+    _field_trait("jitter", "jitter", "s rms"),
+    _field_trait("dropouts", "dropout_probability"),
+    _field_trait("encoder", "encoder", "counts per turn"),
+    _trait("velocity by difference", lambda x: x.velocity == "difference", _difference_words),
+    _trait("converters", lambda x: bool(x.adc_bits or x.dac_bits), _converter_words),
+    _field_trait("force noise", "force_noise", "N rms"),
+    _field_trait("force filter", "force_filter", "Hz"),
+    _field_trait("delay", "delay", "s", YES),
+    _trait("joint friction", lambda x: any(x.friction), _friction_words),
+    _trait(
+        "passivity controller",
+        lambda x: x.passivity,
+        lambda x: [Quantity("passivity controller")],
+        physical=_HELD,
+    ),
+    _trait("virtual coupling", lambda x: x.coupling is not None, _coupling_words, physical=_HELD),
 )

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, part
-from ..errors import Bound, ParameterError, integer
+from ..errors import Bound, ParameterError
 from ..formulas import hardware
 from ..model.samples import Samples
 from ..model.spring import STIFFNESS_MAX
@@ -65,6 +65,8 @@ class Path:
 
 Amplitude = Annotated[float, Bound(0.0, 0.1, "m", above=True)]
 Turn = Annotated[tuple[float, float], Bound(1.0, 1e6, names=("p", "q"))]
+Periods = Annotated[int, Bound(1, 10_000)]
+Steps = Annotated[int, Bound(2, 10_000)]
 
 
 @checked
@@ -106,28 +108,23 @@ def polygon(wall: VirtualWall, turn: Turn, amplitude: Amplitude = 1e-4) -> Path:
     )
 
 
-def imposed(wall: VirtualWall, path: Path, periods: int = 3, steps: int = PATH_STEPS) -> Scenario:
-    """The run in which a hand supplies, kick by kick, the force that a path requires.
+def imposed(wall: VirtualWall, path: Path, periods: int, steps: int) -> tuple[Scenario, int]:
+    """The run in which a hand supplies the force that a path requires, and the first step to count.
 
     The wall's force is its law applied to the path as measured by encoder and difference.
     """
-    return _imposed(wall, path, periods, steps)[0]
-
-
-def _imposed(wall: VirtualWall, path: Path, periods: int, steps: int) -> tuple[Scenario, int]:
-    """The run, and the step from which energy is counted."""
     d, Ts = wall.device, wall.Ts
     if wall.operator is not None:
         raise ParameterError("wall.operator", wall.operator, "must be None: the path is the hand")
     if wall.unilateral:
         raise ParameterError("wall.unilateral", True, "must be False: the wall acts along the path")
-    steps = min(integer("steps", steps, 2, 10_000), max(2, int(Ts / LEAST_STEP)))
+    steps = min(steps, max(2, int(Ts / LEAST_STEP)))
     n, h = len(path.places), Ts / steps
     memory = wall.velocity_window + math.ceil(wall.delay / Ts) + 2.0
     if wall.velocity_filter is not None:
         memory += FILTER_TIMES / (2.0 * math.pi * wall.velocity_filter * Ts)
     first = math.ceil(memory / n)
-    samples, corner = n * (first + integer("periods", periods, 1, 10_000)) + 1, 0
+    samples, corner = n * (first + periods) + 1, 0
     at, place = np.arange(samples + 1) * Ts, np.resize(path.places, samples + 1)
     if path.middles:
         corner = h * min(max(round(math.fmod(wall.delay, Ts) / h), 1), steps - 1)
@@ -179,7 +176,9 @@ def _wall_force(wall: VirtualWall, place: np.ndarray, t: np.ndarray, h: float) -
 
 
 @checked
-def taken_energy(wall: VirtualWall, path: Path, periods: int = 3, steps: int = PATH_STEPS) -> float:
+def taken_energy(
+    wall: VirtualWall, path: Path, periods: Periods = 3, steps: Steps = PATH_STEPS
+) -> float:
     """Energy that the device absorbs from the hand over a period of a path, by a run [J].
 
     It is the integral of fh v over the run, minus the negligible energy stored in the mass. A
@@ -192,7 +191,7 @@ def taken_energy(wall: VirtualWall, path: Path, periods: int = 3, steps: int = P
         steps: engine steps per sample, with steps of at least 1e-6 s; along a zigzag damping and
             friction are too low by one part in this number.
     """
-    scenario, first = _imposed(wall, path, periods, steps)
+    scenario, first = imposed(wall, path, periods, steps)
     found = simulate(scenario)
     d, v = wall.device, found.v[first:, 0]
     if found.outcome.code != "time limit":
@@ -206,7 +205,7 @@ def taken_energy(wall: VirtualWall, path: Path, periods: int = 3, steps: int = P
 
 
 @checked
-def passivity_limit(wall: VirtualWall, steps: int = PATH_STEPS) -> float:
+def passivity_limit(wall: VirtualWall, steps: Steps = PATH_STEPS) -> float:
     """Largest K at which no path of a hand takes energy from the wall, by runs [N/m].
 
     The paths are polygons at several frequencies up to pi/Ts and at the worst frequency by theory.

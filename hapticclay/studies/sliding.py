@@ -44,16 +44,16 @@ class Sliding(NamedTuple):
     t: np.ndarray  # [s]
     sign: np.ndarray  # of the velocity
     f: np.ndarray  # against the motion [N]
-    p: np.ndarray  # of these samples and of those between them [m], or empty
     v: np.ndarray  # speeds [m/s], or the coefficients of the motion
     slowest: float  # least speed of a sliding sample [m/s]
-    motion: Motion | None  # splines through the positions
-    spacing: float  # of their knots [s]
-    force_variance: float  # about a free curve [N^2]; nan without one
-    position_variance: float  # [m^2]
-    position_correlation: float  # samples per independent one
-    position_tails: float  # deviation over that of normal noise with the same median
     at: np.ndarray  # indices in the data
+    p: np.ndarray = np.zeros(0)  # positions of these samples and of those between them [m]
+    motion: Motion | None = None  # splines through the positions
+    spacing: float = 0.0  # of their knots [s]
+    force_variance: float = math.nan  # about a free curve [N^2]
+    position_variance: float = 0.0  # [m^2]
+    position_correlation: float = 1.0  # samples per independent one
+    position_tails: float = 1.0  # deviation over that of normal noise with the same median
 
     @property
     def speeds(self) -> np.ndarray:
@@ -123,12 +123,8 @@ def sliding_at_known_speed(
     at = inside & (change <= STEADY_STEP * speed) & (speed > 1e-4 * np.max(speed[inside]))
     if np.count_nonzero(at) < LEAST_SLIDING:
         raise _too_few(int(np.count_nonzero(at)))
-    sign = np.sign(v[at])
-    speed, none = speed[at], np.zeros(0)
-    slowest = float(speed.min())
-    index = np.flatnonzero(at)
-    known = none, speed, slowest, None, 0.0, math.nan, 0.0, 1.0, 1.0
-    return Sliding(t[at], sign, sign * f[at], *known, index)
+    sign, speed = np.sign(v[at]), speed[at]
+    return Sliding(t[at], sign, sign * f[at], speed, float(speed.min()), np.flatnonzero(at))
 
 
 def _too_few(count: int) -> ParameterError:
@@ -176,29 +172,28 @@ def sliding_along_positions(
     usable_at = np.concatenate([np.arange(*x) for x in one_way])
     forces = [Stretch(t[a:b], (), usable[a:b]) for a, b in one_way]
     series = [Series(stretches, place), Series(forces, direction[usable_at] * f[usable_at])]
-    spacing, (of_p, of_f) = chosen_spacing(series)
+    spacing, (position_variance, force_variance) = chosen_spacing(series)
     sliding = sliding[usable[sliding]]
     sign = direction[sliding]
     motion = Motion(stretches, spacing, np.searchsorted(at, sliding), sign)
     c = motion.follow(place)
     left = (place - motion.place(c))[good[at]]
-    correlation = correlation_time(left)
-    of_p = max(of_p, (1e-12 * float(np.ptp(p))) ** 2)  # rounding
+    position_variance = max(position_variance, (1e-12 * float(np.ptp(p))) ** 2)  # rounding
     usual = max(robust_deviation(left), ROUNDED * count, 1e-12 * float(np.ptp(p)))
     return Sliding(
         t[sliding],
         sign,
         sign * f[sliding],
-        place,
         c,
         float(slow.min()),
+        sliding,
+        place,
         motion,
         spacing,
-        of_f,
-        of_p,
-        correlation,
-        math.sqrt(of_p) / usual,
-        sliding,
+        force_variance,
+        position_variance,
+        correlation_time(left),
+        math.sqrt(position_variance) / usual,
     )
 
 
