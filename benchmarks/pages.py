@@ -100,7 +100,7 @@ def conclusions_page(data: dict[str, dict[str, Any]]) -> str:
         ]
     if {"work_precision", "hits"} <= set(data):
         text += ["## Which step to take", *steps_to_take(data)]
-    limitations = list(LIMITATIONS)
+    limitations: list[str] = list(LIMITATIONS)
     if any(study.is_of_both(found) for found in data.values()):
         limitations.insert(2, PARTLY_IN_PYTHON)
     text += ["## Limitations", "\n".join(f"- {x}" for x in limitations)]

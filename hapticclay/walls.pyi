@@ -19,8 +19,8 @@ from .studies.port_energy import passivity_limit as passivity_limit
 from .studies.port_energy import polygon as polygon
 from .studies.port_energy import taken_energy as taken_energy
 from .studies.port_energy import zigzag as zigzag
-from .studies.wall_lines import Limit as Limit
-from .studies.wall_runs import Press as Press
+from .studies.published_walls import Limit as Limit
+from .studies.wall import Press as Press
 from .studies.wall_runs import settles as settles
 from .studies.zwidth import ZRegion as ZRegion
 from .studies.zwidth import ZWidth as ZWidth

@@ -78,9 +78,10 @@ class Mechanism:
         self._mujoco.mj_fullM(model, self._data, inertia)
         damping = follow.T @ (model.dof_damping[:, None] * follow)
         jacobian = self._jacobian() @ follow
-        stiffness = self._stiffness(q)
+        springs, gravity, weight = self._stiffness(q)
         self._place(place)
-        return Linear(follow.T @ inertia @ follow, damping, *stiffness, jacobian)
+        whole = follow.T @ inertia @ follow
+        return Linear(whole, damping, springs, gravity, weight, jacobian)
 
     def static_torque(self, q: np.ndarray) -> np.ndarray:
         """Torque that holds the arm against gravity [N.m], shape (n,)."""

@@ -90,7 +90,7 @@ class MjcfArm:
         """Least and largest position of each joint [rad or m], infinite for none, shape (n, 2)."""
         return self._loaded.ranges.copy()  # type: ignore[attr-defined]
 
-    def linear(self, q: Sequence[float] | None = None) -> Linear:
+    def linear(self, q: Sequence[float] | np.ndarray | None = None) -> Linear:
         """The arm linearised at a pose: all that its linear theory needs.
 
         Args:
@@ -101,7 +101,7 @@ class MjcfArm:
         """
         return self._loaded.mechanism.linear(self._place(q))  # type: ignore[attr-defined]
 
-    def mass_matrix(self, q: Sequence[float] | None = None) -> np.ndarray:
+    def mass_matrix(self, q: Sequence[float] | np.ndarray | None = None) -> np.ndarray:
         """Inertia M(q) of the joints, rotors included [kg.m^2], shape (n, n).
 
         Args:
@@ -112,7 +112,7 @@ class MjcfArm:
         """
         return self.linear(q).inertia
 
-    def gravity_stiffness(self, q: Sequence[float] | None = None) -> np.ndarray:
+    def gravity_stiffness(self, q: Sequence[float] | np.ndarray | None = None) -> np.ndarray:
         """Change of the gravity torques with the joint positions [N.m/rad], shape (n, n).
 
         Args:
@@ -123,7 +123,7 @@ class MjcfArm:
         """
         return self.linear(q).gravity_stiffness
 
-    def jacobian(self, q: Sequence[float] | None = None) -> np.ndarray:
+    def jacobian(self, q: Sequence[float] | np.ndarray | None = None) -> np.ndarray:
         """Velocity of the handle along x, y, z per joint rate [m], shape (3, n).
 
         Args:
@@ -135,7 +135,7 @@ class MjcfArm:
         self.check_handle()
         return self.linear(q).jacobian
 
-    def handle(self, q: Sequence[float] | None = None) -> np.ndarray:
+    def handle(self, q: Sequence[float] | np.ndarray | None = None) -> np.ndarray:
         """Position of the handle in the world [m], shape (3,).
 
         Args:
@@ -157,7 +157,7 @@ class MjcfArm:
             bound = "must name a site or body at the handle: the file has no site on a moving body"
             raise ParameterError("site", None, bound)
 
-    def _place(self, q: Sequence[float] | None) -> np.ndarray:
+    def _place(self, q: Sequence[float] | np.ndarray | None) -> np.ndarray:
         if q is None:
             return self.q
         place = array_of("q", q)

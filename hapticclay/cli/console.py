@@ -19,21 +19,16 @@ from .unused import Unused, undrawn
 
 if TYPE_CHECKING:
     from ..results import Result
-    from ..scene.scenario import Scenario
     from ..views.figure import Figure
 
 
 ENDS = ("SIGTERM", "SIGHUP")  # signals that end a command as Ctrl-C does
 
 
-def default_folder(command: str, scenario: Scenario) -> Path:
-    """The folder for what a command writes about a scenario.
-
-    Args:
-        command: its name.
-        scenario: the scenario, whose name is that of the folder.
-    """
-    return Path("out", command, re.sub(r"[^\w.+-]+", "-", scenario.name).strip(".-") or "scenario")
+def default_folder(command: str, subject: Any) -> Path:
+    """The folder for what a command writes about a scenario or an arm, which has its name."""
+    name = re.sub(r"[^\w.+-]+", "-", subject.name).strip(".-")
+    return Path("out", command, name or "scenario")
 
 
 def progress_bar(items: Any = None, **look: Any) -> Any:

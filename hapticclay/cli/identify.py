@@ -112,7 +112,7 @@ class IdentifyCommand:
     def _blocks(self, show: Callable[..., None]) -> tuple[Identified, ...]:
         from ..studies.identification import BLOCK_KINDS, Noise, identify
 
-        axes = AXES if self.axis == "both" else (self.axis,)
+        axes: Any = AXES if self.axis == "both" else (self.axis,)
         jobs = [(what, axis) for what in BLOCK_KINDS for axis in axes]
         return tuple(
             identify(

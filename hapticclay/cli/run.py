@@ -17,6 +17,7 @@ from .options import ScenarioWord
 from .unused import Unused
 
 if TYPE_CHECKING:
+    from ..fields import Axis
     from ..model.clay import Clay
     from ..scene.scenario import Scenario
     from ..simulation.record import Record
@@ -247,7 +248,7 @@ def _damping(r: dict[str, Any]) -> str:
     return f"{r['b']:.4g} - {r['b_end']:.4g}" if _grows(r) else f"{r['b']:g}"
 
 
-def _maneuver_line(record: Record, axis: str) -> str:
+def _maneuver_line(record: Record, axis: Axis) -> str:
     from ..simulation.record import out_of_band_ratio
 
     rms = float((record.fh[:, AXES.index(axis)] ** 2).mean() ** 0.5)

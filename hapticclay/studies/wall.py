@@ -6,11 +6,12 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from ..errors import ParameterError
+from ..arguments import part
+from ..errors import Bound, ParameterError
 from ..model.constants import AXES
 from ..model.operator import Operator
 from ..model.shapes import Constant
@@ -23,10 +24,7 @@ from ..theory.impedance import Impedance, loop_response, wall_response
 from ..theory.loops import Loop
 from . import boundary, growth
 from .boundary import PushedLoop
-from .wall_lines import Limit, published_limits
-
-if TYPE_CHECKING:
-    from .wall_runs import Press
+from .published_walls import Limit, published_limits
 
 Subject = PushedLoop | VirtualWall
 
@@ -45,6 +43,24 @@ SAMPLE_PUSH = 1e-7  # [m] per sample, for a device: above rounding, and far belo
 
 Varied = Mapping[str, tuple[str, str, float]]  # field, unit, factor of the unit in labels
 TS_VARIED, DELAY_VARIED = ("Ts", "ms", 1e3), ("delay", "ms", 1e3)
+
+
+@part("press.")
+class Press:
+    """The push that tests a wall with a nonlinear loop, and the criterion of rest.
+
+    Attributes:
+        force: force that presses into the wall from the start [N], 0 to 1e3: to at most 5 mm, and
+            to the middle between two forces that the encoder can resolve, where rest is least
+            likely.
+        speed: impact speed of the device [m/s], 0 to 1.
+        still: largest peak-to-peak motion that counts as rest [m], 1e-9 to 1e-2. A gripping hand
+            feels less than 1 um at 150 to 200 Hz (Brisben, Hsiao, Johnson 1999).
+    """
+
+    force: Annotated[float, Bound(0.0, 1e3, "N")] = 1.0
+    speed: Annotated[float, Bound(0.0, 1.0, "m/s")] = boundary.LARGE_PUSH
+    still: Annotated[float, Bound(1e-9, 1e-2, "m")] = 1e-6
 
 
 class GrowthRun(NamedTuple):

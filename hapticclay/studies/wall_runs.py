@@ -5,19 +5,18 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Generator, Sequence
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 
-from ..arguments import checked, part
-from ..errors import Bound
+from ..arguments import checked
 from ..model.spring import STIFFNESS_MAX
 from ..scene.virtual_wall import VirtualWall
 from ..simulation.batch import simulate_batch
 from ..simulation.period_map import PeriodMaps
 from ..simulation.record import Record
 from . import boundary, growth
-from .wall import REST_STEPS, Subject, Wall, as_wall
+from .wall import REST_STEPS, Press, Subject, Wall, as_wall
 
 REST_SPANS = (1.0, 4.0, 16.0, 64.0)  # longer while a swing decays, or the device creeps
 REST_MOST = 20_000  # samples of that first run, at most
@@ -33,24 +32,6 @@ Share = Callable[[float], None]
 
 def unshown(share: float) -> None:
     """Ignores the progress."""
-
-
-@part("press.")
-class Press:
-    """The push that tests a wall with a nonlinear loop, and the criterion of rest.
-
-    Attributes:
-        force: force that presses into the wall from the start [N], 0 to 1e3: to at most 5 mm, and
-            to the middle between two forces that the encoder can resolve, where rest is least
-            likely.
-        speed: impact speed of the device [m/s], 0 to 1.
-        still: largest peak-to-peak motion that counts as rest [m], 1e-9 to 1e-2. A gripping hand
-            feels less than 1 um at 150 to 200 Hz (Brisben, Hsiao, Johnson 1999).
-    """
-
-    force: Annotated[float, Bound(0.0, 1e3, "N")] = 1.0
-    speed: Annotated[float, Bound(0.0, 1.0, "m/s")] = boundary.LARGE_PUSH
-    still: Annotated[float, Bound(1e-9, 1e-2, "m")] = 1e-6
 
 
 PRESS = Press()
@@ -174,7 +155,7 @@ def settles(wall: VirtualWall, press: Press = PRESS) -> bool:
     return come_to_rest([wall], press)[0]
 
 
-def come_to_rest(subjects: Sequence[Wall | Subject], press: Press = Press()) -> list[bool]:
+def come_to_rest(subjects: Sequence[Wall | Subject], press: Press = PRESS) -> list[bool]:
     """Whether each wall comes to rest after a push, by one run each.
 
     A wall is at rest if its peak-to-peak motion in the last fifth of the run is at most

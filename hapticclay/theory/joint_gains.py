@@ -151,7 +151,7 @@ class JointLimits(Result):
 
     def tables(self) -> Tables:
         """Gains and limits of each joint; how the limits move; the whole arm."""
-        joints = {
+        joints: dict[str, Any] = {
             "joint": self.names,
             "Kp [N.m/rad]": self.stiffness,
             "least Kp [N.m/rad]": self.Kp[:, 0],
@@ -162,7 +162,7 @@ class JointLimits(Result):
             "largest Kd [N.m.s/rad]": self.Kd[:, 1],
             "friction slope [N.m.s/rad]": self.friction_slope,
         }
-        moves = {
+        moves: dict[str, Any] = {
             "joint": self.names,
             "largest Kp per rotor inertia [1/s^2]": self.Kp_change[:, 0],
             "largest Kp per damping [1/s]": self.Kp_change[:, 1],

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -184,7 +184,7 @@ def grid(loop: JointLoop) -> np.ndarray:
     """Angles of a search, > 0 and <= pi: even, by factors, and dense at resonances."""
     whole = loop._late[0]
     even = np.linspace(0.0, math.pi, 400 * (1 + whole // 8) + 1)[1:]
-    found = [even, np.geomspace(1e-6, 1.0, 400)]
+    found: list[Any] = [even, np.geomspace(1e-6, 1.0, 400)]
     if loop.n * (4 + whole) <= MOST_STATES // 3:
         z = np.linalg.eigvals(loop.map())
         z = z[(np.abs(z) > 0.5) & (z.imag >= 0.0)]

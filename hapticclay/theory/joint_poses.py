@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -79,7 +79,7 @@ class OverPoses(Result):
 
     def tables(self) -> Tables:
         """Every pose, and how often each joint buzzes first."""
-        poses = {f"{name} [rad]": self.q[:, j] for j, name in enumerate(self.names)}
+        poses: dict[str, Any] = {f"{name} [rad]": self.q[:, j] for j, name in enumerate(self.names)}
         poses |= {f"{axis} [m]": self.p[:, i] for i, axis in enumerate("xyz")}
         poses |= {
             "radius": self.radius,
@@ -115,7 +115,7 @@ def over_poses(
     """
     random, bounds = np.random.default_rng(seed), arm.ranges
     bounds = np.where(np.isfinite(bounds), bounds, [-math.pi, math.pi])
-    rows = []
+    rows, assumed = [], ()
     for _ in range(TRIES * poses):
         q = random.uniform(*bounds.T)
         try:
@@ -124,13 +124,14 @@ def over_poses(
             if error.field != "pose":
                 raise
             continue
+        assumed = study.assumed()
         rows.append((q, _handle(arm, q), *_at_pose(study)))
         if len(rows) == poses:
             break
     if not rows:
         raise ParameterError("poses", poses, "must be some at which the arm's chain can be closed")
-    q, p, radius, scale, buzz, first = map(np.array, zip(*rows, strict=True))
-    return OverPoses(arm.names, q, p, radius, scale, buzz, first, Ts, delay, study.assumed())
+    q, p, radius, scale, buzz, first = (np.array(column) for column in zip(*rows, strict=True))
+    return OverPoses(arm.names, q, p, radius, scale, buzz, first, Ts, delay, assumed)
 
 
 def _handle(arm: MjcfArm, q: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
@@ -86,7 +86,7 @@ class WallLimit(Result):
             "Ts [s]": self.Ts,
             "delay [s]": self.delay,
         }
-        line = {"B [N.s/m]": self.line_B, "largest K [N/m]": self.line_K}
+        line: dict[str, Any] = {"B [N.s/m]": self.line_B, "largest K [N/m]": self.line_K}
         return {"wall": {name: [x] for name, x in row.items()}, "line": line}
 
 

@@ -10,7 +10,7 @@ from ..scene.scenario import Scenario
 from ..theory.linear_loop import LinearLoop
 
 MOST_KINDS = 8  # kinds of clay that a title lists
-UNITS = {"N.s": "N·s", "N.m": "N·m", "^2": "²", "(m/s)^n": "(m/s)ⁿ"}
+UNITS = {"N.m.s": "N·m·s", "N.s": "N·s", "N.m": "N·m", "^2": "²", "(m/s)^n": "(m/s)ⁿ"}
 LETTERS = {"Fy =": "F$_y$ =", "K =": "K$_c$ =", "k1 =": "k$_1$ ="}  # K: consistency
 
 
