@@ -30,10 +30,8 @@ from .traits import (
     Refusal,
     Soft,
     check_traits,
-    local_quantity,
     multiplied,
     present,
-    scene_quantity,
 )
 
 
@@ -313,7 +311,7 @@ class Clay:
         """
         others = [x for kind in self.kinds for x in kind.here(self, place)]
         b = self.at(*place).tolist() if b is None else b
-        return [*others, *local_quantity("b = {}", b, "N.s/m")]
+        return [*others, *Quantity.of_axes("b = {}", b, "N.s/m")]
 
     def at(self, x: Any, y: Any) -> np.ndarray:
         """Damping of both axes at given places, without growth [N.s/m], shape (2, ...).
@@ -333,7 +331,7 @@ _ACROSS = Refusal(
 
 def _words(form: str, name: str, unit: str) -> Callable[[Clay], tuple[Quantity, ...]]:
     """A quantity of the cells of both axes."""
-    return lambda clay: scene_quantity(
+    return lambda clay: Quantity.of_scene(
         form, (v for law in clay.laws for v in getattr(law, name).ravel().tolist()), unit
     )
 
@@ -371,7 +369,7 @@ TRAITS = (
     Law(
         "rotated axes", "clay", lambda c: c.angle != 0.0,
         refuses={"passivity controller": _ACROSS, "virtual coupling": _ACROSS},
-        words=lambda c: scene_quantity("axes rotated by {}", (math.degrees(c.angle),), "degrees"),
+        words=lambda c: [Quantity("axes rotated by {}", (math.degrees(c.angle),), "degrees")],
     ),
 )  # fmt: skip
 # in the order of texts

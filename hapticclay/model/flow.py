@@ -10,17 +10,7 @@ import numpy as np
 from ..arguments import part
 from ..errors import Bound
 from ..formulas.constants import B_MAX
-from .traits import (
-    LEAST,
-    LEFT_OUT,
-    Column,
-    Hold,
-    Law,
-    Quantity,
-    local_quantity,
-    multiplied,
-    scene_quantity,
-)
+from .traits import LEAST, LEFT_OUT, Column, Hold, Law, Quantity, multiplied
 
 FY_MAX = 1e6  # [N]
 CONSISTENCY_MAX = 1e6  # [N/(m/s)^n]
@@ -62,7 +52,7 @@ class Flow:
     @property
     def words(self) -> list[Quantity]:
         """Its resistance, in words."""
-        b = scene_quantity("b = {}", [self.b], "N.s/m")
+        b = Quantity.of_scene("b = {}", [self.b], "N.s/m")
         return [*_flow_quantities([self.Fy], [self.K], [self.n]), *b]
 
     def force(self, v: Any) -> np.ndarray:
@@ -88,17 +78,21 @@ def _flow_quantities(Fy: list[float], K: list[float], n: list[float]) -> list[Qu
     """Yield force, consistency, and flow index where there is a consistency."""
     index = [x for x, consistency in zip(n, K, strict=True) if consistency]
     return [
-        *scene_quantity("Fy = {}", Fy, "N"),
-        *scene_quantity("K = {}", K, "N/(m/s)^n"),
-        *scene_quantity("n = {}", index),
+        *Quantity.of_scene("Fy = {}", Fy, "N"),
+        *Quantity.of_scene("K = {}", K, "N/(m/s)^n"),
+        *Quantity.of_scene("n = {}", index),
     ]
 
 
 def _here(clay: Any, place: tuple[float, float]) -> list[Quantity]:
     """Yield force, consistency and flow index of both axes at a place."""
     Fy, K, n = zip(*(law.flows_at(*place) for law in clay.laws), strict=True)
-    index = local_quantity("n = {}", n) if any(K) else ()
-    return [*local_quantity("Fy = {}", Fy, "N"), *local_quantity("K = {}", K, "N/(m/s)^n"), *index]
+    index = Quantity.of_axes("n = {}", n) if any(K) else ()
+    return [
+        *Quantity.of_axes("Fy = {}", Fy, "N"),
+        *Quantity.of_axes("K = {}", K, "N/(m/s)^n"),
+        *index,
+    ]
 
 
 def _cell_force(law: Any, speed: float, _: float) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 from ..arguments import part
 from ..errors import Bound, ParameterError
 from ..fields import JOINTS, Seed
-from .traits import LEFT_OUT, YES, Quantity, Refusal, Trait, present, scene_quantity
+from .traits import LEFT_OUT, YES, Quantity, Refusal, Trait, present
 
 STIFF = 1e12  # [N/m, N.s/m] upper bound of a coupling
 
@@ -202,7 +202,7 @@ def _field_trait(name: str, field: str, unit: str = "", theory: str = LEFT_OUT) 
     return _trait(
         name,
         lambda x: bool(getattr(x, field)),
-        lambda x: scene_quantity(form, (getattr(x, field),), unit),
+        lambda x: Quantity.of_scene(form, (getattr(x, field),), unit),
         theory,
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arguments import part
 from ..errors import Bound, ParameterError
-from .traits import LEFT_OUT, Law, Quantity, Refusal, local_quantity, scene_quantity
+from .traits import LEFT_OUT, Law, Quantity, Refusal
 
 STIFFNESS_MAX = 1e9  # [N/m]
 RESOLVED = 0.2  # [rad] limit of step times highest frequency of the springs in the loop
@@ -63,7 +63,9 @@ def _words(clay: Any) -> list[Quantity]:
     """Stiffness, limit and relaxing stiffness over a scene."""
     rows = np.concatenate([law.elastic.reshape(-1, 5) for law in clay.laws])
     return [
-        x for form, unit, j in _QUANTITIES for x in scene_quantity(form, _finite(rows[:, j]), unit)
+        x
+        for form, unit, j in _QUANTITIES
+        for x in Quantity.of_scene(form, _finite(rows[:, j]), unit)
     ]
 
 
@@ -73,7 +75,7 @@ def _here(clay: Any, place: tuple[float, float]) -> list[Quantity]:
     return [
         q
         for form, unit, j in _QUANTITIES
-        for q in local_quantity(form, _finite((x[j], y[j])), unit)
+        for q in Quantity.of_axes(form, _finite((x[j], y[j])), unit)
     ]
 
 

@@ -53,6 +53,20 @@ class Quantity(NamedTuple):
             shown = f"{some[0]:.4g} to {some[-1]:.4g}"
         return f"{self.form.format(shown)} {self.unit}".rstrip()
 
+    @classmethod
+    def of_scene(cls, form: str, values: Iterable[float], unit: str = "") -> tuple[Quantity, ...]:
+        """A quantity over a scene, or nothing if all its values are 0."""
+        some = tuple(v for v in dict.fromkeys(values) if v)
+        return (cls(form, some, unit),) * bool(some)
+
+    @classmethod
+    def of_axes(cls, form: str, values: Sequence[float], unit: str = "") -> tuple[Quantity, ...]:
+        """A quantity of both axes: one number if they agree, nothing if both are 0."""
+        x, y = map(float, values)
+        if x != y:
+            return (cls(form.format(f"({x:.4g}, {y:.4g})"), (), unit),)
+        return cls.of_scene(form, (x,), unit)
+
 
 class Column(NamedTuple):
     """A column of a table of stretches."""
@@ -127,22 +141,6 @@ def multiplied(values: Any, factor: float, most: float, least: float = 0.0) -> A
     if isinstance(values, tuple):
         return tuple(multiplied(x, factor, most, least) for x in values)
     return min(max(values * factor, least), most) if values else values
-
-
-def scene_quantity(form: str, values: Iterable[float], unit: str = "") -> tuple[Quantity, ...]:
-    """A quantity over a scene, or nothing if all its values are 0."""
-    some = tuple(v for v in dict.fromkeys(values) if v)
-    return (Quantity(form, some, unit),) * bool(some)
-
-
-def local_quantity(form: str, values: Sequence[float], unit: str = "") -> tuple[Quantity, ...]:
-    """A quantity of both axes at a place: one number if they agree, nothing if both are 0."""
-    x, y = map(float, values)
-    if not (x or y):
-        return ()
-    if x == y:
-        return (Quantity(form, (x,), unit),)
-    return (Quantity(form.format(f"({x:.4g}, {y:.4g})"), (), unit),)
 
 
 def present(scene: Any, traits: Iterable[T]) -> list[T]:
