@@ -153,9 +153,8 @@ class SampleNoise:
         return np.column_stack((late, lost, hiss))
 
 
-_UNSAMPLED = dict.fromkeys(
-    ("fast", "accurate"), Refusal("hardware", "must be None unless control is 'sampled'")
-)
+_IDEAL = Refusal("hardware", "must be None unless control is 'sampled'")
+_UNSAMPLED = {"fast": _IDEAL, "accurate": _IDEAL}
 _HELD = Refusal("render", "must be 'held' for a passivity controller or a coupling")
 
 

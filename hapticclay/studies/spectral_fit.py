@@ -39,6 +39,9 @@ USUAL, FAR_BEYOND = 0.99, 2.0  # quantile of a column, and times that an impossi
 NEIGHBOURS = 20  # lines to each side over which noise is averaged, at most
 WEIGHT_ROUNDS = 4  # of fit and noise; the weights settle in two
 
+# frequency [Hz], response, its deviation, coherence
+Averaged = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
 
 @checked
 def identify_data(
@@ -108,7 +111,7 @@ class _Estimate(NamedTuple):
 
     spectrum: _Spectrum
     fitted: _Fitted
-    averaged: tuple[np.ndarray, ...]
+    averaged: Averaged
     periods: int
 
     @property
@@ -436,7 +439,7 @@ def _orthogonal(
     return theta
 
 
-def _averaged_response(x: _Spectrum, found: _Fitted) -> tuple[np.ndarray, ...]:
+def _averaged_response(x: _Spectrum, found: _Fitted) -> Averaged:
     """Frequency, response, its deviation and coherence, averaged over up to 40 bands.
 
     The residual is projected on the block's output, so curvature within a band has no effect.
