@@ -30,7 +30,6 @@ def _show_line(usual: Callable[..., None], message: Any, category: type, *where:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs the command line."""
     # matplotlib warns of a home that cannot be written
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     with contextlib.suppress(AttributeError, ValueError):

@@ -32,12 +32,7 @@ def default_folder(command: str, subject: Any) -> Path:
 
 
 def progress_bar(items: Any = None, **look: Any) -> Any:
-    """A tqdm bar that shows itself on a terminal after two seconds and vanishes at the end.
-
-    Args:
-        items: what to iterate over; None to update the bar by hand.
-        **look: other arguments of tqdm.
-    """
+    """A tqdm bar that shows itself on a terminal after two seconds and vanishes at the end."""
     from tqdm import tqdm
 
     return tqdm(items, **{"delay": 2.0, "disable": None, "leave": False, **look})
@@ -45,11 +40,7 @@ def progress_bar(items: Any = None, **look: Any) -> Any:
 
 @contextlib.contextmanager
 def fraction_bar(title: str) -> Iterator[Callable[..., None]]:
-    """Yields show(fraction, title=None), which moves a progress bar to a fraction of the work.
-
-    Args:
-        title: text before the bar.
-    """
+    """Yields show(fraction, title=None), which moves a progress bar to a fraction of the work."""
     form = "{desc} {percentage:3.0f}% |{bar}| {elapsed} <{remaining}"
     with progress_bar(total=1.0, desc=title, bar_format=form) as bar:
 
@@ -62,15 +53,7 @@ def fraction_bar(title: str) -> Iterator[Callable[..., None]]:
 
 
 def announce(runs: str, seconds: float, crew: int, size: float, folder: Path) -> None:
-    """Prints the time and the room on disk that runs will take, before they begin.
-
-    Args:
-        runs: the runs, in words.
-        seconds: their time [s].
-        crew: number of processes.
-        size: room that they take [bytes].
-        folder: where they are stored.
-    """
+    """Prints the time, and the room on disk [bytes], that runs in a crew of processes will take."""
     from tqdm import tqdm
 
     free = shutil.disk_usage(folder.parent).free
@@ -158,19 +141,7 @@ class FigureOptions:
 def save_figures(
     figures: Mapping[str, Figure], folder: Path, options: FigureOptions | None = None
 ) -> dict[str, list[Path]]:
-    """Writes figures as folder/NAME.png or in other formats, each whole or not at all.
-
-    Args:
-        figures: by name.
-        folder: where to.
-        options: formats, style, and whether to write the numbers too.
-
-    Returns:
-        The files of each figure that applies, by name.
-
-    Raises:
-        ParameterError: a file cannot be written.
-    """
+    """Writes figures as folder/NAME.png or in other formats, and returns the files by name."""
     o = options or FigureOptions()
     written = {
         name: figure.save(folder / name, o.format, o.dpi, o.style, o.data)
@@ -188,18 +159,9 @@ def deliver(
     pages: Mapping[str, Callable[[], str]] | None = None,
     **asked: Any,
 ) -> None:
-    """Writes a result as NAME.json, its figures and pages, and prints it.
+    """Writes a result as NAME.json, its figures and pages, and prints it, or `text` in its place.
 
-    Args:
-        found: the result.
-        out: where to.
-        figures: formats and style of the figures; None for no figures.
-        text: what to print in place of `found.text()`.
-        pages: texts of further files, by file name.
-        **asked: the question, as NAME.json repeats it.
-
-    Raises:
-        ParameterError: a file cannot be written; the result is printed nevertheless.
+    Without `figures` none are drawn; `asked` is the question, which NAME.json repeats.
     """
     try:
         found.write(out, asked)

@@ -158,7 +158,6 @@ def deliver_loops(
 def write_report(
     exchanges: Exchanges, scenario: Scenario, folder: Path, figures: console.FigureOptions | None
 ) -> None:
-    """Writes and prints the report of a loop."""
     from ..ports.report import loop_report
 
     console.deliver(loop_report(exchanges, scenario), folder, figures)

@@ -18,7 +18,6 @@ ABOUT = "Virtual clay, cut with a simulated haptic arm."
 
 
 def print_help(words: Sequence[str]) -> None:
-    """Prints the help page of a command line."""
     width = max(shutil.get_terminal_size().columns, NARROWEST)
     if words and not words[0].startswith("-"):
         _print_command(words, width)

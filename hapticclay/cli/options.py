@@ -70,22 +70,15 @@ class Several(Node):
 
 @dataclass(frozen=True, eq=False)
 class Option:
-    """A word, or words behind a name, that a command takes.
-
-    Attributes:
-        part: field of the command in which the option lies; SCENARIO for those of an experiment, ""
-            for the command's own.
-        note: LOOSE, SCENARIO or RECORD for a word without a name; "" for others.
-        field: name of the field, without the prefix of a part.
-    """
+    """A word, or words behind a name, that a command takes."""
 
     name: str
     node: Node
     about: str
     default: Any
-    part: str = ""
-    note: str = ""
-    field: str = ""
+    part: str = ""  # the field in which it lies; SCENARIO for an experiment's, "" for none
+    note: str = ""  # LOOSE, SCENARIO or RECORD for a word without a name; "" for others
+    field: str = ""  # name of the field, without the prefix of a part
 
     @property
     def word(self) -> str:

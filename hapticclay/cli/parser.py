@@ -44,22 +44,13 @@ OF_SAMPLING = Unused(
 
 @dataclass(frozen=True)
 class Line:
-    """What a command line says.
-
-    Attributes:
-        name: the command.
-        kind: its dataclass.
-        options: all that it takes, by name.
-        origin: EXPERIMENT, FILE or RECORD where the command has a scenario; else "".
-        source: name of that experiment, or path.
-        values: what was given, by name.
-    """
+    """What a command line says."""
 
     name: str
-    kind: type
-    options: dict[str, Option]
-    origin: str = ""
-    source: str = ""
+    kind: type  # dataclass of the command
+    options: dict[str, Option]  # all that it takes, by name
+    origin: str = ""  # EXPERIMENT, FILE or RECORD where it has a scenario; else ""
+    source: str = ""  # name of that experiment, or path
     values: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -98,11 +89,7 @@ class Line:
 
 
 def read(words: Sequence[str]) -> Line:
-    """Reads a command line.
-
-    Raises:
-        ParameterError: it has a word that its command does not take.
-    """
+    """Reads a command line; refuses a word that its command does not take."""
     line, rest = begun([NEGATIVE.sub(r" \g<0>", word) for word in words])
     quiet: Any = object()  # a console would be imported for an error, which nobody prints there
     try:

@@ -100,7 +100,6 @@ def simulate_with_progress(
     stop: Callable[[], bool] | None = None,
     error: str | None = None,
 ) -> Record:
-    """Runs simulate() under a progress bar."""
     from ..simulation.simulate import simulate
 
     start, length = scenario.start[0], scenario.length

@@ -14,21 +14,14 @@ class Unused(NamedTuple):
     """Options that do nothing, in a command where a combination of others stands.
 
     A combination names words as "spec" (given), or "design=grid" (given with this value).
-
-    Attributes:
-        options: names of the options, and of fields behind --set.
-        why: what to do about them, for the error.
-        beside: words that are all given; () for any command line.
-        without: words none of which is given.
     """
 
-    options: tuple[str, ...]
-    why: str
-    beside: tuple[str, ...] = ()
-    without: tuple[str, ...] = ()
+    options: tuple[str, ...]  # names of the options, and of fields behind --set
+    why: str  # what to do about them, for the error
+    beside: tuple[str, ...] = ()  # words that are all given
+    without: tuple[str, ...] = ()  # words none of which is given
 
     def refuse(self, given: Given) -> None:
-        """Refuses the options where they do nothing."""
         beside = all(_is_given(word, given) for word in self.beside)
         if not beside or any(_is_given(word, given) for word in self.without):
             return

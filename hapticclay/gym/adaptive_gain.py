@@ -47,7 +47,6 @@ class AdaptiveGainTask(Task):
 
     @property
     def observations(self) -> tuple[Quantity, ...]:
-        """Quantities of an observation."""
         v = (symmetric(f"velocity, {k} periods ago", 200.0, "cm/s") for k in range(SAMPLES))
         f = (symmetric(f"force of the hand, {k} periods ago", 100.0, "N") for k in range(SAMPLES))
         return (

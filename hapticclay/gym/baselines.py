@@ -31,17 +31,11 @@ Maker = Callable[[Any, list[Truth], int], Policy]
 
 
 class Scores(NamedTuple):
-    """Scores of a policy, one episode per seed.
+    """Scores of a policy, one episode per seed; arrays of shape (n,)."""
 
-    Attributes:
-        total: sum of rewards, shape (n,).
-        length: number of control periods, shape (n,).
-        info: info of the last step, by name, shape (n,) each.
-    """
-
-    total: np.ndarray
-    length: np.ndarray
-    info: dict[str, np.ndarray]
+    total: np.ndarray  # sum of rewards
+    length: np.ndarray  # number of control periods
+    info: dict[str, np.ndarray]  # info of the last step, by name
 
 
 def at_random(task: Task, truths: list[Truth], seed: int) -> Policy:

@@ -27,11 +27,7 @@ GAIN_SHARE = Range(0.3, 1.0, "", 0.01, 2.0, False, "gain of the device, share of
 
 @dataclass(frozen=True)
 class CutLineTask(Follow):
-    """Task: cut along a line through viscous clay.
-
-    Attributes:
-        shape: shape of the line: "straight", "arc" or "corner".
-    """
+    """Task: cut along a line through viscous clay."""
 
     shape: Literal["straight", "arc", "corner"] = "straight"
     drawn: ClassVar[dict[str, Range]] = {
@@ -48,7 +44,6 @@ class CutLineTask(Follow):
 
     @property
     def observations(self) -> tuple[Quantity, ...]:
-        """Quantities of an observation."""
         return (
             symmetric("distance from the line, positive to its left", 50.0, "mm"),
             *MOTION,
@@ -56,7 +51,6 @@ class CutLineTask(Follow):
         )
 
     def line(self, truth: Truth) -> np.ndarray:
-        """Nodes of the line [m]."""
         return lines.rotated(lines.SHAPES[self.shape](LENGTH), truth["angle"])
 
     @override

@@ -50,21 +50,13 @@ WRITTEN = 50  # episodes that Minari's writer is given at once
 
 @dataclass(frozen=True)
 class Recording(store.Plan):
-    """Episodes of an environment's baseline with noise on its actions, one per file.
+    """Episodes of an environment's baseline with noise on its actions, one per file."""
 
-    Attributes:
-        id: name of the environment.
-        noise: standard deviation of the noise.
-        seed: seed of the first episode; counted up for the others.
-        episodes: number of episodes; a recording may be continued with another one.
-        engine: as in `Simulation`; the bits are the same for all.
-    """
-
-    id: str
-    noise: float
-    seed: int
-    episodes: int
-    engine: str
+    id: str  # name of the environment
+    noise: float  # standard deviation
+    seed: int  # seed of the first episode; counted up for the others
+    episodes: int  # a recording may be continued with another number
+    engine: str  # the bits are the same for all
     chunk: int | None = 1
 
     notes: ClassVar[Notes] = {
@@ -91,7 +83,6 @@ class Recording(store.Plan):
 
     @functools.cached_property
     def env(self) -> Any:
-        """The environment."""
         return gymnasium.make(f"{NAMESPACE}/{self.id}", engine=self.engine)
 
     def _episode(self, seed: int) -> dict[str, np.ndarray]:

@@ -14,24 +14,14 @@ Truth = dict[str, float]
 
 
 class Range(NamedTuple):
-    """Range of a number drawn for each episode.
+    """Range of a number drawn for each episode."""
 
-    Attributes:
-        low: smallest value drawn.
-        high: largest value drawn.
-        unit: its unit; "" for none.
-        least: smallest value allowed.
-        most: largest value allowed.
-        log: whether its logarithm is uniformly distributed; else the number itself is.
-        what: description.
-    """
-
-    low: float
-    high: float
-    unit: str
-    least: float
-    most: float
-    log: bool
+    low: float  # smallest value drawn
+    high: float  # largest value drawn
+    unit: str  # "" for none
+    least: float  # smallest value allowed
+    most: float  # largest value allowed
+    log: bool  # whether its logarithm is uniformly distributed; else the number itself is
     what: str
 
 

@@ -18,19 +18,12 @@ Ends = Sequence[tuple[float, float]]  # of the quantities of an observation
 
 
 class Period(NamedTuple):
-    """Results of a control period, of one copy or of all.
+    """Results of a control period, of one copy or of all."""
 
-    Attributes:
-        observation: shape (m,) or (n, m), float32.
-        reward: number or shape (n,).
-        ended: whether the episode is over, bool or shape (n,).
-        info: values by name, numbers or shape (n,) each.
-    """
-
-    observation: np.ndarray
-    reward: Any
-    ended: Any
-    info: Memory
+    observation: np.ndarray  # float32, shape (m,) or (n, m)
+    reward: Any  # a number, or shape (n,)
+    ended: Any  # whether the episode is over: bool, or shape (n,)
+    info: Memory  # by name: numbers, or shape (n,) each
 
 
 class One:
@@ -41,7 +34,6 @@ class One:
         self.gain: Any = None
 
     def reset(self, which: Sequence[int], scenarios: Sequence[Any]) -> None:
-        """Restarts the run."""
         self.run.reset(scenarios[0])
         self.gain = None
 
@@ -78,7 +70,6 @@ class Many:
         self.run = SimulationBatch(scenarios, engine=engine, monitored=False)
 
     def reset(self, which: Sequence[int], scenarios: Sequence[Any]) -> None:
-        """Restarts some runs."""
         self.run.reset(which, scenarios)
 
     def advance(self, n: int, command: Command, live: np.ndarray) -> None:
@@ -89,35 +80,21 @@ class Many:
             self.run.advance(n, force=np.stack(command.force, axis=1), mask=live)
 
     def measured(self, n: int, k: int) -> tuple[Any, Any, Any]:
-        """As `One.measured`."""
         run = self.run
         return run.numbers().T, run.torque_reached(n, k).T, run.ended
 
     def observation(self, values: Iterable[Value], ends: Ends) -> np.ndarray:
-        """As `One.observation`."""
         low, high = np.array(ends).T
         return observed(np.stack(tuple(values), axis=1), low, high).astype(np.float32)
 
     @staticmethod
     def merged(kept: Memory, which: Sequence[int], rows: Sequence[Memory]) -> Memory:
-        """As `One.merged`."""
         new = {name: columns_of([x[name] for x in rows]) for name in rows[0]}
         return {name: replaced(kept[name], which, x) for name, x in new.items()} if kept else new
 
 
 class Episodes:
-    """Episodes of a task.
-
-    Args:
-        task: the task.
-        kind: `One` copy or `Many`.
-        engine: "auto", "python" or "native".
-
-    Attributes:
-        truth: numbers drawn for the episodes, by name.
-        memory: memory of the task.
-        handle: state of the handle at the end of the last control period.
-    """
+    """Episodes of a task, with the numbers drawn for them, of `One` copy or of `Many`."""
 
     def __init__(self, task: Task, kind: type[One | Many], engine: str):
         self.task, self.kind, self.engine = task, kind, engine
@@ -180,7 +157,6 @@ class Episodes:
         return {name: float(x[i]) for name, x in self.truth.items()}
 
     def close(self) -> None:
-        """Ends the runs."""
         if self._runs is not None:
             self._runs.run.close()
         self._runs = None

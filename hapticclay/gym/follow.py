@@ -39,16 +39,11 @@ MOTION = (
 
 @dataclass(frozen=True)
 class Follow(Task):
-    """Task: follow a line at constant speed.
-
-    Attributes:
-        far: distance from the line at which an episode ends [m].
-        most: muscle force at an action of 1 [N].
-    """
+    """Task: follow a line at constant speed."""
 
     actions: ClassVar[tuple[Quantity, ...]] = PUSH
-    far: ClassVar[float] = 0.02
-    most: ClassVar[float] = FORCE
+    far: ClassVar[float] = 0.02  # [m] distance from the line at which an episode ends
+    most: ClassVar[float] = FORCE  # [N] muscle force at an action of 1
 
     def line(self, truth: Truth) -> np.ndarray:
         """Nodes of the line of an episode [m], shape (pieces + 1, 2)."""

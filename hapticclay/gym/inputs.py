@@ -76,7 +76,6 @@ def options_of(given: Any) -> dict[str, Any]:
 
 
 def task_of(kind: type[T], ranges: Any, options: Mapping[str, Any], owner: Any) -> T:
-    """The task of an environment."""
     own = [f.name for f in dataclasses.fields(kind) if f.init and f.name != "given"]
     parameters = inspect.signature(owner.__init__).parameters.values()
     others = [p.name for p in parameters if p.kind is not p.VAR_KEYWORD]

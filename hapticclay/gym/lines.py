@@ -17,21 +17,13 @@ PIECES = 24  # pieces of an arc
 
 
 class Place(NamedTuple):
-    """Position of a handle relative to its line; numbers or columns.
+    """Position of a handle relative to its line; numbers or columns."""
 
-    Attributes:
-        s: arc length of the nearest point of the line [m].
-        across: distance from the line, positive to its left [m].
-        distance: distance from the nearest point [m].
-        tangent: unit vector along the line there.
-        ahead: unit vector along the line further on.
-    """
-
-    s: Value
-    across: Value
-    distance: Value
-    tangent: Pair
-    ahead: Pair
+    s: Value  # [m] arc length of the nearest point of the line
+    across: Value  # [m] distance from the line, positive to its left
+    distance: Value  # [m] from the nearest point
+    tangent: Pair  # unit vector along the line there
+    ahead: Pair  # unit vector along the line further on
 
 
 def straight(length: float) -> list[tuple[float, float]]:

@@ -50,7 +50,6 @@ class PareEdgeTask(Follow):
 
     @property
     def observations(self) -> tuple[Quantity, ...]:
-        """Quantities of an observation."""
         return (
             symmetric("depth of the tool's edge below that of the block", 20.0, "mm"),
             Quantity("target depth", 0.0, 10.0, "mm"),

@@ -17,11 +17,7 @@ PATH = 2000  # points of the path to keep
 
 
 class Picture:
-    """A picture of one copy, in a window or as an array, with the path of its handle.
-
-    Attributes:
-        unseen: why there is no window although one was asked for, else "".
-    """
+    """A picture of one copy, in a window or as an array; `unseen` says why there is no window."""
 
     def __init__(self, task: Task, window: bool):
         self._task, self._plan = task, PlanPicture(window)
@@ -29,11 +25,9 @@ class Picture:
         self._path: list[tuple[float, float]] = []
 
     def begin(self) -> None:
-        """Starts a new path."""
         self._path = []
 
     def note(self, p: tuple[float, float]) -> None:
-        """Adds a point to the path."""
         point = float(p[0]), float(p[1])
         if not self._path or self._path[-1] != point:
             self._path.append(point)
@@ -54,7 +48,6 @@ class Picture:
         return f"K = {m['K']:.2f} 1/kg, {speed}" if "K" in m else speed
 
     def close(self) -> None:
-        """Closes the window, if any."""
         self._plan.close()
 
 

@@ -43,7 +43,6 @@ class ProbeClayTask(Task):
 
     @property
     def observations(self) -> tuple[Quantity, ...]:
-        """Quantities of an observation."""
         return (
             symmetric("position x", 200.0, "mm"),
             symmetric("position y", 200.0, "mm"),

@@ -10,16 +10,11 @@ NAMESPACE = "hapticclay"
 
 
 class Entry(NamedTuple):
-    """An environment.
-
-    Attributes:
-        module: module of this package that contains it.
-        name: name of its class; the vector environment adds Vector.
-        limit: control periods after which an episode is truncated; None if it ends by itself.
-    """
+    """An environment: its module in this package, and its class."""
 
     module: str
-    name: str
+    name: str  # that of the vector environment adds Vector
+    # control periods after which an episode is truncated; None if it ends by itself
     limit: int | None
 
 

@@ -26,74 +26,44 @@ Memory = dict[str, Any]  # values, tables, or tuples of them, by name: of one co
 
 
 class Handle(NamedTuple):
-    """State of the handle at the end of a control period; pairs (x, y) of numbers or columns.
+    """State of the handle at the end of a control period; pairs (x, y) of numbers or columns."""
 
-    Attributes:
-        p: position [m].
-        v: velocity [m/s].
-        fh: force of the hand on the handle [N].
-        fe: resisting force of the clay [N].
-        diverged: whether the run is unstable or over.
-    """
-
-    p: Pair
-    v: Pair
-    fh: Pair
-    fe: Pair
-    diverged: Value
+    p: Pair  # [m]
+    v: Pair  # [m/s]
+    fh: Pair  # [N] of the hand on the handle
+    fe: Pair  # [N] resistance of the clay
+    diverged: Value  # whether the run is unstable or over
 
 
 class Command(NamedTuple):
-    """Command for a control period; pairs (x, y) of numbers or columns.
+    """Command for a control period; pairs (x, y) of numbers or columns."""
 
-    Attributes:
-        force: muscle force on the handle [N].
-        gain: K of the compensator [1/kg]; None to keep it.
-    """
-
-    force: Pair
-    gain: Pair | None = None
+    force: Pair  # [N] muscle force on the handle
+    gain: Pair | None = None  # K of the compensator [1/kg]; None to keep it
 
 
 class Judged(NamedTuple):
-    """Reward of a control period; numbers or columns.
-
-    Attributes:
-        reward: reward.
-        ended: whether the episode is over.
-        info: values by name.
-    """
+    """Reward of a control period; numbers or columns."""
 
     reward: Value
-    ended: Value
-    info: Memory
+    ended: Value  # whether the episode is over
+    info: Memory  # values by name
 
 
 @dataclass(frozen=True)
 class Task:
-    """A task: its numbers and functions, independent of the engine.
+    """A task: its numbers and functions, independent of the engine."""
 
-    Attributes:
-        given: ends (low, high) of ranges other than the task's own, by name; None for none.
-        steps: engine steps per control period.
-        limit: control periods after which an episode is truncated.
-        strain: share of the torque limit beyond which a run counts as unstable.
-        share: share of a control period in which that torque is needed; after a jump of the muscle
-            force stable runs need it for less.
-        actions: quantities of an action.
-        observations: quantities of an observation.
-        drawn: ranges of the numbers drawn for each episode.
-        ranges: these ranges with the given ends.
-    """
-
-    given: Any = None
-    ranges: dict[str, Range] = field(init=False)
-    steps: ClassVar[int] = 56
-    limit: ClassVar[int] = 500
-    strain: ClassVar[float] = 1.0
+    given: Any = None  # ends (low, high) of ranges that differ from the task's own, by name
+    ranges: dict[str, Range] = field(init=False)  # those of `drawn`, with the given ends
+    steps: ClassVar[int] = 56  # engine steps per control period
+    limit: ClassVar[int] = 500  # control periods after which an episode is truncated
+    strain: ClassVar[float] = 1.0  # share of the torque limit beyond which a run counts as unstable
+    # share of a control period in which that torque is needed; after a jump of the muscle force
+    # stable runs need it for less
     share: ClassVar[float] = 0.25
     actions: ClassVar[tuple[Quantity, ...]]
-    drawn: ClassVar[dict[str, Range]]
+    drawn: ClassVar[dict[str, Range]]  # ranges of the numbers drawn for each episode
 
     def __post_init__(self):
         object.__setattr__(self, "ranges", with_ranges(self.drawn, self.given))
@@ -147,7 +117,6 @@ class Task:
 
 
 def hand_of(truth: Truth) -> Operator:
-    """The hand of an episode."""
     return Operator(*(truth[name] for name in HAND))
 
 

@@ -20,7 +20,6 @@ class Clock:
     """
 
     def __init__(self, span: float = FRAME_TIME):
-        """Begins with the first slice."""
         self._span = span
         self.frames, self.late, self.slow = 0, np.zeros(len(LATE_EDGES) - 1, dtype=int), False
         self.real = self.simulated = 0.0  # elapsed and scheduled [s]

@@ -14,7 +14,7 @@ from typing import Any
 
 from ..ports.coupled import DeviceHand
 from ..ports.device import device_scenario
-from ..ports.driven_arm import LARGEST_FORCE, Drive, DrivenArm, Sensed
+from ..ports.driven_arm import LARGEST_FORCE, Device, Drive, DrivenArm, Sensed
 from ..ports.service import Service
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
@@ -46,7 +46,6 @@ class ServedSession(Session):
         every: int = 1,
         largest_force: float = LARGEST_FORCE,
     ):
-        """Begins at the start of a scenario."""
         self._largest_force = largest_force
         self._counts: deque[tuple[float, int]] = deque()
         self.partner = Partner(SERVED_SPAN)
@@ -84,33 +83,28 @@ class ServedSession(Session):
         return replace(super().record(), scenario=self.undriven)
 
 
-class LiveDevice:
+class LiveDevice(Device):
     """The arm of a session as the device of a service; the session's player advances it."""
 
     paced = True
 
     def __init__(self, session: ServedSession):
-        """The arm of a session."""
         self._session = session
 
     @property
     def t(self) -> float:
-        """Simulated time [s]."""
         return self._session.t
 
     @property
     def sensed(self) -> Sensed:
-        """The newest measurement."""
         return self._session.arm.sensed
 
     @property
     def force(self) -> tuple[float, float]:
-        """The force that acts on the handle [N]."""
         return self._session.arm.force
 
     @property
     def torques(self) -> tuple[float, float]:
-        """Torques in addition to that force [N.m]."""
         return self._session.arm.asked.torques
 
     @property
@@ -120,11 +114,9 @@ class LiveDevice:
 
     @property
     def scenario(self) -> Scenario:
-        """The simulated scenario."""
         return self._session.undriven
 
     def drive(self, drive: Drive) -> tuple[float, float]:
-        """Changes the drive of the motors from the next control sample on."""
         return self._session.arm.drive(drive)
 
     def advance(self, samples: int | None = None) -> None:
@@ -137,7 +129,6 @@ class DeviceSession(Session):
     frame_time = FRAME_TIME
 
     def __init__(self, scenario: Scenario, hand: DeviceHand, tool: Tool = TOOL, every: int = 1):
-        """Begins at the start of a scenario."""
         self.hand, self.partner = hand, DevicePartner(hand)
         super().__init__(scenario, 1.0, tool, every)
 
@@ -158,7 +149,6 @@ class DevicePartner(Partner):
     """
 
     def __init__(self, hand: DeviceHand):
-        """Connects a device to a session."""
         super().__init__(hand.client.limits.Ts)
         self.hand = hand
         self._handle: Any = None  # position and velocity of the simulated handle; None at rest
@@ -167,7 +157,7 @@ class DevicePartner(Partner):
         """Sends the force of the coupling, and reads the device."""
         handle, self._handle = self._handle, None
         if handle is None:
-            self.hand.watch()
+            self.hand.read_position()
         else:
             self.hand.exchange(*handle)
 

@@ -20,14 +20,12 @@ class Replay:
     point = None  # no hand pulls
 
     def __init__(self, record: Record, tool: Tool = TOOL):
-        """Begins at the first sample."""
         self.source, self.scenario = record, record.scenario
         self._held = record.held()
         self.tool = Tool(**record.notes["tool"]) if "tool" in record.notes else tool
         self.restart()
 
     def restart(self) -> None:
-        """Restarts at the first sample."""
         self.paused, self.clock, self.t, self.n = False, Clock(), 0.0, 0
         self.frames = [self._frame(0)]
         self._limits = PoseLimits(self.scenario)

@@ -26,13 +26,8 @@ class UdpStream:
     A datagram is one JSON object: timestamp [s], which continues over restarts; t, the time of the
     session [s]; p [m], v [m/s], fh, fe [N], b [N.s/m] and gain [1/kg], each with x and y; held, 1
     where yielding clay holds the handle; target [m] while the hand pulls. null replaces a number
-    that is not finite. Datagrams without a receiver are lost.
-
-    Args:
-        address: HOST:PORT, or [HOST]:PORT.
-
-    Raises:
-        ParameterError: the address is invalid, or the host is unknown.
+    that is not finite. Datagrams without a receiver are lost. An address is HOST:PORT or
+    [HOST]:PORT.
     """
 
     def __init__(self, address: str):
@@ -69,7 +64,6 @@ class UdpStream:
             self._socket.sendto(json.dumps(values).encode(), self._to)
 
     def close(self) -> None:
-        """Closes the socket."""
         self._socket.close()
 
 

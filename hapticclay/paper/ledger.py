@@ -14,6 +14,7 @@ from ..simulation.simulate import simulate
 from ..studies.identification import Identified, identify
 from ..theory import loops
 
+TH = Operator()  # Eq. 19
 STATUSES = {
     "given": "printed in the paper, and reproduced",
     "inferred": "not printed, but follows from printed numbers",
@@ -25,29 +26,18 @@ STATUSES = {
 
 @dataclass(frozen=True)
 class Row:
-    """One row.
+    """One row of the ledger."""
 
-    Attributes:
-        what: the quantity.
-        where: its place in the paper.
-        printed: text as printed in the paper.
-        unit: unit of expected and ours.
-        expected: value by our reading of the paper; None if there is nothing to compare.
-        ours: value found by the simulator; None if there is nothing to find.
-        tolerance: relative to expected (absolute where that is 0); None if the row need not agree.
-        status: one of STATUSES.
-        reason: why, with the evidence.
-    """
-
-    what: str
-    where: str
-    printed: str
-    unit: str
-    expected: float | None
-    ours: float | None
+    what: str  # the quantity
+    where: str  # its place in the paper
+    printed: str  # text as printed in the paper
+    unit: str  # unit of `expected` and `ours`
+    expected: float | None  # by our reading of the paper; None if there is nothing to compare
+    ours: float | None  # by the simulator; None if there is nothing to find
+    # relative, or absolute where 0 is expected; None if the row need not agree
     tolerance: float | None
-    status: str
-    reason: str = ""
+    status: str  # one of STATUSES
+    reason: str = ""  # why, with the evidence
 
     def __post_init__(self):
         for field in ("expected", "ours"):  # plain numbers, not those of NumPy
@@ -70,14 +60,9 @@ class Row:
 
 
 class Runs:
-    """The runs behind rows and figures, each run once, on first use.
-
-    Attributes:
-        progress: called with the name of each run before it starts.
-    """
+    """The runs behind rows and figures, each run once, on first use; `progress` takes its name."""
 
     def __init__(self, progress: Callable[[str], None] | None = None):
-        """Starts without runs."""
         self.progress = progress or (lambda name: None)
         self._kept: dict[str, Any] = {}
 
@@ -88,25 +73,21 @@ class Runs:
         return self._kept[name]
 
     def constant(self, **kw) -> Record:
-        """A constant cut."""
         return self._get(f"constant cut {_keywords(kw)}", lambda: simulate(constant_cut(**kw)))
 
     def variable(self, growth: Any = "30/s", **kw) -> Record:
-        """A variable cut."""
         return self._get(
             f"variable cut, growth {growth} {_keywords(kw)}",
             lambda: simulate(variable_cut(growth, **kw)),
         )
 
     def stability(self, gain: float, **kw) -> Record:
-        """A stability test."""
         return self._get(
             f"stability test, K = {gain:g} {_keywords(kw)}",
             lambda: simulate(stability_test(gain, **kw)),
         )
 
     def free(self, **kw) -> Record:
-        """A motion in free space."""
         return self._get(f"free {_keywords(kw)}", lambda: simulate(free(**kw)))
 
     def identified(self, what: str, axis: str) -> Identified:
@@ -133,15 +114,11 @@ def rightmost(axis: str, K: float, b: float, th: Operator | None) -> complex:
     return complex(max((p for p in poles if p.imag >= 0.0), key=lambda p: p.real))
 
 
-TH = Operator()  # Eq. 19
-
-
 def row(
     cells: str,
     figures: tuple[float | None, float | None, float | None],
     status: str,
     reason: str = "",
 ) -> Row:
-    """Makes one row of the ledger."""
     what, where, printed, unit = cells.split(" | ")
     return Row(what, where, printed, unit, *figures, status, reason)

@@ -37,23 +37,15 @@ WIDE = 7.0  # [inch] wider figures have panels side by side and span both column
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure of the report.
+    """A figure of the report."""
 
-    Attributes:
-        name: name of the file.
-        title: title above the figure.
-        caption: caption below the figure.
-        draw: draws the figure from the runs of the ledger.
-        paper: data of the paper's figure to compare with ours; its curves are not reproduced.
-        quick: whether the quick report includes it.
-    """
-
-    name: str
+    name: str  # name of the file
     title: str
     caption: str
-    draw: Callable[[Runs], Any]
+    draw: Callable[[Runs], Any]  # draws the figure from the runs of the ledger
+    # data of the paper's figure to compare with ours; its curves are not reproduced
     paper: str = ""
-    quick: bool = True
+    quick: bool = True  # whether the quick report includes it
 
 
 def _identified(runs: Runs, what: str) -> Any:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import os
 from pathlib import Path
@@ -13,32 +11,22 @@ import numpy as np
 
 from ..arguments import named
 from ..errors import ParameterError, integer
-from ..files import atomic
 from .commands import AXES, Vector
-from .rows import MOST_ROWS, Rows
+from .rows import MOST_ROWS, Rows, write_table
 
 FILE = "device.csv"  # stored with the record of a session
 FEWEST = 2
 
 
 class Exchanged(NamedTuple):
-    """A force that was sent, and the answer.
+    """A force that was sent to the cursor, and the answer."""
 
-    Attributes:
-        sent: when the force was sent, on the computer's clock [s].
-        received: when the answer came [s].
-        t: time assigned to the answer [s].
-        position: position of the cursor [m].
-        velocity: velocity of the cursor [m/s].
-        force: force that was sent [N].
-    """
-
-    sent: float
-    received: float
-    t: float
-    position: Vector
-    velocity: Vector
-    force: Vector
+    sent: float  # [s] on the computer's clock
+    received: float  # [s] on the same clock
+    t: float  # [s] assigned to the answer
+    position: Vector  # [m]
+    velocity: Vector  # [m/s]
+    force: Vector  # [N] that was sent
 
 
 class Timing(NamedTuple):
@@ -178,10 +166,5 @@ class ClientLog:
         Raises:
             ParameterError: there are fewer than two exchanges, or the file cannot be written.
         """
-        columns, text = self.columns(), io.StringIO()
-        rows = csv.writer(text, lineterminator="\n")
-        rows.writerow(columns)
-        rows.writerows(zip(*(map(repr, x.tolist()) for x in columns.values()), strict=True))
-        with atomic(Path(path)) as f:
-            f.write(text.getvalue().encode())
-        return Path(path)
+        columns = self.columns()
+        return write_table(path, columns, np.column_stack(list(columns.values())))

@@ -16,16 +16,10 @@ LONGEST_TEXT = 256  # characters of a name or id from a message
 
 
 class Quantity(NamedTuple):
-    """A quantity in messages, and the bound of its numbers.
+    """A quantity in messages, and the bound of its numbers."""
 
-    Attributes:
-        name: name in notices.
-        most: largest magnitude that counts as a number of this quantity.
-        unit: unit.
-    """
-
-    name: str
-    most: float
+    name: str  # name in notices
+    most: float  # largest magnitude that counts as a number of this quantity
     unit: str
 
 
@@ -40,17 +34,11 @@ RATE = Quantity("rate", 1e9, "deg/s")
 
 @dataclass(frozen=True)
 class Command:
-    """The command in a message; None for what the message does not contain.
+    """The command in a message; None for what the message does not contain."""
 
-    Attributes:
-        force: force on the cursor, along x, y, z of the device [N].
-        target: position at which to hold the cursor, x, y, z [m].
-        torques: torques on the shoulder and elbow joints [N.m].
-    """
-
-    force: Vector | None = None
-    target: Vector | None = None
-    torques: Pair | None = None
+    force: Vector | None = None  # [N] on the cursor, along x, y, z of the device
+    target: Vector | None = None  # [m] at which to hold the cursor
+    torques: Pair | None = None  # [N.m] on shoulder and elbow
 
     @property
     def mode(self) -> str:

@@ -20,7 +20,7 @@ from ..simulation.record import Record
 from ..simulation.stepwise import Simulation
 from .client import DeviceClient, DeviceSample
 from .client_log import ClientLog, Timing
-from .commands import NOTHING, Pair
+from .commands import NOTHING, Pair, Vector
 from .device import ended_as_planned
 from .limits import PLAIN, Limits
 from .planes import Plane, to_plane, to_space
@@ -98,17 +98,10 @@ PLAIN_COUPLING = Coupled()
 
 
 class DeviceHand:
-    """The handle of a device, as a hand in the plane of the arm.
+    """The handle of a device as a hand: its `place` [m] and `rate` [m/s] in the plane of the arm.
 
-    It starts at the simulated handle, wherever the device is.
-
-    Attributes:
-        client: reads the device.
-        coupling: coupling to the arm; K is lowered if the exchanges are slower than requested.
-        place: position of the device's handle, in the plane of the arm [m].
-        rate: velocity of the device's handle [m/s].
-        held: whether the newest sample arrived in time.
-        t: time of the newest sample [s].
+    It starts at the simulated handle, wherever the device is. K of `coupling` is lowered if the
+    exchanges are slow; `held` says whether the newest sample, at `t` [s], came in time.
     """
 
     def __init__(self, client: DeviceClient, coupling: Coupled, start: Pair):
@@ -121,6 +114,7 @@ class DeviceHand:
         if sample := client.exchange():
             x, y = to_plane(sample.position, self.plane)
             self._offset = start[0] - x, start[1] - y
+            self.held = True
             self._take(sample)
         client.restart_ramp()
 
@@ -138,16 +132,16 @@ class DeviceHand:
         if self.held:
             x, y = self.coupling.force(self.place, self.rate, p, v)
             push = to_space((-x, -y), self.plane)
-        sample = self.client.exchange(push)
-        self.held = sample is not None
-        if sample is not None:
-            self._take(sample)
-        return self.held
+        return self._send(push)
 
-    def watch(self) -> bool:
+    def read_position(self) -> None:
         """Reads the position of the device, without force; the next forces rise from zero."""
-        sample = self.client.exchange()
+        self._send(NOTHING)
         self.client.restart_ramp()
+
+    def _send(self, force: Vector) -> bool:
+        """Sends a force and takes the answer, if there is one."""
+        sample = self.client.exchange(force)
         self.held = sample is not None
         if sample is not None:
             self._take(sample)
@@ -156,10 +150,9 @@ class DeviceHand:
     def _take(self, sample: DeviceSample) -> None:
         x, y = to_plane(sample.position, self.plane)
         self.place = x + self._offset[0], y + self._offset[1]
-        self.rate, self.held, self.t = to_plane(sample.velocity, self.plane), True, sample.t
+        self.rate, self.t = to_plane(sample.velocity, self.plane), sample.t
 
     def notes(self) -> dict[str, object]:
-        """Notes about the device for a record."""
         return {
             "url": self.client.url,
             "device_id": self.client.device_id,

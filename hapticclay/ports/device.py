@@ -18,7 +18,7 @@ from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from ..simulation.stepwise import Simulation
 from .commands import Pair
-from .driven_arm import LARGEST_FORCE, Drive, DrivenArm, Sensed
+from .driven_arm import LARGEST_FORCE, Device, Drive, DrivenArm, Sensed
 
 LONGEST = 1e5  # [s] longest session
 FASTEST = 100.0  # [m/s] of a hand
@@ -108,18 +108,14 @@ def read_columns(
     return rows
 
 
-class SimulatedDevice:
+class SimulatedDevice(Device):
     """The arm and hand of a scenario, driven by a client instead of the controller.
 
     A force acts through the transposed Jacobian at the measured joint angles. It is held for a
     control sample, limited by the torque limits and delayed as the scenario's hardware says.
-
-    Attributes:
-        scenario: the simulated scenario.
-        paced: whether anything but the clock of a service advances the device; False here.
     """
 
-    paced = False
+    paced = False  # the clock of a service advances it
 
     def __init__(
         self,
@@ -131,52 +127,49 @@ class SimulatedDevice:
         clay: bool = False,
     ):
         """Makes the device, at rest."""
-        self.scenario, self._samples = device_scenario(scenario, period, clay)
+        self._scenario, self._samples = device_scenario(scenario, period, clay)
         self._hand = None if hand is None else _follower(hand, self.scenario)
         self._arm = DrivenArm(self.scenario, largest_force)
         driven = replace(self.scenario, controller=self._arm.controller)
         self._simulation = Simulation(driven)
 
     @property
+    def scenario(self) -> Scenario:
+        return self._scenario
+
+    @property
     def t(self) -> float:
-        """Simulated time [s]."""
         return self._simulation.t
 
     @property
     def sensed(self) -> Sensed:
-        """The newest measurement."""
         return self._arm.sensed
 
     @property
     def force(self) -> Pair:
-        """The force that acts on the handle [N]."""
         return self._arm.force
 
     @property
     def torques(self) -> Pair:
-        """Torques that act on the joints in addition to that force [N.m]."""
         return self._arm.asked.torques
 
     @property
     def ended(self) -> str:
-        """Why the device stopped; "" while it runs."""
         outcome = self._simulation.outcome
         return "" if outcome is None else str(outcome)
 
     def drive(self, drive: Drive) -> Pair:
-        """Changes what the motors do from the next control sample on."""
         return self._arm.drive(drive)
 
     def advance(self, samples: int | None = None) -> None:
-        """Advances the simulation."""
         steps = round(float(self.scenario.Ts or self.scenario.dt) / self.scenario.dt)
         n = steps * (self._samples if samples is None else samples)
         force = None if self._hand is None else self._hand(self.t)
         self._simulation.advance(n, force=force)
 
     def record(self) -> Record:
-        """Stops the device and returns the record so far."""
-        return replace_scenario(self._simulation.record(), self.scenario)
+        """Stops the device and returns the record so far, without the law of its motors."""
+        return replace(self._simulation.record(), scenario=self.scenario)
 
 
 def ended_as_planned(record: Record) -> Record:
@@ -184,11 +177,6 @@ def ended_as_planned(record: Record) -> Record:
     if record.outcome.code != "interrupted":
         return record
     return replace(record, outcome=replace(record.outcome, code="time limit"))
-
-
-def replace_scenario(record: Record, scenario: Scenario) -> Record:
-    """A record whose scenario does not contain the law that the client replaces."""
-    return replace(record, scenario=scenario)
 
 
 def device_scenario(scenario: Scenario, period: float | None, clay: bool) -> tuple[Scenario, int]:

@@ -1,9 +1,9 @@
-"""The motors and sensors of a simulated device, commanded by a client."""
+"""A device as a service sees it, and the motors and sensors of a simulated one."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from ..errors import number
 from ..formulas.arm import handle_velocity, jacobian, joint_torques
@@ -17,49 +17,76 @@ NOWHERE: Pair = (0.0, 0.0)
 
 
 class Sensed(NamedTuple):
-    """Measurements of the device at a control sample.
+    """Measurements of the device at a control sample."""
 
-    Attributes:
-        t: time of the sample [s].
-        position: position of the handle [m].
-        velocity: velocity of the handle [m/s].
-        angles: joint angles [rad].
-        rates: joint rates [rad/s].
-    """
-
-    t: float
-    position: Pair
-    velocity: Pair
-    angles: Pair = NOWHERE
-    rates: Pair = NOWHERE
+    t: float  # [s]
+    position: Pair  # [m] of the handle
+    velocity: Pair  # [m/s] of the handle
+    angles: Pair = NOWHERE  # [rad] of the joints
+    rates: Pair = NOWHERE  # [rad/s] of the joints
 
 
 class Drive(NamedTuple):
-    """Command to the motors, in the plane of the arm.
+    """Command to the motors, in the plane of the arm."""
 
-    Attributes:
-        force: force on the handle [N].
-        target: position at which to hold the handle [m]; None for no target.
-        torques: additional joint torques [N.m].
-    """
-
-    force: Pair = NOWHERE
-    target: Pair | None = None
-    torques: Pair = NOWHERE
+    force: Pair = NOWHERE  # [N] on the handle
+    target: Pair | None = None  # [m] at which to hold the handle
+    torques: Pair = NOWHERE  # [N.m] on the joints, in addition
 
 
 LIMP = Drive()
 
 
+class Device(Protocol):
+    """The device of a service: a `SimulatedDevice`, or the arm of a session with a viewer."""
+
+    paced: bool  # whether anything but the clock of the service advances the device
+
+    @property
+    def t(self) -> float:
+        """Simulated time [s]."""
+        ...
+
+    @property
+    def sensed(self) -> Sensed:
+        """The newest measurement."""
+        ...
+
+    @property
+    def force(self) -> Pair:
+        """The force that acts on the handle [N]."""
+        ...
+
+    @property
+    def torques(self) -> Pair:
+        """Torques that act on the joints in addition to that force [N.m]."""
+        ...
+
+    @property
+    def ended(self) -> str:
+        """Why the device stopped; "" while it runs."""
+        ...
+
+    @property
+    def scenario(self) -> Scenario:
+        """The simulated scenario."""
+        ...
+
+    def drive(self, drive: Drive) -> Pair:
+        """Changes what the motors do from the next control sample on."""
+        ...
+
+    def advance(self, samples: int | None = None) -> None:
+        """Advances the simulation."""
+
+
 class DrivenArm:
     """Motors that apply a force, hold a position, or apply torques, held for a control sample.
 
-    Attributes:
-        largest_force: limit on the sum of the force and the pull to the target [N]. Joint torques
-            are limited to those of such a force on the stretched arm.
-        sensed: the newest measurement that is finite and within the bounds of messages.
-        asked: command to the motors, its torques within their limit.
-        force: force on the handle from the newest sample on [N].
+    `largest_force` [N] limits the sum of the force and the pull to the target; joint torques are
+    limited to those of such a force on the stretched arm. `sensed` is the newest measurement that
+    is finite and within the bounds of messages, `asked` the command with its torques limited,
+    `force` [N] acts on the handle from the newest sample on.
     """
 
     def __init__(self, scenario: Scenario, largest_force: float = LARGEST_FORCE):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +11,9 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..columns import Sheet, unreadable
-from ..files import atomic
-from .rows import MOST_ROWS, Rows
+from .rows import MOST_ROWS, Rows, write_table
 
+FILE = "exchanges.csv"  # stored with the record of a session
 COLUMNS = (
     "received_s",
     "began_s",
@@ -33,25 +31,15 @@ COLUMNS = (
 
 
 class Exchange(NamedTuple):
-    """A message and its answer.
+    """A message and its answer."""
 
-    Attributes:
-        received: when the message came, on the computer's clock [s].
-        began: simulated time from which its force acted [s].
-        sampled: simulated time at which the answered state was measured [s].
-        position: answered position of the handle in the plane of the arm [m].
-        velocity: answered velocity of the handle [m/s].
-        asked: force that the client requested [N]: in the plane of the arm, and normal to it.
-        applied: force of all clients on the handle, in the plane of the arm, after the limit [N].
-    """
-
-    received: float
-    began: float
-    sampled: float
-    position: tuple[float, float]
-    velocity: tuple[float, float]
-    asked: tuple[float, float, float]
-    applied: tuple[float, float]
+    received: float  # [s] when the message came, on the computer's clock
+    began: float  # [s] simulated time from which its force acted
+    sampled: float  # [s] simulated time at which the answered state was measured
+    position: tuple[float, float]  # [m] of the handle in the plane of the arm, as answered
+    velocity: tuple[float, float]  # [m/s] of the handle, as answered
+    asked: tuple[float, float, float]  # [N] by this client: in that plane, and normal to it
+    applied: tuple[float, float]  # [N] of all clients on the handle, after the limit
 
 
 @named
@@ -111,13 +99,7 @@ class Exchanges:
         Raises:
             OSError: the file cannot be written.
         """
-        text = io.StringIO()
-        rows = csv.writer(text, lineterminator="\n")
-        rows.writerow(COLUMNS)
-        rows.writerows([[repr(float(x)) for x in row] for row in self.table()])
-        with atomic(Path(path)) as f:
-            f.write(text.getvalue().encode())
-        return Path(path)
+        return write_table(path, COLUMNS, self.table())
 
     @classmethod
     @checked
@@ -141,14 +123,10 @@ class Exchanges:
         return cls.of_table(np.column_stack([columns[name] for name in COLUMNS]))
 
 
-FILE = "exchanges.csv"  # stored with the record of a session
-
-
 class ExchangeLog:
     """Keeps the newest exchanges."""
 
     def __init__(self, most: int = MOST_ROWS):
-        """Makes an empty log."""
         self._rows = Rows(len(COLUMNS), most)
 
     @property
@@ -157,10 +135,8 @@ class ExchangeLog:
         return self._rows.count
 
     def add(self, row: Exchange) -> None:
-        """Adds an exchange."""
         times, (position, velocity, asked, applied) = row[:3], row[3:]
         self._rows.add((*times, *position, *velocity, *asked, *applied))
 
     def exchanges(self) -> Exchanges:
-        """The exchanges that are kept."""
         return Exchanges.of_table(self._rows.table())

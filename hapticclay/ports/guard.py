@@ -26,16 +26,11 @@ class Guard:
     A foreign page can make a browser send requests to this server, under our name or under its own
     (DNS rebinding), but it cannot forge the Host and Origin headers. Programs send no Origin. Where
     other machines can connect, a token is required as well.
-
-    Attributes:
-        host: address that the server listens on.
-        token: token required in each request; "" for none.
-        origins: pages of other servers that are admitted, as http://localhost:8000.
     """
 
-    host: str
-    token: str
-    origins: tuple[str, ...] = ()
+    host: str  # address that the server listens on
+    token: str  # "" for none
+    origins: tuple[str, ...] = ()  # admitted pages of other servers, as http://localhost:8000
 
     def refusal(self, connection: Any, request: Any) -> Any:
         """Judges a request."""
@@ -87,10 +82,10 @@ def origins_of(given: object) -> tuple[str, ...]:
         try:
             parts = urlsplit(origin)
             plain = parts._replace(scheme="", netloc="").geturl() in ("", "/") and parts.port != 0
-            fine = parts.scheme in ("http", "https") and bool(parts.hostname) and plain
+            is_page = parts.scheme in ("http", "https") and bool(parts.hostname) and plain
         except (ValueError, AttributeError, TypeError):
-            fine = False
-        if not fine:
+            is_page = False
+        if not is_page:
             bound = "must be scheme, host and port of a page, as http://localhost:8000"
             raise ParameterError("origins", origin, bound)
     return tuple(origin.lower().rstrip("/") for origin in given)

@@ -10,30 +10,21 @@ from . import inverse
 
 
 class Arrival(NamedTuple):
-    """A frame that a device sent.
-
-    Attributes:
-        frame: the frame.
-        received: when it came, on the computer's clock [s].
-    """
+    """A frame that a device sent."""
 
     frame: inverse.Frame
-    received: float
+    received: float  # [s] on the computer's clock
 
 
 class Inbox:
     """Reads a connection in a thread of its own and keeps only the newest frame.
 
     Frames that are not taken do not queue up, in memory or in the connection, so the one that is
-    taken is as new as the device allows.
-
-    Attributes:
-        skipped: frames that were not taken: a newer one came, or they did not hold the device.
-        ended: why the connection ended; "" while it is open.
+    taken is as new as the device allows. `skipped` counts the others, with those that did not hold
+    the device; `ended` is why the connection ended, "" while it is open.
     """
 
     def __init__(self, socket: Any, broken: tuple[type[BaseException], ...]):
-        """Starts to read."""
         self.skipped, self.ended = 0, ""
         self._socket, self._broken = socket, broken
         self._changed = threading.Condition()

@@ -53,64 +53,39 @@ UNTURNED = {"w": 1.0, "x": 0.0, "y": 0.0, "z": 0.0}
 
 @dataclass(frozen=True)
 class Force:
-    """A force that a client commands.
-
-    Attributes:
-        device_id: of the device.
-        vector: the force [N].
-    """
+    """A force that a client commands."""
 
     device_id: str
-    vector: Vector
+    vector: Vector  # [N]
 
 
 @dataclass(frozen=True)
 class Target:
-    """A position at which a client wants the cursor held.
-
-    Attributes:
-        device_id: of the device.
-        vector: the position [m].
-    """
+    """A position at which a client wants the cursor held."""
 
     device_id: str
-    vector: Vector
+    vector: Vector  # [m]
 
 
 @dataclass(frozen=True)
 class Torques:
-    """Torques that a client commands.
-
-    Attributes:
-        device_id: of the device.
-        torques: torques on the joints a0 and a1 [N.m].
-    """
+    """Torques that a client commands."""
 
     device_id: str
-    torques: Pair
+    torques: Pair  # [N.m] on the joints a0 and a1
 
 
 @dataclass(frozen=True)
 class Message:
-    """A message from a client.
+    """A message from a client; commands are in the order of their entries."""
 
-    Attributes:
-        forces: forces in the order of their entries; forces for the same device add up.
-        devices: ids of the devices that the message names.
-        full: whether the answer must include the configuration.
-        profile: name that the client gives its session; "" for none.
-        notices: what was dropped, and why.
-        targets: targets in the order of their entries; the last one for a device counts.
-        torques: torques in the order of their entries; torques for the same device add up.
-    """
-
-    forces: tuple[Force, ...] = ()
-    devices: tuple[str, ...] = ()
-    full: bool = False
-    profile: str = ""
-    notices: tuple[str, ...] = ()
-    targets: tuple[Target, ...] = ()
-    torques: tuple[Torques, ...] = ()
+    forces: tuple[Force, ...] = ()  # those for the same device add up
+    devices: tuple[str, ...] = ()  # ids that the message names
+    full: bool = False  # whether the answer must include the configuration
+    profile: str = ""  # name that the client gives its session
+    notices: tuple[str, ...] = ()  # what was dropped, and why
+    targets: tuple[Target, ...] = ()  # the last one for a device counts
+    torques: tuple[Torques, ...] = ()  # those for the same device add up
 
     def command(self, device_id: str) -> Command:
         """The command in the message for a device."""
@@ -124,46 +99,28 @@ class Message:
 
 @dataclass(frozen=True)
 class Cursor:
-    """State of the handle of an Inverse3.
+    """State of the handle of an Inverse3."""
 
-    Attributes:
-        position: position [m].
-        velocity: velocity [m/s].
-        force: force that the device applies [N].
-        mode: what a client drives: "force", "position", "torque", or "idle" for nothing.
-        angles: angles of the joints a0 and a1 [deg].
-        rates: rates of these joints [deg/s].
-        torques: torques on these joints [N.m].
-    """
-
-    position: Vector
-    velocity: Vector = NOTHING
-    force: Vector = NOTHING
-    mode: str = "idle"
-    angles: Pair = (0.0, 0.0)
-    rates: Pair = (0.0, 0.0)
-    torques: Pair = (0.0, 0.0)
+    position: Vector  # [m]
+    velocity: Vector = NOTHING  # [m/s]
+    force: Vector = NOTHING  # [N] that the device applies
+    mode: str = "idle"  # what a client drives: "force", "position", "torque" or "idle"
+    angles: Pair = (0.0, 0.0)  # [deg] of the joints a0 and a1
+    rates: Pair = (0.0, 0.0)  # [deg/s] of these joints
+    torques: Pair = (0.0, 0.0)  # [N.m] on these joints
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A state frame of the service: an Inverse3 and a wireless grip.
+    """A state frame of the service: an Inverse3 and a wireless grip."""
 
-    Attributes:
-        device_id: id of the Inverse3, hexadecimal.
-        cursor: state of its handle.
-        grip_id: id of the grip, hexadecimal.
-        buttons: names of the pressed buttons, from "a", "b", "c", "home".
-        session_id: id of the client's session.
-        full: whether the frame includes the configuration.
-    """
-
-    device_id: str
+    device_id: str  # hexadecimal
     cursor: Cursor
-    grip_id: str = ""
+    grip_id: str = ""  # hexadecimal
+    # names of the pressed buttons, from "a", "b", "c", "home"
     buttons: frozenset[str] = field(default_factory=frozenset)
     session_id: int = 1
-    full: bool = False
+    full: bool = False  # whether it includes the configuration
 
 
 # ---- what clients send ---------------------------------------------------------------------------
@@ -347,7 +304,6 @@ GRIP_STATUS = {"connected": True, "awake": True, "ready": True}
 
 
 def frame_text(frame: Frame) -> str:
-    """The text of a frame of the service."""
     return json.dumps(frame_data(frame), allow_nan=False)
 
 

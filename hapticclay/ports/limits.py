@@ -57,15 +57,11 @@ def allowed(force: Vector, largest: float, grown: float) -> Vector:
 
 
 class ForceLimiter:
-    """Applies the limits to the forces for a device, one after the other.
-
-    Attributes:
-        withheld: forces that were not sent because the position was frozen.
-    """
+    """Applies the limits to the forces for a device, one after the other."""
 
     def __init__(self, limits: Limits):
         """Starts with the ramp, before any force."""
-        self._limits, self.withheld = limits, 0
+        self._limits, self.withheld = limits, 0  # forces not sent: the position was frozen
         self._ramp_from = 0.0  # [s]
         self._sent, self._sent_at = NOTHING, -limits.Ts  # the newest force, and when [s]
         self._position: Vector | None = None  # the newest
@@ -73,7 +69,6 @@ class ForceLimiter:
         self._is_frozen = False
 
     def restart(self, t: float) -> None:
-        """Restarts the ramp."""
         self._ramp_from, self._pushed_at = t, None
 
     def see(self, position: Vector, t: float) -> None:
@@ -92,7 +87,7 @@ class ForceLimiter:
         if not shortening(force, limits.largest_force):
             self._pushed_at = None
             self._thaw(t)
-        self._sent = self._slewed(self._watched(asked, t), passed)
+        self._sent = self._slewed(self._unless_frozen(asked, t), passed)
         return self._sent
 
     def _grown(self, t: float) -> float:
@@ -100,7 +95,7 @@ class ForceLimiter:
         ramp, passed = self._limits.ramp, t - self._ramp_from
         return 1.0 if passed >= ramp else max(0.0, passed / ramp)
 
-    def _watched(self, asked: Vector, t: float) -> Vector:
+    def _unless_frozen(self, asked: Vector, t: float) -> Vector:
         """The force; zero if forces have acted for too long at a position that does not change."""
         if asked == NOTHING or self._limits.frozen is None:
             return asked

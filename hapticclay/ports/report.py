@@ -33,7 +33,7 @@ FORCE_LEAST = 1e-9  # [N] smaller forces count as zero
 EXPLAINED = 0.9  # least share of the squared force that a wall must explain
 KEPT_UP = 0.95  # of the time is simulated where the computer is not late
 DOUBT = 0.2  # largest relative standard error of K
-UNTOLD = (  # without a wall
+UNDETERMINED = (  # without a wall
     "delay",
     "longest_delay",
     "K",
@@ -47,32 +47,18 @@ LINE = 25  # number of values of B on the theoretical limit line
 
 
 class WallFit(NamedTuple):
-    """A wall that explains a client's forces.
+    """A wall that explains a client's forces."""
 
-    Attributes:
-        K: stiffness [N/m].
-        B: damping [N.s/m].
-        K_error: standard error of K [N/m].
-        explained: share of the squared force that the wall explains.
-        back: age, in answers, of the state that a force was computed from, 1 for the
-            newest.
-        oldest: the largest age that explains the forces as well.
-        tried: the largest age that was tried.
-        normal: direction of the force.
-        place: mean position in contact [m].
-        contact: number of messages used in the fit.
-    """
-
-    K: float
-    B: float
-    K_error: float
-    explained: float
-    back: int
-    oldest: int
-    tried: int
-    normal: tuple[float, float]
-    place: tuple[float, float]
-    contact: int
+    K: float  # [N/m]
+    B: float  # [N.s/m]
+    K_error: float  # [N/m] standard error
+    explained: float  # share of the squared force that the wall explains
+    back: int  # age, in answers, of the state that a force was computed from: 1 for the newest
+    oldest: int  # the largest age that explains the forces as well
+    tried: int  # the largest age that was tried
+    normal: tuple[float, float]  # direction of the force
+    place: tuple[float, float]  # [m] mean position in contact
+    contact: int  # number of messages used in the fit
 
 
 @named
@@ -102,8 +88,7 @@ class LoopReport(Result):
         line_K: largest stable stiffness there [N/m]: the Z-width at this period, delay and hand.
         note: why K and B could not be estimated; "" if they were.
         longest_delay: longest delay that explains the forces as well [s]; inf where older answers
-            than those that were tried may; NaN
-            without a wall.
+            than those that were tried may; NaN without a wall.
     """
 
     drawn_by = "hapticclay.views.loop_plots:loop_plot"
@@ -183,11 +168,7 @@ class LoopReport(Result):
         return f"; {self.rate_needed:.4g} Hz would do"
 
     def text(self, form: str = "") -> str:
-        """The report, a quantity a line, and the headline.
-
-        Args:
-            form: as in `Result.text`.
-        """
+        """The report, a quantity a line, and the headline."""
         report = self.tables()["report"]
         values = [value for (value,) in report.values()]
         return f"{text_table({'loop': list(report), '': values}, form=form)}\n{self.headline()}"
@@ -197,12 +178,7 @@ class LoopReport(Result):
         return super().figures() if self.line_K else {}
 
     def write(self, folder: Path, asked: Mapping[str, Any] | None = None) -> None:
-        """Writes loop.json with exact values, as `save` does.
-
-        Args:
-            folder: where to.
-            asked: left out of the file.
-        """
+        """Writes loop.json with exact values, as `save` does; `asked` is left out of it."""
         self.save(folder / "loop.json")
 
     def tables(self) -> Tables:
@@ -269,9 +245,9 @@ def loop_report(exchanges: Exchanges, scenario: Scenario) -> LoopReport:
     }
     if fit is None or period <= 0.0:
         note = why_no_period(exchanges) if period <= 0.0 else note
-        untold: dict[str, Any] = dict.fromkeys(UNTOLD, math.nan)
-        untold |= dict(contact=0, normal=(1.0, 0.0), line_B=(), line_K=())
-        return LoopReport(**common, **untold, note=note)
+        absent: dict[str, Any] = dict.fromkeys(UNDETERMINED, math.nan)
+        absent |= dict(contact=0, normal=(1.0, 0.0), line_B=(), line_K=())
+        return LoopReport(**common, **absent, note=note)
     delay = lag_behind(exchanges, fit.back)
     longest = math.inf if fit.oldest == fit.tried else lag_behind(exchanges, fit.oldest)
     handle = Handle.of(scenario, fit.place, fit.normal)

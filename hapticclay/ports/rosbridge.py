@@ -57,27 +57,17 @@ LONGEST_THROTTLE = 1e9  # [ms]
 
 @dataclass(frozen=True)
 class Operation:
-    """An operation from a client.
+    """An operation from a client."""
 
-    Attributes:
-        op: the operation; "" if it is unreadable.
-        id: id to repeat in the answer; None for none.
-        topic: its name, or that of a service.
-        type: type of the topic, without "msg"; "" for none.
-        msg: the ROS message, or the arguments of a service.
-        throttle: least time between two messages of a subscription [s].
-        compression: compression that a subscription requests.
-        error: why the operation cannot be used; "" if it can.
-    """
-
-    op: str = ""
-    id: str | int | None = None
-    topic: str = ""
-    type: str = ""
+    op: str = ""  # "" if it is unreadable
+    id: str | int | None = None  # repeated in the answer
+    topic: str = ""  # name of the topic, or of a service
+    type: str = ""  # that of the topic, without "msg"; "" for none
+    # the ROS message, or the arguments of a service
     msg: Mapping[str, Any] = field(default_factory=dict)
-    throttle: float = 0.0
-    compression: str = "none"
-    error: str = ""
+    throttle: float = 0.0  # [s] least time between two messages of a subscription
+    compression: str = "none"  # asked for by a subscription
+    error: str = ""  # why the operation cannot be used; "" if it can
 
 
 # ---- what clients send ---------------------------------------------------------------------------
@@ -165,18 +155,15 @@ def _command(kind: str, vector: Vector | None) -> Command:
 
 
 def publish_text(topic: str, msg: Mapping[str, Any]) -> str:
-    """A message on a topic."""
     return json.dumps({"op": "publish", "topic": topic, "msg": msg}, allow_nan=False)
 
 
 def status_text(level: str, text: str, to: Operation) -> str:
-    """A status message."""
     name = {} if to.id is None else {"id": to.id}
     return json.dumps({"op": "status", **name, "level": level, "msg": text})
 
 
 def response_text(to: Operation, values: Any, result: bool) -> str:
-    """The answer of a service."""
     name = {} if to.id is None else {"id": to.id}
     body = {"service": to.topic, "values": values, "result": result}
     return json.dumps({"op": "service_response", **name, **body}, allow_nan=False)

@@ -19,24 +19,17 @@ MOST_SUBSCRIPTIONS = 500  # subscriptions of a client, which differ in topic or 
 
 @dataclass
 class Subscriptions:
-    """Subscriptions of a client.
+    """Subscriptions of a client."""
 
-    Attributes:
-        topics: their kinds, by name.
-        throttles: least time between two messages [s], by topic and id of the subscription.
-        sent: simulated time of the newest state sent, by topic [s].
-        level: level of the status messages that the client wants.
-        buttons: buttons in the last message to the client; None for no message yet.
-    """
-
-    topics: dict[str, str] = field(default_factory=dict)
+    topics: dict[str, str] = field(default_factory=dict)  # their kinds, by name
+    # least time between two messages [s], by topic and id of the subscription
     throttles: dict[str, dict[str | int | None, float]] = field(default_factory=dict)
+    # simulated time of the newest state sent [s], by topic
     sent: dict[str, float] = field(default_factory=dict)
-    level: str = "error"
-    buttons: frozenset[str] | None = None
+    level: str = "error"  # least severe of the status messages that the client wants
+    buttons: frozenset[str] | None = None  # those in the last message; None before it
 
     def add(self, operation: Operation, kind: str) -> None:
-        """Adds a subscription."""
         self.topics[operation.topic] = kind
         self.throttles.setdefault(operation.topic, {})[operation.id] = operation.throttle
 
@@ -149,9 +142,9 @@ class RosbridgeProtocol:
             text = f"nobody listens to {x.topic}"
             return self._status(service, session, "warning", text, x)
         command, left_out = rosbridge.command_of(kind, x.msg)
-        told = self._status(service, session, "error", left_out, x) if left_out else []
+        statuses = self._status(service, session, "error", left_out, x) if left_out else []
         service.apply(session, command)
-        return [*told, *self.due(service, session)]
+        return [*statuses, *self.due(service, session)]
 
     def _call_service(self, service: Host, session: Session, x: Operation) -> list[str]:
         values = self._called(service, x)

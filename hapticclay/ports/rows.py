@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import collections
-from collections.abc import Sequence
+import csv
+import io
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 import numpy as np
+
+from ..files import atomic
 
 CHUNK = 4096  # rows per allocation
 MOST_ROWS = 1_000_000  # 17 minutes at 1 kHz
 
 
 class Rows:
-    """The newest rows of a table.
-
-    Attributes:
-        count: number of rows so far, kept or not.
-    """
+    """The newest rows of a table."""
 
     def __init__(self, width: int, most: int = MOST_ROWS):
-        """Makes an empty table."""
-        self.count, self._width, self._most = 0, width, most
+        self.count, self._width, self._most = 0, width, most  # rows so far, kept or not
         chunks = -(-most // CHUNK) + 1
         self._chunks: collections.deque[np.ndarray] = collections.deque(maxlen=chunks)
 
@@ -28,7 +29,6 @@ class Rows:
         return min(self.count, self._most)
 
     def add(self, row: Sequence[float]) -> None:
-        """Adds a row."""
         at = self.count % CHUNK
         if not at:
             self._chunks.append(np.empty((CHUNK, self._width)))
@@ -42,3 +42,14 @@ class Rows:
         last = (self.count - 1) % CHUNK + 1
         parts = [*list(self._chunks)[:-1], self._chunks[-1][:last]]
         return np.concatenate(parts)[-self._most :]
+
+
+def write_table(path: str | os.PathLike[str], names: Iterable[str], table: np.ndarray) -> Path:
+    """Writes a table with exact values as a CSV file, whole or not at all."""
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(names)
+    rows.writerows([[repr(x) for x in row] for row in table.tolist()])
+    with atomic(Path(path)) as f:
+        f.write(text.getvalue().encode())
+    return Path(path)

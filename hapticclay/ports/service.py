@@ -17,11 +17,11 @@ from typing import Any
 
 from ..display import one_line
 from .commands import IDLE, NOTHING, Command, Vector
-from .driven_arm import LIMP, Drive
+from .driven_arm import LIMP, Device, Drive
 from .exchanges import Exchange, ExchangeLog
 from .inverse import Cursor
 from .planes import normal_component, to_plane, to_space
-from .sessions import PLAIN, Device, Inverse3, Session, WireProtocol
+from .sessions import PLAIN, Inverse3, Session, WireProtocol
 
 REST: Vector = (0.08, -0.15, 0.14)  # [m] cursor of an Inverse3 at rest: handle at p = 0
 # [s] without a message after which a client's command no longer acts: with the thread's turn, 50 ms
@@ -35,17 +35,7 @@ LOG = logging.getLogger("hapticclay.ports")
 
 
 class Service:
-    """Clients, their commands, and the clock.
-
-    Attributes:
-        device: the driven device.
-        clock: "tick" or "wall".
-        inverse3: identity of the simulated device.
-        protocol: protocol of the clients.
-        notices: what was dropped from messages, and how often.
-        skipped: control samples that the wall clock skipped because the computer was late.
-        samples: control samples that the wall clock made.
-    """
+    """Clients, their commands, and the clock: "tick" or "wall"."""
 
     def __init__(
         self,
@@ -55,10 +45,11 @@ class Service:
         inverse3: Inverse3 = PLAIN,
     ):
         """Makes the service; `start` starts the wall clock."""
-        self.device, self.clock, self.notices = device, clock, Counter[str]()
+        self.device, self.clock = device, clock
+        self.notices = Counter[str]()  # what was dropped from messages, and how often
         self.inverse3, self._plane = inverse3, inverse3.plane
         self.protocol = protocol_of(inverse3.protocol)
-        self.skipped = self.samples = 0
+        self.skipped = self.samples = 0  # control samples by the wall clock: late, and made
         self._sessions: dict[int, Session] = {}
         self._logs: dict[int, ExchangeLog] = {}
         self._count = 0  # of clients so far
@@ -68,7 +59,6 @@ class Service:
     # ---- clients
 
     def connect(self) -> tuple[int, list[str]]:
-        """Adds a client."""
         with self._lock:
             self._count += 1
             number = self._count
@@ -87,7 +77,6 @@ class Service:
             self.device.drive(LIMP if self.clock == "tick" else self._drive())
 
     def answer(self, number: int, data: str | bytes) -> list[str]:
-        """The answer to a message."""
         with self._lock:
             return self.protocol.answer(self, self._sessions[number], data)
 
@@ -192,7 +181,6 @@ class Service:
             self._thread.start()
 
     def stop(self) -> None:
-        """Stops the clock and the device."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join()
@@ -222,7 +210,6 @@ class Service:
 
 
 def protocol_of(protocol: str) -> WireProtocol:
-    """The protocol with a given name."""
     if protocol == "rosbridge":
         from .rosbridge_service import RosbridgeProtocol
 

@@ -1,4 +1,4 @@
-"""Types shared by a service and its protocols: the device, its identity, and its clients."""
+"""Types shared by a service and its protocols: the identity of the device, and its clients."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from typing import Annotated, Any, Literal, Protocol
 
 from ..arguments import part
 from ..errors import Bound, ParameterError
-from ..scene.scenario import Scenario
 from .buttons import ButtonScript
-from .commands import IDLE, Command, Pair
-from .driven_arm import LARGEST_FORCE, Drive, Sensed
+from .commands import IDLE, Command
+from .driven_arm import LARGEST_FORCE, Device
 from .exchanges import ExchangeLog
 from .guard import origins_of
 from .inverse import Cursor
@@ -55,85 +54,23 @@ class Inverse3:
 PLAIN = Inverse3()
 
 
-class Device(Protocol):
-    """The device of a service: a `SimulatedDevice`, or the arm of a session with a viewer.
-
-    Attributes:
-        paced: whether anything but the clock of the service advances the device.
-    """
-
-    paced: bool
-
-    @property
-    def t(self) -> float:
-        """Simulated time [s]."""
-        ...
-
-    @property
-    def sensed(self) -> Sensed:
-        """The newest measurement."""
-        ...
-
-    @property
-    def force(self) -> Pair:
-        """The force that acts on the handle [N]."""
-        ...
-
-    @property
-    def torques(self) -> Pair:
-        """Torques that act on the joints in addition to that force [N.m]."""
-        ...
-
-    @property
-    def ended(self) -> str:
-        """Why the device stopped; "" while it runs."""
-        ...
-
-    @property
-    def scenario(self) -> Scenario:
-        """The simulated scenario."""
-        ...
-
-    def drive(self, drive: Drive) -> Pair:
-        """Changes what the motors do from the next control sample on."""
-        ...
-
-    def advance(self, samples: int | None = None) -> None:
-        """Advances the simulation."""
-
-
 @dataclass
 class Session:
-    """A connected client.
+    """A connected client."""
 
-    Attributes:
-        number: 1 for the first client, and so on.
-        command: newest command.
-        heard: when the last command arrived [s].
-        log: exchanges.
-        profile: name that the client gave itself.
-        memory: state that the protocol keeps.
-    """
-
-    number: int
-    command: Command = IDLE
-    heard: float = -math.inf
+    number: int  # 1 for the first client, and so on
+    command: Command = IDLE  # the newest
+    heard: float = -math.inf  # [s] when the last command arrived
     log: ExchangeLog = field(default_factory=ExchangeLog)
-    profile: str = ""
-    memory: Any = None
+    profile: str = ""  # name that the client gave itself
+    memory: Any = None  # state that the protocol keeps
 
 
 class Host(Protocol):
-    """The service as a protocol sees it.
-
-    Attributes:
-        device: the driven device.
-        clock: "tick" or "wall".
-        inverse3: identity of the simulated device.
-    """
+    """The service as a protocol sees it."""
 
     device: Device
-    clock: str
+    clock: str  # "tick" or "wall"
     inverse3: Inverse3
 
     @property
@@ -153,15 +90,10 @@ class Host(Protocol):
 
 
 class WireProtocol(Protocol):
-    """A protocol: reads messages from a client and writes messages to it.
-
-    Attributes:
-        name: name of the protocol.
-        pushes: whether the service pushes states to clients.
-    """
+    """A protocol: reads messages from a client and writes messages to it."""
 
     name: str
-    pushes: bool
+    pushes: bool  # whether the service pushes states to clients
 
     def greet(self, service: Host, session: Session) -> list[str]:
         """The first message to a client."""

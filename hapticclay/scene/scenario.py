@@ -140,7 +140,7 @@ class Scenario:
                 )
                 raise ParameterError("Ts", self.Ts, bound)
         self._check_servo()
-        self._check_interface()
+        self._check_hardware()
         self._check_rotated_axes()
         self._check_soft_clay()
         self._check_reach("start", self.start)
@@ -260,7 +260,7 @@ class Scenario:
             )
             raise ParameterError("dt", self.dt, bound)
 
-    def _check_interface(self) -> None:
+    def _check_hardware(self) -> None:
         given, Ts = self.hardware, self.Ts or self.dt
         if given is None:
             return

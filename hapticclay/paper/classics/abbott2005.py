@@ -10,12 +10,12 @@ from ...scene.virtual_wall import Device, VirtualWall
 from ...studies.chart import Chart, curve
 from ...studies.port_energy import passivity_limit, taken_energy, zigzag
 from ..ledger import Row, row
-from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Tell, holds
+from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Progress, holds
 
 MASS, DAMPER, FRICTION, TS = 0.1, 5.0, 0.05, 1e-3  # kg, N.s/m, N, s
 QUANTA = (4e-6, 1e-5, 2e-5, 4e-5)  # [m]
 QUICK_QUANTA = (4e-6, 2e-5)
-FOUND = 0.01  # share: friction along the large path, damping along the small one
+LIMIT_ERROR = 0.01  # share: friction along the large path, damping along the small one
 ENERGY = 0.02  # share: friction that reverses in one of 32 steps, relative to the remainder
 LARGE, SMALL_SHARE = 2e-3, 0.01  # [m] and of the quantum: amplitudes of the two zigzags
 
@@ -37,9 +37,9 @@ def _energies(wall: VirtualWall) -> tuple[float, float]:
     return taken_energy(wall, large), taken_energy(wall, small)
 
 
-def _modes(tell: Tell) -> list[Row]:
+def _modes(progress: Progress) -> list[Row]:
     """The two modes; each can be active while the other is passive."""
-    tell("the two modes")
+    progress("the two modes")
     damped, rubbed = _wall(4e-6, 1.2 * 2.0 * DAMPER / TS), _wall(4e-5, 1.2 * 2.0 * FRICTION / 4e-5)
     rows = []
     for wall, name, active in (
@@ -72,30 +72,29 @@ def _modes(tell: Tell) -> list[Row]:
     return rows
 
 
-def make(quick: bool, tell: Tell) -> Found:
-    """Makes the runs."""
+def make(quick: bool, progress: Progress) -> Found:
     rows, found = [], []
     for quantum in QUICK_QUANTA if quick else QUANTA:
-        tell(f"largest passive K: Delta = {1e6 * quantum:g} um")
+        progress(f"largest passive K: Delta = {1e6 * quantum:g} um")
         found.append(passivity_limit(_wall(quantum)))
         rows.append(
             row(
                 f"largest passive K, Delta = {1e6 * quantum:g} um | main result | "
                 "min(2 b/Ts, 2 fc/Delta) | N/m",
-                (bound(quantum), found[-1], FOUND),
+                (bound(quantum), found[-1], LIMIT_ERROR),
                 FORMULA,
                 f"b = {DAMPER:g} N.s/m, fc = {FRICTION:g} N, Ts = {1e3 * TS:g} ms; searched for "
                 "by runs along a large and a small zigzag of a hand",
             )
         )
-    rows += _modes(tell)
+    rows += _modes(progress)
     if not quick:
-        tell("without an encoder")
+        progress("without an encoder")
         exact = passivity_limit(replace(_wall(1e-5), device=Device(MASS, DAMPER)))
         rows.append(
             row(
                 "largest passive K without encoder and friction | main result | 2 b/Ts | N/m",
-                (2.0 * DAMPER / TS, exact, FOUND),
+                (2.0 * DAMPER / TS, exact, LIMIT_ERROR),
                 FORMULA,
                 "the limit of Colgate and Schenkel",
             )

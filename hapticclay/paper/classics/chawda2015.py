@@ -14,7 +14,7 @@ from ...studies.port_energy import passivity_limit
 from ...studies.wall_runs import Press, stiffest, unshown
 from ...theory import wall_limits
 from ..ledger import Row, row
-from .classic import BESIDE, QUOTED, Classic, Found, Tell, holds
+from .classic import BESIDE, QUOTED, Classic, Found, Progress, holds
 
 MASS, DAMPER, FRICTION, TS = 0.1, 0.5, 0.05, 1e-3  # kg, N.s/m, N, s
 B = 10.0  # [N.s/m] damping at which K is compared
@@ -35,7 +35,7 @@ PRESSES = (  # a limit cycle is reached after some pushes and not after others
 AREA_B = (0.0, 2.0, 5.0, B, 20.0, 30.0)  # [N.s/m]
 AREA_CUTOFFS: Cutoffs = (10.0, 20.0, 30.0, 50.0, 100.0, None)
 GROWTH = 3e-3  # share: bisection of the growth rate, and steps of the engine
-FOUND = 5e-3  # share: test paths are not infinitely slow
+LIMIT_ERROR = 5e-3  # share: test paths are not infinitely slow
 MARGIN = 1.05  # ratio that separates an optimum from the irregular limit of a rough device
 
 
@@ -65,9 +65,9 @@ def _exact(cutoff: float | None) -> float:
     return wall_limits.stiffness_band(replace(SMOOTH, velocity_filter=cutoff))[1]
 
 
-def _lag(cutoffs: Cutoffs, tell: Tell) -> tuple[list[Row], list[float]]:
+def _lag(cutoffs: Cutoffs, progress: Progress) -> tuple[list[Row], list[float]]:
     """Phase lag alone: runs with an exact position, beside the eigenvalues."""
-    tell("cut-offs, exact position")
+    progress("cut-offs, exact position")
     walls = [replace(SMOOTH, velocity_filter=f) for f in cutoffs]
     found = [stiffest([w], [AROUND], SOFTEST, PRESSES[0], unshown)[0] for w in walls]
     rows = [
@@ -93,12 +93,12 @@ def _lag(cutoffs: Cutoffs, tell: Tell) -> tuple[list[Row], list[float]]:
 
 
 def _noise(
-    cutoffs: Cutoffs, quanta: Sequence[float], tell: Tell
+    cutoffs: Cutoffs, quanta: Sequence[float], progress: Progress
 ) -> tuple[list[Row], dict[float, list[float]]]:
     """Phase lag and quantization: largest K over the cut-off, for each encoder."""
     found = {}
     for quantum in quanta:
-        tell(f"cut-offs, encoder of {1e6 * quantum:g} um and friction")
+        progress(f"cut-offs, encoder of {1e6 * quantum:g} um and friction")
         found[quantum] = [_resting(_rough(quantum), f, (B,))[0] for f in cutoffs]
     K = found[MIDDLE]
     rows = [
@@ -127,9 +127,9 @@ def _noise(
     return rows, found
 
 
-def _area(tell: Tell) -> Row:
+def _area(progress: Progress) -> Row:
     """Area of the Z-width over the cut-off."""
-    tell("areas of the Z-width")
+    progress("areas of the Z-width")
     wall = _rough(MIDDLE)
     areas = [float(np.trapezoid(_resting(wall, f, AREA_B), AREA_B)) for f in AREA_CUTOFFS]
     return row(
@@ -149,24 +149,24 @@ def _passive(cutoff: float) -> Row:
     return row(
         f"largest passive K, B = {wall.B:g} N.s/m behind a filter of {cutoff:g} Hz | none | "
         "criterion of Colgate and Schenkel 1997, with the filter in H(z) | N/m",
-        (wall_limits.colgate_schenkel_limit(wall), passivity_limit(wall, 8), FOUND),
+        (wall_limits.colgate_schenkel_limit(wall), passivity_limit(wall, 8), LIMIT_ERROR),
         BESIDE,
         "beside energy of runs; the criterion is that of the page colgate1997",
     )
 
 
 def _chart(cutoffs: Cutoffs, smooth: list[float], rough: dict[float, list[float]]) -> Chart:
-    fine = np.geomspace(cutoffs[0] or NYQUIST, NYQUIST, 61)
+    grid = np.geomspace(cutoffs[0] or NYQUIST, NYQUIST, 61)
     shown = [NYQUIST if f is None else f for f in cutoffs]
     curves = [
-        curve("eigenvalues, exact position", fine, [_exact(float(f)) for f in fine]),
+        curve("eigenvalues, exact position", grid, [_exact(float(f)) for f in grid]),
         curve("runs, exact position", shown, smooth, "marks"),
     ]
     for quantum, K in rough.items():
         if quantum < MIDDLE:
             continue  # its marks lie on those of an exact position
         name, most = f"{1e6 * quantum:g} um", 2.0 * FRICTION / quantum
-        curves.append(curve(f"2 fc/Delta, {name}", fine[[0, -1]], [most, most], "dashed"))
+        curves.append(curve(f"2 fc/Delta, {name}", grid[[0, -1]], [most, most], "dashed"))
         curves.append(curve(f"runs, {name}", shown, K, "marks"))
     return Chart(
         "cutoff",
@@ -181,16 +181,15 @@ def _chart(cutoffs: Cutoffs, smooth: list[float], rough: dict[float, list[float]
     )
 
 
-def make(quick: bool, tell: Tell) -> Found:
-    """Makes the runs."""
+def make(quick: bool, progress: Progress) -> Found:
     cutoffs, quanta = (QUICK_CUTOFFS, (MIDDLE,)) if quick else (CUTOFFS, QUANTA)
-    lag, smooth = _lag(cutoffs, tell)
-    noise, rough = _noise(cutoffs, quanta, tell)
+    lag, smooth = _lag(cutoffs, progress)
+    noise, rough = _noise(cutoffs, quanta, progress)
     rows = [*lag, *noise]
     if not quick:
-        rows.append(_area(tell))
+        rows.append(_area(progress))
     for cutoff in (50.0,) if quick else (20.0, 50.0, 200.0):
-        tell(f"passive K behind a filter of {cutoff:g} Hz")
+        progress(f"passive K behind a filter of {cutoff:g} Hz")
         rows.append(_passive(cutoff))
     return Found(tuple(rows), (_chart(cutoffs, smooth, rough),))
 

@@ -14,17 +14,12 @@ CLASSIC_STATUSES = {
     FORMULA: "a formula of the source, and runs that search for the same limit without it",
     BESIDE: "what the source does not state, found on the way",
 }
-Tell = Callable[[str], None]
+Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Found:
-    """Results of the runs of a classic.
-
-    Attributes:
-        rows: the table of claims.
-        charts: its figures.
-    """
+    """Results of the runs of a classic: the table of claims, and its figures."""
 
     rows: tuple[Row, ...]
     charts: tuple[Chart, ...]
@@ -32,23 +27,14 @@ class Found:
 
 @dataclass(frozen=True)
 class Classic:
-    """A published result and the runs that check it.
+    """A published result and the runs that check it."""
 
-    Attributes:
-        name: name of the command and the page.
-        title: short title.
-        citation: authors, title, journal, year.
-        read: which parts of the source were available, and which were not.
-        method: how the runs check the claims.
-        make: function that makes the runs; arguments: quick, and a callback for step names.
-    """
-
-    name: str
+    name: str  # name of the command and the page
     title: str
-    citation: str
-    read: str
-    method: str
-    make: Callable[[bool, Tell], Found]
+    citation: str  # authors, title, journal, year
+    read: str  # which parts of the source were available, and which were not
+    method: str  # how the runs check the claims
+    make: Callable[[bool, Progress], Found]  # makes the runs: quick, progress
 
 
 def holds(cells: str, ours: bool, status: str, reason: str) -> Row:

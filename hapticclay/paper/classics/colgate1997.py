@@ -13,11 +13,11 @@ from ...studies.chart import Chart, curve
 from ...studies.port_energy import passivity_limit, taken_energy, zigzag
 from ...studies.wall_runs import PRESS, stiffest, unshown
 from ..ledger import Row, row
-from .classic import BESIDE, FORMULA, Classic, Found, Tell, holds
+from .classic import BESIDE, FORMULA, Classic, Found, Progress, holds
 
 MASS, DAMPER, TS = 0.1, 2.0, 1e-3  # kg, N.s/m, s
 WALL = VirtualWall(device=Device(MASS, DAMPER), Ts=TS)
-FOUND = 5e-3  # share of K: slowest paths at pi/48 a sample; the line is for pi/infinity
+LIMIT_ERROR = 5e-3  # share of K: slowest paths at pi/48 a sample; the line is for pi/infinity
 ENERGY = 1e-3  # share: impulses of 2 m v at the corners are summed over engine steps
 AMPLITUDE = 1e-4  # [m] of the zigzag
 STEPS = 8  # engine steps per sample; the zigzag's energy is exact to one part in this number
@@ -28,7 +28,7 @@ def bound(wall: VirtualWall) -> float:
     return max(0.0, 2.0 * (wall.device.damper - abs(wall.B)) / wall.Ts)
 
 
-def _limits(quick: bool, tell: Tell) -> Iterator[tuple[str, VirtualWall, float]]:
+def _limits(quick: bool, progress: Progress) -> Iterator[tuple[str, VirtualWall, float]]:
     """Walls with the largest passive K, found by runs."""
     cases = {
         "b = 2 N.s/m, Ts = 1 ms": WALL,
@@ -42,7 +42,7 @@ def _limits(quick: bool, tell: Tell) -> Iterator[tuple[str, VirtualWall, float]]
             "mass of 1 kg": replace(WALL, device=Device(10.0 * MASS, DAMPER)),
         }
     for name, wall in cases.items():
-        tell(f"largest passive K: {name}")
+        progress(f"largest passive K: {name}")
         yield name, wall, passivity_limit(wall, STEPS)
 
 
@@ -61,9 +61,9 @@ def _worst_path() -> Iterator[Row]:
         )
 
 
-def _passive_is_stable(tell: Tell) -> Row:
+def _passive_is_stable(progress: Progress) -> Row:
     """Stability at the passive limit with a range of hands, from runs."""
-    tell("stability in a hand")
+    progress("stability in a hand")
     hands = (None, Operator(0.5, 2.0, 200.0))
     walls = [replace(WALL, operator=x) for x in hands]
     found = [stiffest([w], [bound(WALL)], bound(WALL), PRESS, unshown)[0] for w in walls]
@@ -97,13 +97,12 @@ def _plane(found: list[tuple[str, VirtualWall, float]]) -> Chart:
     )
 
 
-def make(quick: bool, tell: Tell) -> Found:
-    """Makes the runs."""
-    found = list(_limits(quick, tell))
+def make(quick: bool, progress: Progress) -> Found:
+    found = list(_limits(quick, progress))
     rows = [
         row(
             f"largest passive K: {name} | criterion | b > K Ts/2 + abs(B) | N/m",
-            (bound(wall), K, FOUND),
+            (bound(wall), K, LIMIT_ERROR),
             FORMULA,
             "searched for by runs along polygons of a hand",
         )
@@ -120,12 +119,12 @@ def make(quick: bool, tell: Tell) -> Found:
         )
     )
     if not quick:
-        rows.append(_passive_is_stable(tell))
+        rows.append(_passive_is_stable(progress))
         heavy = next(K for name, _, K in found if name.startswith("mass"))
         rows.append(
             row(
                 "the same limit for ten times the mass | none | not in the formula | N/m",
-                (found[0][2], heavy, FOUND),
+                (found[0][2], heavy, LIMIT_ERROR),
                 BESIDE,
                 "the worst path has constant speed between samples, whatever the mass",
             )

@@ -14,7 +14,7 @@ from ...studies.wall_runs import Press, come_to_rest
 from ...theory import wall_limits
 from ...theory.roots import bisect
 from ..ledger import Row, row
-from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Tell, holds
+from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Progress, holds
 
 MASS, DAMPER, FRICTION, TS = 0.1, 0.1, 0.05, 1e-3  # kg, N.s/m, N, s
 WALL = VirtualWall(device=Device(MASS, DAMPER, FRICTION), Ts=TS)
@@ -58,11 +58,11 @@ def held_speed(wall: VirtualWall) -> float:
     return math.sqrt(low * high)
 
 
-def _thresholds(quick: bool, tell: Tell) -> tuple[list[Row], Chart]:
+def _thresholds(quick: bool, progress: Progress) -> tuple[list[Row], Chart]:
     rows, found = [], []
     tried = QUICK_STIFF if quick else STIFF
     for K in tried:
-        tell(f"speed that friction holds: K = {K:g} N/m")
+        progress(f"speed that friction holds: K = {K:g} N/m")
         wall = replace(WALL, K=K)
         expected = threshold(wall)
         found.append(held_speed(wall))
@@ -92,9 +92,9 @@ def _thresholds(quick: bool, tell: Tell) -> tuple[list[Row], Chart]:
     return rows, chart
 
 
-def _stable_but_active(tell: Tell) -> Row:
+def _stable_but_active(progress: Progress) -> Row:
     """A wall that is active, since a hand can extract energy, yet comes to rest."""
-    tell("a wall that is stable and not passive")
+    progress("a wall that is stable and not passive")
     limit = passivity_limit(VirtualWall(device=ROUGH))
     stiff = VirtualWall(K=1.2 * limit, device=ROUGH)
     return holds(
@@ -108,9 +108,9 @@ def _stable_but_active(tell: Tell) -> Row:
     )
 
 
-def _quantum(tell: Tell) -> Row:
+def _quantum(progress: Progress) -> Row:
     """Friction of half the force of a quantum separates rest from a buzz."""
-    tell("quantum and friction")
+    progress("quantum and friction")
     edge = 2.0 * ROUGH.friction / ROUGH.quantum
     tried = [
         VirtualWall(K=share * edge, B=BUZZ, device=ROUGH) for share in (0.5, 0.9, 0.98, 1.1, 1.3)
@@ -129,12 +129,11 @@ def _quantum(tell: Tell) -> Row:
     )
 
 
-def make(quick: bool, tell: Tell) -> Found:
-    """Makes the runs."""
-    rows, chart = _thresholds(quick, tell)
+def make(quick: bool, progress: Progress) -> Found:
+    rows, chart = _thresholds(quick, progress)
     if not quick:
-        rows += [_stable_but_active(tell), _quantum(tell)]
-        tell("without friction")
+        rows += [_stable_but_active(progress), _quantum(progress)]
+        progress("without friction")
         bare = replace(WALL, K=QUICK_STIFF[0], device=Device(MASS, DAMPER))
         rows.append(
             holds(

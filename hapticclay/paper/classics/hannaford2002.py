@@ -16,7 +16,7 @@ from ...simulation.record import Record
 from ...simulation.simulate import simulate
 from ...studies.chart import Chart, curve
 from ..ledger import Row, row
-from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Tell, holds
+from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Progress, holds
 
 MASS, DAMPER, TS = 1.0, 1.0, 1e-3  # kg, N.s/m, s
 HAND = Operator(0.2, 5.0, 100.0)
@@ -48,15 +48,10 @@ def observed_wall(t, q, qd, fh, state, params):
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """A run against the wall, and the energy seen by its observer.
+    """A run against the wall, and the energy seen by its observer."""
 
-    Attributes:
-        record: record of the run, one row per sample.
-        force: held force of the wall [N], (n,).
-    """
-
-    record: Record
-    force: np.ndarray
+    record: Record  # one row per sample
+    force: np.ndarray  # [N] of the wall, held, shape (n,)
 
     @property
     def energy(self) -> np.ndarray:
@@ -97,7 +92,7 @@ def _balance(record: Record) -> np.ndarray:
     return np.append((impulse - (MASS + HAND.mass) * change) / TS, 0.0)
 
 
-def _claims(quick: bool, tell: Tell) -> tuple[list[Row], dict[str, Contact]]:
+def _claims(quick: bool, progress: Progress) -> tuple[list[Row], dict[str, Contact]]:
     rows: list[Row] = []
     shown: dict[str, Contact] = {}
     cases = [(STIFF, 0, "a wall of 100 N/mm", "stiffness > 100 N/mm")]
@@ -108,7 +103,7 @@ def _claims(quick: bool, tell: Tell) -> tuple[list[Row], dict[str, Contact]]:
             (10.0 * SOFT, DELAY, "a wall of 10 N/mm that is 15 ms late", "time delays of 15 ms"),
         ]
     for K, delay, what, printed in cases:
-        tell(what)
+        progress(what)
         plain, damped, ours = (contact(K, x, delay) for x in (PLAIN, PUBLISHED, OURS))
         if not shown:
             shown = {"without": plain, "with": damped}
@@ -152,12 +147,11 @@ def _observer(plain: Contact) -> Row:
     )
 
 
-def make(quick: bool, tell: Tell) -> Found:
-    """Makes the runs."""
-    rows, shown = _claims(quick, tell)
+def make(quick: bool, progress: Progress) -> Found:
+    rows, shown = _claims(quick, progress)
     plain, damped = shown["without"], shown["with"]
     rows.append(_observer(plain))
-    tell("without a bound on the damper")
+    progress("without a bound on the damper")
     free = contact(STIFF, FREE)
     rows.append(
         holds(

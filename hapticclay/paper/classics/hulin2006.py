@@ -12,7 +12,7 @@ from ...studies.chart import Chart, curve
 from ...studies.wall_runs import PRESS, stiffest, unshown
 from ...theory import wall_limits
 from ..ledger import Row, row
-from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Tell, holds
+from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Progress, holds
 
 MASS, TS = 1.0, 1e-3  # kg, s
 RULE = 0.01  # share: the rule is first-order in (b + B) Ts/mass, see docs/equations.md
@@ -37,13 +37,13 @@ def _by_runs(wall: VirtualWall, *B: float) -> list[float]:
     return stiffest([replace(wall, B=x) for x in B], around, min(around), PRESS, unshown)
 
 
-def _rows_of_the_rule(quick: bool, tell: Tell) -> list[Row]:
+def _rule_rows(quick: bool, progress: Progress) -> list[Row]:
     rows = []
     for delay in QUICK_DELAYS if quick else DELAYS:
         for b, B in ((SMALL, 0.0), (0.5 * SMALL, 0.5 * SMALL)):
             if quick and B:
                 continue
-            tell(f"stable K: delay of {delay:g} samples, b = {b:g}, B = {B:g} N.s/m")
+            progress(f"stable K: delay of {delay:g} samples, b = {b:g}, B = {B:g} N.s/m")
             rows.append(
                 row(
                     f"largest stable K, delay {delay:g} Ts, b = {b:g}, B = {B:g} N.s/m | linear "
@@ -56,9 +56,9 @@ def _rows_of_the_rule(quick: bool, tell: Tell) -> list[Row]:
     return rows
 
 
-def _row_of_the_hand(tell: Tell) -> Row:
+def _hand_row(progress: Progress) -> Row:
     """A hand adds its damping to the device; its mass hardly moves the boundary."""
-    tell("stable K in a hand")
+    progress("stable K in a hand")
     hand = Operator(0.5, 3.0, 0.0)
     return row(
         "largest stable K, in a hand of 0.5 kg and 3 N.s/m, b = 1 N.s/m, delay Ts | linear "
@@ -69,12 +69,12 @@ def _row_of_the_hand(tell: Tell) -> Row:
     )
 
 
-def _boundary(quick: bool, tell: Tell) -> tuple[list[Row], Chart]:
+def _boundary(quick: bool, progress: Progress) -> tuple[list[Row], Chart]:
     """The whole boundary, including where the rule fails."""
     rows, curves, unit = [], [], MASS / TS
     shares = (0.1, 0.4) if quick else (0.1, 0.4, 0.8)
     for delay in (0.0, 1.0) if quick else (0.0, 1.0, 2.0):
-        tell(f"boundary at a delay of {delay:g} samples")
+        progress(f"boundary at a delay of {delay:g} samples")
         B, K = wall_limits.hulin_boundary(MASS, 0.0, TS, delay)
         curves.append(curve(f"delay {delay:g} Ts: exact", B / unit, K * TS / unit))
         tried = np.array([x for x in shares if x * unit < 0.9 * B.max()])
@@ -107,14 +107,13 @@ def _boundary(quick: bool, tell: Tell) -> tuple[list[Row], Chart]:
     return rows, chart
 
 
-def make(quick: bool, tell: Tell) -> Found:
-    """Makes the runs."""
-    rows = _rows_of_the_rule(quick, tell)
+def make(quick: bool, progress: Progress) -> Found:
+    rows = _rule_rows(quick, progress)
     if not quick:
-        rows.append(_row_of_the_hand(tell))
+        rows.append(_hand_row(progress))
     far = 0.4 * MASS / TS
-    boundary, chart = _boundary(quick, tell)
-    tell("where the rule ends")
+    boundary, chart = _boundary(quick, progress)
+    progress("where the rule ends")
     ours = _by_runs(_wall(0.0, 0.0), far)[0]
     rows.append(
         holds(
