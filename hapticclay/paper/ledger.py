@@ -90,7 +90,7 @@ class Runs:
     def free(self, **kw) -> Record:
         return self._get(f"free {_keywords(kw)}", lambda: simulate(free(**kw)))
 
-    def identified(self, what: str, axis: str) -> Identified:
+    def identified(self, what: Any, axis: Any) -> Identified:
         """An identification from a single run."""
         return self._get(
             f"identification of {what}{axis}", lambda: identify(axis, what, realisations=1)

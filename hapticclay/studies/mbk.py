@@ -70,7 +70,7 @@ class DeviceMBK(Result):
     formats = {"off": "+.2g %"}
 
     wall: VirtualWall
-    regions: dict[str, Region]
+    regions: dict[Plane, Region]
     found: dict[str, tuple[Border, ...]]
     range: DynamicRange
 
@@ -242,7 +242,7 @@ def device_mbk(
     low, high = numbers_of("band", band, ("low", "high"), 0.0, 1e4, above=True, unit="Hz")
     linear = replace(wall.device, friction=0.0, quantum=0.0)
     wall = replace(wall, device=linear, unilateral=False)
-    regions = {plane: renderable(wall, plane, points) for plane in PLANES}
+    regions: dict[Plane, Region] = {x: renderable(wall, x, points) for x in PLANES}
     # away from the ends of a plane, where the borders meet
     shares = (np.arange(columns) + 0.5) / columns if columns else np.empty(0)
     searched = [

@@ -30,7 +30,7 @@ from .wall_limits import wall_differences
 
 Plane = Literal["mass-damper", "mass-stiffness", "damper-stiffness"]
 WallPart = Literal["K", "B", "M"]
-PLANES: dict[str, tuple[WallPart, WallPart]] = {  # fields of VirtualWall: horizontal, vertical
+PLANES: dict[Plane, tuple[WallPart, WallPart]] = {  # fields of VirtualWall: horizontal, vertical
     "mass-damper": ("M", "B"),
     "mass-stiffness": ("M", "K"),
     "damper-stiffness": ("B", "K"),

@@ -21,6 +21,13 @@ def unit_text(text: str) -> str:
     return text
 
 
+def plain_text(text: str) -> str:
+    """A label with its units as in files: N.s/m, s^2."""
+    for plain, typeset in UNITS.items():
+        text = text.replace(typeset, plain)
+    return text
+
+
 def clay_text(text: str) -> str:
     """Typesets a text on clay, with its letters."""
     for plain, typeset in LETTERS.items():

@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import ParameterError, choice, number
 from ..files import atomic
 from . import style as styles
+from .captions import plain_text
 
 if TYPE_CHECKING:
     import matplotlib.figure
@@ -157,7 +158,7 @@ def curves_drawn(figure: matplotlib.figure.Figure) -> dict[str, Table]:
         curves = [x for x in curves if all(map(len, x.get_data()))]
         if not curves:
             continue
-        x_name, y_name = ax.get_xlabel() or "x", ax.get_ylabel() or "y"
+        x_name, y_name = plain_text(ax.get_xlabel()) or "x", plain_text(ax.get_ylabel()) or "y"
         names = [str(x.get_label()) for x in curves]
         names = [f"curve {i}" if n.startswith("_") else n for i, n in enumerate(names, 1)]
         xy = [x.get_xydata() for x in curves]

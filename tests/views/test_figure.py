@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.views import palette, style
+from hapticclay.views.captions import unit_text
 from hapticclay.views.figure import FORMATS, csv_text, curves_drawn
 from hapticclay.views.style import figure_size, figure_style, points
 
@@ -138,3 +139,14 @@ def test_printed_colours_differ_in_grey():
 
 def test_a_draft_for_a_notebook():
     assert hc.Figure(parabola)._repr_svg_().lstrip().startswith("<?xml")
+
+
+def test_heads_of_curves_have_units_as_files_have_them(tmp_path):
+    """Labels are typeset; the CSV file made from the curves has N.s/m and s^2."""
+    drawn = Figure()
+    ax = drawn.add_subplot()
+    ax.plot([1.0, 2.0], [3.0, 4.0])
+    ax.set(xlabel=unit_text("b [N.s/m]"), ylabel=unit_text("a [m/s^2]"))
+    hc.Figure(lambda: drawn).save(tmp_path / "curve", data=True)
+    head = (tmp_path / "curve.csv").read_text().splitlines()[0]
+    assert head == "curve,b [N.s/m],a [m/s^2]"
