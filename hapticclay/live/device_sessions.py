@@ -21,7 +21,7 @@ from ..simulation.record import Record
 from ..studies.removal import TOOL, Tool
 from .clock import FRAME_TIME
 from .frame import Partner
-from .run import played
+from .run import session_scenario
 from .session import Session, refuse_other
 from .verdict import LiveVerdict
 
@@ -54,8 +54,8 @@ class ServedSession(Session):
     def prepared(self, scenario: Scenario) -> Scenario:
         """The scenario with motors commanded by programs."""
         refuse_other(scenario, integrator="fast")
-        driven, _ = device_scenario(played(scenario, self.stiffness), None, clay=True)
-        self.undriven = played(driven, 1.0)
+        driven, _ = device_scenario(session_scenario(scenario, self.stiffness), None, clay=True)
+        self.undriven = session_scenario(driven, 1.0)
         self.arm = DrivenArm(self.undriven, self._largest_force)
         return replace(self.undriven, controller=self.arm.controller)
 
@@ -166,7 +166,7 @@ class DevicePartner(Partner):
         hand, held = self.hand, self.hand.held
         play.pull(hand.place if held else None)
         B = hand.coupling.B
-        play.run.pull.carried = (B * hand.rate[0], B * hand.rate[1]) if held else (0.0, 0.0)
+        play.run.pull.damper_force = (B * hand.rate[0], B * hand.rate[1]) if held else (0.0, 0.0)
 
     def after_slice(self, play: Session) -> None:
         """Stores the new position of the handle."""

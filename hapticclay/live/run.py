@@ -25,14 +25,14 @@ class Pull:
     """The muscle force of a hand that pulls to a point with the spring of its impedance.
 
     The force is k times the position of the point. The loop applies the impedance of the hand to p,
-    so the sum is fh = -Th applied to p - point. `force` is added [N], and `carried`, the force of
+    so the sum is fh = -Th applied to p - point. `force` is added [N], and `damper_force`, that of
     the damper of a moving hand [N]; `knots` is the point's path so far, (t [s], x, y [m]).
     """
 
     def __init__(self, spring: tuple[float, float], p: tuple[float, float]):
         """Places the point at the handle."""
         self.spring, self.force = np.array(spring), (0.0, 0.0)
-        self.carried = 0.0, 0.0
+        self.damper_force = 0.0, 0.0
         self.knots = [(0.0, *p)]
         self._from, self._rate, self._since = np.array(p), np.zeros(2), 0.0
 
@@ -54,12 +54,12 @@ class Pull:
     def steady(self) -> tuple[float, ...]:
         """The force as parts.Push.steady: since [s], (x, y) [N], its rate [N/s]."""
         (fx, fy), (px, py) = self.force, (self.spring * self._from).tolist()
-        cx, cy = self.carried
+        cx, cy = self.damper_force
         return float(self._since), fx + cx + px, fy + cy + py, *(self.spring * self._rate).tolist()
 
     def mean(self, t: Any, h: Any) -> np.ndarray:
         """Returns the mean force over [t - h, t + h] [N], as `Signal.mean`."""
-        return np.array(self.force) + np.array(self.carried) + self.spring * self.at(t)
+        return np.array(self.force) + np.array(self.damper_force) + self.spring * self.at(t)
 
 
 class LiveRun(Run):
@@ -113,7 +113,7 @@ class LiveRun(Run):
         self.flush()
 
 
-def played(scenario: Scenario, stiffness: float = 1.0) -> Scenario:
+def session_scenario(scenario: Scenario, stiffness: float = 1.0) -> Scenario:
     """Returns the scenario of a session: a person as the muscle, and no end of the path."""
     stiffness = number("stiffness", stiffness, 1e-3, 1e4)
     x, y = (

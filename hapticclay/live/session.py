@@ -25,7 +25,7 @@ from ..studies.removal import TOOL, Tool, removed
 from ..theory.pose_limits import PoseLimits
 from .clock import LATE_EDGES, Clock
 from .frame import Frame, Listener, Partner
-from .run import PULL_MARGIN, LiveRun, played
+from .run import PULL_MARGIN, LiveRun, session_scenario
 from .verdict import CALM_TIME, LiveVerdict, live_gain_limits, live_verdict
 
 
@@ -68,14 +68,14 @@ class Session:
         self.damping = 1.0  # factor on damping, yield force and consistency of all clay
         self.frames: list[Frame] = []
         self._limits = PoseLimits(self.scenario)
-        self._carry = 0.0
-        self._swung = -math.inf  # time of the last growing oscillation [s]
+        self._time_left = 0.0
+        self._last_swing = -math.inf  # time of the last growing oscillation [s]
         self._observe()
 
     def prepared(self, scenario: Scenario) -> Scenario:
         """The scenario as it is run."""
         refuse_other(scenario, control="continuous", integrator="fast")
-        return played(scenario, self.stiffness)
+        return session_scenario(scenario, self.stiffness)
 
     def restart(self) -> None:
         """Restarts the same scenario with the present gain, damping and recording switch."""
@@ -120,7 +120,7 @@ class Session:
         if self._limits.scenario is not s:
             self._limits = PoseLimits(s)
         limit = live_gain_limits(self._limits, self.frames[-1].p, self.b)
-        return live_verdict(self.gain, limit, onset, self.t - self._swung < CALM_TIME)
+        return live_verdict(self.gain, limit, onset, self.t - self._last_swing < CALM_TIME)
 
     def pull(self, point: tuple[float, float] | None) -> None:
         """Makes the hand pull to a point, within reach of the arm."""
@@ -153,8 +153,8 @@ class Session:
         run, dt = self.run, self.scenario.dt
         if self.paused or run.outcome:
             return np.empty((0, 2))
-        steps = math.floor((seconds + self._carry) / dt + 1e-9)
-        self._carry += seconds - steps * dt
+        steps = math.floor((seconds + self._time_left) / dt + 1e-9)
+        self._time_left += seconds - steps * dt
         if not steps:
             return np.empty((0, 2))
         if self.point is None:
@@ -222,7 +222,7 @@ class Session:
     def _observe(self) -> None:
         watch = self.run.watch
         if watch.onset and max(map(len, watch.swings)) >= monitor.SWINGS:
-            self._swung = self.t
+            self._last_swing = self.t
         if self.frames and self.t < self.frames[-1].t + self.frame_time - 1e-9:
             return
         p, v = self.handle()

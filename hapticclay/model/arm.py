@@ -60,6 +60,6 @@ PAPER = Arm()
 
 
 def jacobians(q1: Any, q2: Any, links: Links) -> tuple[Any, ...]:
-    """As `jacobian`, for arrays."""
+    """As `jacobian`, (u1x, u1y, u2x, u2y) [m], for arrays of angles [rad]."""
     l1, l2, a = links[0], links[1], q1 + q2
     return -l1 * np.sin(q1), l1 * np.cos(q1), -l2 * np.sin(a), l2 * np.cos(a)

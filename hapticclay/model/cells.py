@@ -76,14 +76,11 @@ class CellLaw:
         return Fy, K, n
 
     def index(self: Any, x: Any, y: Any) -> tuple[Any, Any]:
-        """Cells at given places; on a line between two cells, the one beyond it.
+        """Indices of the cells at given places; on a line between two cells, the one beyond it.
 
         Args:
             x: coordinates [m].
             y: the same along y.
-
-        Returns:
-            Indices along x and along y.
         """
         at = zip(self.lines, (x, y), strict=True)
         i, j = (np.searchsorted(edges, place, side="right") for edges, place in at)
@@ -163,7 +160,7 @@ class Profile(CellLaw):
             if len(given) != len(regions) and (given or name == "values"):
                 numbers_of(f"clay.{name}", given, [str(i) for i in regions])  # raises the error
         check_ascending("clay.edges", self.edges)
-        _leave_out(self)
+        _drop_zeros(self)
 
     @property
     def borders(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -235,7 +232,7 @@ class Grid(CellLaw):
             if got != shape and (name == "values" or table):
                 bound = f"must have shape {shape}, one more than borders each way, has {got}"
                 raise ParameterError(f"clay.{name}", table, bound)
-        _leave_out(self)
+        _drop_zeros(self)
 
     @property
     def borders(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -333,7 +330,7 @@ def _flow_of(law: Profile | Grid) -> tuple[Any, tuple[float, float, float]]:
     return (law.Fy, law.K, law.n), (0.0, 0.0, 1.0)
 
 
-def _leave_out(law: Profile | Grid) -> None:
+def _drop_zeros(law: Profile | Grid) -> None:
     """Empties values without effect, so that equivalent laws compare equal; refuses n without K."""
     if not law.K and law.n and np.any(np.array(law.n) != 1.0):
         raise ParameterError("clay.n", law.n, "must be empty without K")
@@ -360,11 +357,11 @@ def pixels(image: tuple[tuple[float, ...], ...], b: tuple[float, float]) -> np.n
 
 
 def _framed(inner: Any, outside: float) -> Any:
-    """Values of cells, surrounded by the values of the outer cells."""
+    """The damping of cells within a frame of outer cells."""
     return np.pad(np.asarray(inner), 1, constant_values=outside)
 
 
 def check_ascending(field: str, edges: tuple[float, ...]) -> None:
-    """Raises an error if borders do not ascend."""
+    """Refuses borders [m] that do not ascend."""
     if any(b <= a for a, b in zip(edges, edges[1:], strict=False)):
         raise ParameterError(field, edges, "must be strictly ascending")

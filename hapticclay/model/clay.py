@@ -26,14 +26,12 @@ from .traits import (
     Column,
     Hold,
     Law,
+    Quantity,
     Refusal,
     Soft,
-    Told,
     check_traits,
     multiplied,
     present,
-    told_pair,
-    told_values,
 )
 
 
@@ -45,9 +43,6 @@ def slab(resists: float | Flow, start: float | None = None, end: float | None = 
         resists: damping [N.s/m], 0 to 1e9, or a flow, whose force is then opposite to the motion.
         start: lower border on x [m]; None for clay without borders.
         end: upper border on x [m], given with start.
-
-    Returns:
-        The clay.
 
     Raises:
         ParameterError: a value is out of bounds, or only one border is given.
@@ -75,7 +70,7 @@ def slab(resists: float | Flow, start: float | None = None, end: float | None = 
 
 
 def extent(clay: Clay | None, i: int) -> list[tuple[float, float]]:
-    """Intervals of coordinate i that contain clay, judged by that coordinate alone."""
+    """Ascending intervals [m] of coordinate i that contain clay, judged by i alone."""
     out: list[tuple[float, float]] = []
     for law in clay.laws if clay else ():
         if AXES[i] in law.along:
@@ -303,29 +298,27 @@ class Clay:
         return out
 
     @property
-    def words(self) -> list[Told]:
+    def words(self) -> list[Quantity]:
         """Resistance of the clay over the whole scene."""
-        return [x for kind in self.kinds for x in kind.words(self)] or [Told("b = {}", (0.0,))]
+        return [x for kind in self.kinds for x in kind.words(self)] or [Quantity("b = {}", (0.0,))]
 
-    def here(self, place: tuple[float, float], b: Any = None) -> list[Told]:
+    def here(self, place: tuple[float, float], b: Any = None) -> list[Quantity]:
         """Resistance at a place; empty where there is none.
 
         Args:
             place: (x, y) [m].
             b: damping there, along x and y [N.s/m]; None for that of `at`.
         """
-        told = [x for kind in self.kinds for x in kind.here(self, place)]
-        return [*told, *told_pair("b = {}", self.at(*place).tolist() if b is None else b, "N.s/m")]
+        others = [x for kind in self.kinds for x in kind.here(self, place)]
+        b = self.at(*place).tolist() if b is None else b
+        return [*others, *Quantity.of_axes("b = {}", b, "N.s/m")]
 
     def at(self, x: Any, y: Any) -> np.ndarray:
-        """Damping of both axes at given places, without growth.
+        """Damping of both axes at given places, without growth [N.s/m], shape (2, ...).
 
         Args:
             x: coordinates [m], any shape.
             y: coordinates [m], any shape that broadcasts with x.
-
-        Returns:
-            [N.s/m], shape (2, ...).
         """
         b = self.x.at(x, y)
         return np.stack([b, b if self.y is self.x else self.y.at(x, y)])
@@ -336,16 +329,15 @@ _ACROSS = Refusal(
 )
 
 
-def _damping_values(clay: Clay) -> list[float]:
-    return [v for law in clay.laws for v in law.damping.ravel().tolist()]
-
-
-def _rates(clay: Clay) -> list[float]:
-    return [v for law in clay.laws for v in law.rates.ravel().tolist()]
+def _words(form: str, name: str, unit: str) -> Callable[[Clay], tuple[Quantity, ...]]:
+    """A quantity of the cells of both axes."""
+    return lambda clay: Quantity.of_scene(
+        form, (v for law in clay.laws for v in getattr(law, name).ravel().tolist()), unit
+    )
 
 
 def _scaled(name: str) -> Callable[[Clay, float], Clay]:
-    """What multiplies a quantity of the laws of both axes."""
+    """Clay with a quantity of the laws of both axes multiplied."""
 
     def of(law: Any, factor: float) -> Any:
         given = getattr(law, name)
@@ -362,12 +354,12 @@ def _soft(clay: Clay) -> Soft:
 TRAITS = (
     Law(
         "viscous", "clay", lambda c: any(x.damping.any() for x in c.laws),
-        words=lambda c: told_values("b = {}", _damping_values(c), "N.s/m"),
+        words=_words("b = {}", "damping", "N.s/m"),
         force=lambda law, speed, _: law.damping * speed, scaled=_scaled("values"),
     ),
     Law(
         "growth", "clay", lambda c: c.grows, LEFT_OUT, seen_in_b=False, varies="time",
-        words=lambda c: told_values("grows by {}", _rates(c), "N.s/m per s"),
+        words=_words("grows by {}", "rates", "N.s/m per s"),
         scaled=_scaled("growth"),
     ),
     Law("cells", "clay", lambda c: any(isinstance(x, Grid) for x in c.laws)),
@@ -377,8 +369,8 @@ TRAITS = (
     Law(
         "rotated axes", "clay", lambda c: c.angle != 0.0,
         refuses={"passivity controller": _ACROSS, "virtual coupling": _ACROSS},
-        words=lambda c: told_values("axes rotated by {}", (math.degrees(c.angle),), "degrees"),
+        words=lambda c: [Quantity("axes rotated by {}", (math.degrees(c.angle),), "degrees")],
     ),
 )  # fmt: skip
+# in the order of texts
 LAWS: tuple[Law, ...] = (*groove.TRAITS, *flow.TRAITS, *TRAITS, *spring.TRAITS)
-"""In the order in which texts tell them."""

@@ -14,9 +14,6 @@ from ..errors import Bound, ParameterError
 from ..formulas.compensator import ORDER
 from .constants import C_DEN, C_NUM
 
-# floats of an axis: A, B, C, D of a realisation, each as for the highest order; and of a kick, see
-# `form_kick`: C Phi, what the force of the kick adds, Phi, Gamma
-# working space of `exponential`: two results, then a term of a series, its sum, and a matrix
 CANCELLED = 1e-12  # of a sum, relative to that of the magnitudes
 
 
@@ -131,13 +128,11 @@ class Compensator:
         return None
 
     def state_space(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        """A realisation of C/K: z' = A z + B f, delta = C z + D f.
+        """A realisation A, B, C, D of C/K: z' = A z + B f, delta = C z + D f.
 
-        Controllable form. Time is scaled so that the fastest pole is 1 rad/s, which preserves the
-        digits of fast and slow poles. For the printed compensator, see `lag`, time is in seconds.
-
-        Returns:
-            A, shape (order, order), B and C, shape (order,), and D.
+        Controllable form, with vectors B and C. Time is scaled so that the fastest pole is 1 rad/s,
+        which preserves the digits of fast and slow poles; for the printed compensator, see `lag`,
+        it is in seconds.
         """
         n = self.order
         den = np.array(self.den)
@@ -175,9 +170,8 @@ def _from_roots(name: str, given: Iterable[complex]) -> tuple[float, ...]:
 def _from_state_space(A: Any, B: Any, C: Any, D: Any) -> tuple[Any, Any]:
     """Coefficients by way of the impulse response: D, C B, C A B, ...
 
-    Values that are zero up to rounding are set to zero, so that num has no spurious distant zeros.
-    If all but D are zero, the system is a gain: it has no state that is both controllable and
-    observable.
+    Values at rounding are set to zero, so that num has no spurious distant zeros. If all but D are
+    zero, the system is a gain.
     """
     v, row = np.ravel(B), np.ravel(C)
     A = np.reshape(A, (len(v), len(v)))
@@ -196,7 +190,7 @@ PRINTED = Compensator()
 
 
 def form_numbers(compensator: Compensator) -> list[float]:
-    """A realisation of C/K as plain numbers, padded with zeros to the highest order."""
+    """A, B, C, D of a realisation of C/K, row by row, padded with zeros to the highest order."""
     n = compensator.order
     A, B, C, D = compensator.state_space()
     a, b, c = np.zeros((ORDER, ORDER)), np.zeros(ORDER), np.zeros(ORDER)
@@ -205,7 +199,7 @@ def form_numbers(compensator: Compensator) -> list[float]:
 
 
 def moving_states(compensator: Compensator, v: float) -> list[float]:
-    """States of a compensator whose output moves at constant rate and is 0 now."""
+    """States of a compensator whose output is 0 and moves at v [m/s]; it needs an integrator."""
     n = compensator.order
     out = [0.0] * ORDER
     if v == 0.0:

@@ -44,7 +44,7 @@ SERVO = (Servo(G[0], S[0]), Servo(G[1], S[1]))  # as printed, of x and y
 
 
 def feedback_vector(servo: Servo) -> np.ndarray:
-    """Servo acceleration of the law above, without forces, as a row over the state of one axis."""
+    """The row of p'' over (p, p', delta, delta', y, y') of an axis, without forces."""
     g, s = servo.G, servo.S
     reference = [g.gain, 0.0, s.stiffness - g.stiffness, s.damping - g.damping]
     return np.array([-s.stiffness, -s.damping, *reference])
@@ -53,7 +53,10 @@ def feedback_vector(servo: Servo) -> np.ndarray:
 def controller_matrices(
     servo: Servo, compensator: Compensator, K: Any
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compensator and reference model in continuous time: z' = A z + B f, f the net force [N]."""
+    """Compensator and reference model in continuous time: z' = A z + B f, f the net force [N].
+
+    z holds the states of `Compensator.state_space`, with K (or gains, (m,)) in its input, y and y'.
+    """
     g, n = servo.G, compensator.order
     own, drive, out, through = compensator.state_space()
     A, unit = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
@@ -66,9 +69,9 @@ def controller_matrices(
 def held_compensator(
     servo: Servo, compensator: Compensator, K: Any, T: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compensator and reference model over a sample under held net force: z+ = A z + B f.
+    """As `controller_matrices`, over a sample T [s] under held net force: z+ = A z + B f, exact.
 
-    Exact, by a matrix exponential (Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed.).
+    Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed.
     """
     A, B = controller_matrices(servo, compensator, K)
     n = B.shape[-1]
@@ -79,7 +82,7 @@ def held_compensator(
 
 
 def matrix_exponential(a: np.ndarray) -> np.ndarray:
-    """Matrix exponential."""
+    """Of one matrix or a stack of them."""
     from scipy.linalg import expm
 
     return expm(a)

@@ -10,7 +10,7 @@ import numpy as np
 from ..arguments import part
 from ..errors import Bound
 from ..formulas.constants import B_MAX
-from .traits import LEAST, LEFT_OUT, Column, Hold, Law, Told, multiplied, told_pair, told_values
+from .traits import LEAST, LEFT_OUT, Column, Hold, Law, Quantity, multiplied
 
 FY_MAX = 1e6  # [N]
 CONSISTENCY_MAX = 1e6  # [N/(m/s)^n]
@@ -50,19 +50,16 @@ class Flow:
         return "Herschel-Bulkley" if self.Fy or self.b else "power law"
 
     @property
-    def words(self) -> list[Told]:
+    def words(self) -> list[Quantity]:
         """Its resistance, in words."""
-        b = told_values("b = {}", [self.b], "N.s/m")
-        return [*_told_flow([self.Fy], [self.K], [self.n]), *b]
+        b = Quantity.of_scene("b = {}", [self.b], "N.s/m")
+        return [*_flow_quantities([self.Fy], [self.K], [self.n]), *b]
 
     def force(self, v: Any) -> np.ndarray:
-        """Resisting force on a moving tool; 0 at rest, where any force up to Fy may act.
+        """Resisting force [N], of the sign of v; 0 at rest, where any up to Fy may act.
 
         Args:
             v: velocity [m/s], of either sign, any shape.
-
-        Returns:
-            [N], of the sign of v.
         """
         v = np.asarray(v, dtype=float)
         return np.sign(v) * (self.Fy + self.K * np.abs(v) ** self.n) + self.b * v
@@ -71,27 +68,31 @@ class Flow:
 COLUMNS = (Column("Fy", "N"), Column("K", "N/(m/s)^n"), Column("n"))
 
 
-def _words(clay: Any) -> list[Told]:
+def _words(clay: Any) -> list[Quantity]:
     """Yield force, consistency and flow index over a scene."""
     cells = zip(*(law.flows for law in clay.laws), strict=True)
-    return _told_flow(*(np.concatenate([x.ravel() for x in both]).tolist() for both in cells))
+    return _flow_quantities(*(np.concatenate([x.ravel() for x in both]).tolist() for both in cells))
 
 
-def _told_flow(Fy: list[float], K: list[float], n: list[float]) -> list[Told]:
+def _flow_quantities(Fy: list[float], K: list[float], n: list[float]) -> list[Quantity]:
     """Yield force, consistency, and flow index where there is a consistency."""
     index = [x for x, consistency in zip(n, K, strict=True) if consistency]
     return [
-        *told_values("Fy = {}", Fy, "N"),
-        *told_values("K = {}", K, "N/(m/s)^n"),
-        *told_values("n = {}", index),
+        *Quantity.of_scene("Fy = {}", Fy, "N"),
+        *Quantity.of_scene("K = {}", K, "N/(m/s)^n"),
+        *Quantity.of_scene("n = {}", index),
     ]
 
 
-def _here(clay: Any, place: tuple[float, float]) -> list[Told]:
+def _here(clay: Any, place: tuple[float, float]) -> list[Quantity]:
     """Yield force, consistency and flow index of both axes at a place."""
     Fy, K, n = zip(*(law.flows_at(*place) for law in clay.laws), strict=True)
-    index = told_pair("n = {}", n) if any(K) else ()
-    return [*told_pair("Fy = {}", Fy, "N"), *told_pair("K = {}", K, "N/(m/s)^n"), *index]
+    index = Quantity.of_axes("n = {}", n) if any(K) else ()
+    return [
+        *Quantity.of_axes("Fy = {}", Fy, "N"),
+        *Quantity.of_axes("K = {}", K, "N/(m/s)^n"),
+        *index,
+    ]
 
 
 def _cell_force(law: Any, speed: float, _: float) -> np.ndarray:

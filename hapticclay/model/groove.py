@@ -16,13 +16,11 @@ from .constants import AXES
 from .flow import FY_MAX
 from .materials import SMALL_TOOL, material
 from .tool import Tool
-from .traits import LEAST, LEFT_OUT, Block, Hold, Law, Refusal, Soft, Told
+from .traits import LEAST, LEFT_OUT, Block, Hold, Law, Quantity, Refusal, Soft
 
 CELLS = 20  # default number of cells in the width of the tool
 COARSEST = 8  # fewest cells in that width
 MOST_CELLS = 4_000_000
-# the front of the tool in sectors: by the share of |y| in |x| + |y| of their normals, in each
-# quadrant; half of the angle of each [rad]
 
 
 @part("groove.")
@@ -206,14 +204,14 @@ _BESIDE = Refusal(
 )
 
 
-def _words(clay: Any) -> tuple[Told, ...]:
-    return (Told("permanent cut, up to {}", (clay.groove.hardest,), "N"),)
+def _words(clay: Any) -> tuple[Quantity, ...]:
+    return (Quantity("permanent cut, up to {}", (clay.groove.hardest,), "N"),)
 
 
-def _here(clay: Any, place: tuple[float, float]) -> tuple[Told, ...]:
+def _here(clay: Any, place: tuple[float, float]) -> tuple[Quantity, ...]:
     """Its force where the tool touches it."""
     touched = _block(clay.groove).holds(*place, 0.5 * clay.groove.tool.width)
-    return (Told("holds with up to {}", (clay.groove.hardest,), "N"),) * bool(touched)
+    return (Quantity("holds with up to {}", (clay.groove.hardest,), "N"),) * bool(touched)
 
 
 def _block(groove: Groove) -> Block:

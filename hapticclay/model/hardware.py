@@ -10,7 +10,7 @@ import numpy as np
 from ..arguments import part
 from ..errors import Bound, ParameterError
 from ..fields import JOINTS, Seed
-from .traits import LEFT_OUT, YES, Refusal, Told, Trait, present, told_values
+from .traits import LEFT_OUT, YES, Quantity, Refusal, Trait, present
 
 STIFF = 1e12  # [N/m, N.s/m] upper bound of a coupling
 
@@ -94,9 +94,9 @@ NOISE_BLOCK = 1024  # samples drawn at once
 
 
 def butterworth(cutoff: float, order: int, Ts: float) -> tuple[float, ...]:
-    """Butterworth low-pass filter of unit gain under a held input: x+ = A x + B u, y = x[0], exact.
+    """Butterworth low-pass [Hz] of unit gain under a held input: x+ = A x + B u, y = x[0], exact.
 
-    The poles lie on a circle of radius 2 pi cutoff (matrix exponential).
+    A row by row, then B; the poles lie on a circle of radius 2 pi cutoff (matrix exponential).
     """
     from scipy.linalg import expm
 
@@ -113,11 +113,7 @@ def butterworth(cutoff: float, order: int, Ts: float) -> tuple[float, ...]:
 
 
 class SampleNoise:
-    """Random effects on each sample, reproducible by seed and index; one stream per part.
-
-    Args:
-        parts: the hardware, with its seed.
-    """
+    """Random effects on each sample, reproducible by seed and index; one stream per part."""
 
     def __init__(self, parts: Hardware):
         self.parts = parts
@@ -126,7 +122,7 @@ class SampleNoise:
 
     @property
     def first(self) -> int:
-        """Index of the first sample that is still kept."""
+        """Index of the first sample that is kept."""
         return self._first
 
     def forget(self, first: int) -> None:
@@ -134,7 +130,10 @@ class SampleNoise:
         self._rows, self._first = self._rows[first - self._first :], first
 
     def table(self, first: int, n: int) -> np.ndarray:
-        """Random effects on n samples; the first sample of a run is on time and never lost."""
+        """Offset in time [s], whether lost (1 or 0), and force noise (x, y) [N] of n samples.
+
+        The first sample of a run is on time and never lost.
+        """
         blocks, at = [self._rows], first - self._first
         missing = at + n - len(self._rows)
         while missing > 0:
@@ -154,70 +153,81 @@ class SampleNoise:
         return np.column_stack((late, lost, hiss))
 
 
-_UNSAMPLED = Refusal("hardware", "must be None unless control is 'sampled'")
-_SAMPLED = {"fast": _UNSAMPLED, "accurate": _UNSAMPLED}
-_HELD = {"physical": Refusal("render", "must be 'held' for a passivity controller or a coupling")}
+_IDEAL = Refusal("hardware", "must be None unless control is 'sampled'")
+_UNSAMPLED = {"fast": _IDEAL, "accurate": _IDEAL}
+_HELD = Refusal("render", "must be 'held' for a passivity controller or a coupling")
 
 
-def _told_difference(x: Hardware) -> list[Told]:
-    window = [Told("over {} samples", (float(x.velocity_window),))] * (x.velocity_window > 1)
+def _difference_words(x: Hardware) -> list[Quantity]:
+    window = [Quantity("over {} samples", (float(x.velocity_window),))] * (x.velocity_window > 1)
     cutoff = x.velocity_filter
-    low_pass = [] if cutoff is None else [Told("low-pass {}", (cutoff,), "Hz")]
-    return [Told("velocity by difference"), *window, *low_pass]
+    low_pass = [] if cutoff is None else [Quantity("low-pass {}", (cutoff,), "Hz")]
+    return [Quantity("velocity by difference"), *window, *low_pass]
 
 
-def _told_converters(x: Hardware) -> list[Told]:
+def _converter_words(x: Hardware) -> list[Quantity]:
     bits = {"A/D": x.adc_bits, "D/A": x.dac_bits}
-    return [Told(f"{name} {{}}", (float(n),), "bits") for name, n in bits.items() if n]
+    return [Quantity(f"{name} {{}}", (float(n),), "bits") for name, n in bits.items() if n]
 
 
-PARTS = (  # name, whether hardware has it, how linear theory treats it, what refuses it, words
-    ("jitter", lambda x: x.jitter > 0.0, LEFT_OUT, {},
-     lambda x: told_values("jitter {}", (x.jitter,), "s rms")),
-    ("dropouts", lambda x: x.dropout_probability > 0.0, LEFT_OUT, {},
-     lambda x: told_values("dropout probability {}", (x.dropout_probability,))),
-    ("encoder", lambda x: x.encoder is not None, LEFT_OUT, {},
-     lambda x: told_values("encoder {}", (x.encoder,), "counts per turn")),
-    ("velocity by difference", lambda x: x.velocity == "difference", LEFT_OUT, {},
-     _told_difference),
-    ("converters", lambda x: bool(x.adc_bits or x.dac_bits), LEFT_OUT, {}, _told_converters),
-    ("force noise", lambda x: x.force_noise > 0.0, LEFT_OUT, {},
-     lambda x: told_values("force noise {}", (x.force_noise,), "N rms")),
-    ("force filter", lambda x: x.force_filter is not None, LEFT_OUT, {},
-     lambda x: told_values("force filter {}", (x.force_filter,), "Hz")),
-    ("delay", lambda x: x.delay > 0.0, YES, {},
-     lambda x: told_values("delay {}", (x.delay,), "s")),
-    ("joint friction", lambda x: any(x.friction), LEFT_OUT, {},
-     lambda x: [Told(f"joint friction ({x.friction[0]:.4g}, {x.friction[1]:.4g})", (), "N.m")]),
-    ("passivity controller", lambda x: x.passivity, LEFT_OUT, _HELD,
-     lambda x: [Told("passivity controller")]),
-    ("virtual coupling", lambda x: x.coupling is not None, LEFT_OUT, _HELD,
-     lambda x: [
-         Told("virtual coupling {}", (x.coupling.spring,), "N/m"),
-         Told("{}", (x.coupling.damper,), "N.s/m"),
-     ]),
-)  # fmt: skip
+def _friction_words(x: Hardware) -> list[Quantity]:
+    shoulder, elbow = x.friction
+    return [Quantity(f"joint friction ({shoulder:.4g}, {elbow:.4g})", (), "N.m")]
 
 
-def _trait(name: str, of: Any, theory: str, refuses: dict[str, Refusal], words: Any) -> Trait:
+def _coupling_words(x: Any) -> list[Quantity]:
+    spring, damper = x.coupling.spring, x.coupling.damper
+    return [
+        Quantity("virtual coupling {}", (spring,), "N/m"),
+        Quantity("{}", (damper,), "N.s/m"),
+    ]
+
+
+def _trait(name: str, has: Any, words: Any, theory: str = LEFT_OUT, **refuses: Refusal) -> Trait:
     """The trait of scenes whose hardware has a part."""
     return Trait(
         name,
         "part",
-        lambda s: s.hardware is not None and of(s.hardware),
+        lambda s: s.hardware is not None and has(s.hardware),
         theory,
-        _SAMPLED | refuses,
+        _UNSAMPLED | refuses,
         lambda s: words(s.hardware),
+    )
+
+
+def _field_trait(name: str, field: str, unit: str = "", theory: str = LEFT_OUT) -> Trait:
+    """The trait of a part that is one number, 0 or None without it."""
+    form = f"{field.replace('_', ' ')} {{}}"
+    return _trait(
+        name,
+        lambda x: bool(getattr(x, field)),
+        lambda x: Quantity.of_scene(form, (getattr(x, field),), unit),
+        theory,
     )
 
 
 def hardware_words(scenario: Any) -> str:
     """The parts of the hardware of a scenario, with units; "ideal" if there are none."""
-    found = [told.text() for x in present(scenario, TRAITS[1:]) for told in x.words(scenario)]
+    found = [x.text() for part in present(scenario, TRAITS[1:]) for x in part.words(scenario)]
     return ", ".join(found) or "ideal"
 
 
 TRAITS = (
-    Trait("hardware", "part", lambda s: s.hardware is not None, YES, _SAMPLED),
-    *(_trait(*part) for part in PARTS),
+    Trait("hardware", "part", lambda s: s.hardware is not None, YES, _UNSAMPLED),
+    _field_trait("jitter", "jitter", "s rms"),
+    _field_trait("dropouts", "dropout_probability"),
+    _field_trait("encoder", "encoder", "counts per turn"),
+    _trait("velocity by difference", lambda x: x.velocity == "difference", _difference_words),
+    _trait("converters", lambda x: bool(x.adc_bits or x.dac_bits), _converter_words),
+    _field_trait("force noise", "force_noise", "N rms"),
+    _field_trait("force filter", "force_filter", "Hz"),
+    _field_trait("delay", "delay", "s", YES),
+    _trait("joint friction", lambda x: any(x.friction), _friction_words),
+    _trait(
+        "passivity controller",
+        lambda x: x.passivity,
+        lambda x: [Quantity("passivity controller")],
+        physical=_HELD,
+    ),
+    _trait("virtual coupling", lambda x: x.coupling is not None, _coupling_words, physical=_HELD),
 )

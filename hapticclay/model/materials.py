@@ -33,11 +33,10 @@ PASTE_VISCOSITY = (828.0, 202.4, 40.4)  # apparent [Pa.s]
 
 
 def bearing_factor(tool: Tool) -> float:
-    """Ratio of mean pressure on the tool's face to shear strength of the clay (Skempton 1951).
+    """Mean pressure on the tool's face over shear strength: Nc = 5 (1 + 0.2 B/L) (1 + 0.2 D/B).
 
-    The face, width by depth, is modelled as a rectangular foundation turned on its side. B is the
-    shorter side, L the longer side, and D the depth of the lower edge below the surface:
-    Nc = 5 (1 + 0.2 B/L) (1 + 0.2 D/B), D/B at most 2.5.
+    The face is a rectangular foundation turned on its side (Skempton 1951): B its shorter side, L
+    the longer, D the depth of its lower edge below the surface, at most 2.5 B.
     """
     _check_tool(tool)
     short, long = sorted((tool.width, tool.depth))
@@ -50,11 +49,10 @@ def _check_tool(tool: Tool) -> None:
 
 
 def power_law(rpm: Sequence[float], viscosity: Sequence[float]) -> tuple[float, float]:
-    """Shear stress K rate^n from readings of a rotating viscometer.
+    """K [Pa.s^n] and n of shear stress K rate^n, from rpm and apparent viscosities [Pa.s].
 
-    The spindle is modelled as a long cylinder in a wide vessel. The shear stress at its wall is
-    viscosity x 2 w, and the shear rate 2 w/n (Krieger & Maron 1952); w is its speed in rad/s. n
-    is the slope of a least-squares line through log stress over log w.
+    A long cylinder at w rad/s in a wide vessel has the stress viscosity x 2 w at its wall and the
+    shear rate 2 w/n (Krieger & Maron 1952). n is the slope of log stress over log w.
     """
     x = [math.log(2.0 * _speed(r)) for r in rpm]
     y = [math.log(v) + a for v, a in zip(viscosity, x, strict=True)]
@@ -117,13 +115,10 @@ class Material:
         return self._flow(tool, low, BEARING_LOW), self._flow(tool, high, BEARING_HIGH)
 
     def speeds(self, tool: Tool = SMALL_TOOL) -> tuple[float, float] | None:
-        """Lowest and highest speed of a tool at the shear rates that were measured [m/s].
+        """Lowest and highest speed of a tool at the measured shear rates [m/s]; None without any.
 
         Args:
             tool: as for `flow`.
-
-        Returns:
-            Both speeds; None if no rate was measured, because the flow does not depend on it.
         """
         if self.rates is None:
             return None
@@ -164,9 +159,6 @@ def material(name: str, tool: Tool = SMALL_TOOL) -> Flow:
         name: "very soft clay", "soft clay", "medium clay", "stiff clay", "very stiff clay",
             "printable paste" or "paper clay".
         tool: the tool; 10 mm wide and 5 mm deep by default.
-
-    Returns:
-        The flow.
 
     Raises:
         ParameterError: there is no such material, or the tool is not a Tool.

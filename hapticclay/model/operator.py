@@ -11,7 +11,7 @@ from .traits import Trait
 
 
 def mobility_with(trace, mass):
-    """Largest acceleration of handle and hand per unit of force, for numbers or arrays."""
+    """Largest acceleration of handle and hand per force [1/kg], from the trace of the mobility."""
     return trace / (1.0 + mass * trace)
 
 

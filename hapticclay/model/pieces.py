@@ -29,7 +29,7 @@ PANELS = 2**17  # panels of a quadrature evaluated at once
 
 
 def loop_table(lines: np.ndarray, pieces: np.ndarray, slack: float) -> np.ndarray:
-    """The table of a signal."""
+    """The table of a signal; a jump within `slack` [s] after an instant counts as being at it."""
     table = np.zeros((1 + len(lines) + len(pieces), PIECE))
     table[0, :3] = len(lines), slack, len(table)
     table[1 : 1 + len(lines), :5] = lines
@@ -38,7 +38,7 @@ def loop_table(lines: np.ndarray, pieces: np.ndarray, slack: float) -> np.ndarra
 
 
 def value_rows(rows: np.ndarray, t: np.ndarray, h: Any = 0.0) -> np.ndarray:
-    """As `mean_of_piece`, row by row."""
+    """Mean of each row's piece over [t - h, t + h] [s], shape (n, 2)."""
     u, k = t - rows[:, 0], np.square(h)
     c = rows[:, 1:].reshape(-1, 2, 4).T
     mean = c[0] + u * (c[1] + u * (c[2] + u * c[3])) + k * (c[2] / 3.0 + c[3] * u)
@@ -46,7 +46,7 @@ def value_rows(rows: np.ndarray, t: np.ndarray, h: Any = 0.0) -> np.ndarray:
 
 
 def pieces_value(pieces: np.ndarray, t: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """As `value_of_pieces`, at many times."""
+    """As `value_of_pieces`, at many times; `near` lies on the wanted side of each."""
     at = np.searchsorted(pieces[:, 0], near, "right") - 1
     return value_rows(pieces[np.maximum(at, 0)], t)
 
@@ -73,7 +73,7 @@ def pieces_mean(pieces: np.ndarray, t: np.ndarray, h: np.ndarray) -> np.ndarray:
 
 
 def added_pieces(parts: Sequence[np.ndarray], factors: Sequence[float]) -> np.ndarray:
-    """Pieces of a sum."""
+    """Pieces of the sum of signals, each with its factor."""
     terms = [(x, k) for x, k in zip(parts, factors, strict=True) if len(x)]
     if not terms:
         return NO_PIECES
@@ -93,7 +93,7 @@ def added_pieces(parts: Sequence[np.ndarray], factors: Sequence[float]) -> np.nd
 
 
 def straight_pieces(start: Any, values: Any, slopes: Any = None) -> np.ndarray:
-    """Constant or straight pieces."""
+    """Straight pieces from values (x, y) at their starts [s]; constant ones without slopes."""
     out = np.zeros((len(start), PIECE))
     out[:, 0] = start
     out[:, [1, 5]] = values
@@ -126,7 +126,7 @@ def interpolate(f: Callable[[np.ndarray], np.ndarray], edges: np.ndarray) -> np.
 def integrals(
     f: Callable[[np.ndarray], np.ndarray], begin: np.ndarray, end: np.ndarray, panels: np.ndarray
 ) -> np.ndarray:
-    """Integrals by Gauss quadrature with ten nodes per panel."""
+    """Integrals of f, (m,) to (m, 2), by Gauss quadrature with ten nodes per panel."""
     out = np.zeros((len(begin), 2))
     for which in np.array_split(np.arange(len(begin)), panels.sum() // PANELS + 1):
         of = np.repeat(which, panels[which])

@@ -16,7 +16,7 @@ from .smooth import Smooth
 
 
 def region_table(clay: Clay | None, length: float | None) -> np.ndarray:
-    """Tabulates clay and the end of the path for `enter_region`."""
+    """Clay, and the end of the path [m] (None for no end), as a table for `enter_region`."""
     given = clay.laws if clay else (NOTHING, NOTHING)
     laws = [NOTHING if isinstance(law, Smooth) else law for law in given]
     end = math.inf if length is None else length
@@ -33,7 +33,7 @@ def region_table(clay: Clay | None, length: float | None) -> np.ndarray:
         for own, e, step in zip(law.borders, lines, (law.damping.shape[1], 1), strict=True):
             out.put([float(step * bisect.bisect_right(own, x)) for x in (-math.inf, *e)])
     _put_smooth(out, given)
-    # those of both axes are one where they may be
+    # equal laws of both axes share their columns
     _put_cells(out, clay, laws[:1] if laws[0] == laws[1] else laws)
     return out.table()
 
@@ -52,7 +52,7 @@ class _Columns:
         self._columns.append(values)
         self._size += len(values)
 
-    def lack(self) -> None:
+    def leave_out(self) -> None:
         """Marks a column as absent."""
         self._head.append(0.0)
 
@@ -70,7 +70,7 @@ def _put_smooth(out: _Columns, given: Sequence[Any]) -> None:
     """Adds the numbers of smooth clay of x and of y."""
     for i, law in enumerate(given):
         if not isinstance(law, Smooth):
-            out.lack()
+            out.leave_out()
         elif i == 1 and isinstance(given[0], Smooth) and given[0] == law:
             out.repeat()
         else:
@@ -82,8 +82,8 @@ def _put_cells(out: _Columns, clay: Clay | None, laws: Sequence[Any]) -> None:
     yields, springs = bool(clay and clay.yields), bool(clay and clay.springs)
     for what in ["damping", "rates", "entered", *["flows"] * yields, *["elastic"] * springs]:
         if what == "elastic" and not yields:
-            out.lack()
-            out.lack()
+            out.leave_out()
+            out.leave_out()
         for law in laws:
             out.put(_of_cells(what, law))
         if len(laws) < 2:

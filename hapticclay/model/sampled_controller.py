@@ -95,15 +95,9 @@ class LawFailed(RuntimeError):
 
 
 class LawCaller:
-    """Calls a law between the write of measurements and the read of torques in the buffer.
+    """Calls a law between the write of measurements and the read of torques in shared floats.
 
-    Args:
-        controller: controller that holds the law.
-        buffer: the shared floats, shape (n,).
-
-    Attributes:
-        law: the function.
-        error: exception of a failed call, after which the torques are not finite.
+    After a failed call, `error` holds the exception, and the torques are not finite.
     """
 
     def __init__(self, controller: Controller, buffer: Any):
@@ -144,10 +138,9 @@ class LawCaller:
         return all(map(math.isfinite, self.buffer[TORQUE : TORQUE + 2].tolist()))
 
     def check(self) -> None:
-        """Raises LawFailed if a call has failed; it then leaves torques not finite.
+        """Raises LawFailed if a call has failed, or Ctrl-C and its like unchanged.
 
-        Exceptions that are not errors, such as Ctrl-C, are raised unchanged. Torques that are not
-        finite end a run; at the first sample they raise LawFailed.
+        Torques that are not finite end a run; at the first sample they raise LawFailed.
         """
         if self.error is None and not self.finite():
             if all(map(math.isfinite, self._returned)):

@@ -121,13 +121,6 @@ class Samples(Signal):
         return pieces.straight_pieces(t, np.concatenate((before, values)), slopes)
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
-        """As Signal.pieces.
-
-        Args:
-            begin: as there.
-            end: as there.
-            step: as there.
-        """
         first, last = np.searchsorted(self._rows[:, 0], (begin, end), "right")
         return self._rows[max(first - 1, 0) : max(last, 1)]
 
@@ -154,18 +147,18 @@ class Function(Signal):
 
     def _at(self, t: float) -> tuple[float, float]:
         """Value at one time."""
-        told = f"f({t:.12g}) must be a pair (x, y) of finite numbers"
+        bound = f"f({t:.12g}) must be a pair (x, y) of finite numbers"
         try:
             given = self.f(t)
         except Exception as error:  # noqa: BLE001  # whatever a user's function may raise
             why = " ".join(f"{type(error).__name__}: {error}".split())
-            raise ParameterError("function.f", self.f, f"{told}, but raised {why}") from error
+            raise ParameterError("function.f", self.f, f"{bound}, but raised {why}") from error
         try:
             x, y = (float(v) for v in given)
         except (TypeError, ValueError):
-            raise ParameterError("function.f", self.f, f"{told}, not {given!r:.60}") from None
+            raise ParameterError("function.f", self.f, f"{bound}, not {given!r:.60}") from None
         if not (math.isfinite(x) and math.isfinite(y)):
-            raise ParameterError("function.f", self.f, f"{told}, not ({x}, {y})")
+            raise ParameterError("function.f", self.f, f"{bound}, not ({x}, {y})")
         return x, y
 
     def _together(self, t: np.ndarray) -> np.ndarray | None:
@@ -198,22 +191,9 @@ class Function(Signal):
         return np.array([self._at(x) for x in t.tolist()]).reshape(-1, 2)
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
-        """As Signal.pieces.
-
-        Args:
-            begin: as there.
-            end: as there.
-            step: as there.
-        """
         return pieces.interpolate(self._values, pieces.cell_edges(begin, end, 0.5 * step))
 
     def breaks(self, begin: float, end: float) -> np.ndarray:
-        """No known breaks.
-
-        Args:
-            begin: as Signal.breaks.
-            end: as Signal.breaks.
-        """
         return np.zeros(0)
 
     def _means(self, t: np.ndarray, h: np.ndarray) -> np.ndarray:

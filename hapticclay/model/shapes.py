@@ -29,17 +29,9 @@ class Constant(Signal):
 
     @property
     def varies(self) -> bool:
-        """It does not."""
         return False
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
-        """As Signal.pieces.
-
-        Args:
-            begin: as there.
-            end: as there.
-            step: as there.
-        """
         return pieces.straight_pieces([0.0], [self.value])
 
 
@@ -56,13 +48,6 @@ class Step(Signal):
     time: Moment
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
-        """As Signal.pieces.
-
-        Args:
-            begin: as there.
-            end: as there.
-            step: as there.
-        """
         return pieces.straight_pieces([self.time - BEFORE, self.time], [(0.0, 0.0), self.value])
 
 
@@ -81,13 +66,6 @@ class Ramp(Signal):
     end: Annotated[float | None, Bound("start", 1e5, "s", above=True)] = None
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
-        """As Signal.pieces.
-
-        Args:
-            begin: as there.
-            end: as there.
-            step: as there.
-        """
         start, none = [self.start - BEFORE, self.start], (0.0, 0.0)
         if self.end is None:
             return pieces.straight_pieces(start, [none, none], [none, self.rate])
@@ -118,13 +96,6 @@ class Pulse(Signal):
             number("pulse.period", self.period, self.width, above=True, unit="s")
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
-        """As Signal.pieces.
-
-        Args:
-            begin: as there.
-            end: as there.
-            step: as there.
-        """
         k = np.zeros(1)
         if self.period is not None:
             first, last = ((x - self.start) / self.period for x in (begin, end))
@@ -192,13 +163,6 @@ class Chirp(Signal):
         return wave[:, None] * np.array(self.amplitude)
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
-        """As Signal.pieces.
-
-        Args:
-            begin: as there.
-            end: as there.
-            step: as there.
-        """
         stop, rows = self.start + self.duration, []
         low, high = max(begin, self.start), min(end, stop)
         if begin < self.start or high <= low:
@@ -211,12 +175,6 @@ class Chirp(Signal):
         return np.concatenate(rows)
 
     def breaks(self, begin: float, end: float) -> np.ndarray:
-        """As Signal.breaks.
-
-        Args:
-            begin: as there.
-            end: as there.
-        """
         return np.array([self.start, self.start + self.duration])
 
     def _means(self, t: np.ndarray, h: np.ndarray) -> np.ndarray:

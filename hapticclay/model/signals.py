@@ -24,7 +24,7 @@ MOST_LINES = 100_000
 
 
 def multisine_line(omega: Any, phase: Any, t: Any, h: Any) -> Any:
-    """Mean of cos(omega t + phase) over [t - h, t + h]. Numbers, or arrays of one shape."""
+    """Mean of cos(omega t + phase) over [t - h, t + h], in rad/s, rad and s."""
     return np.sinc(omega * h / np.pi) * np.cos(omega * t + phase)
 
 
@@ -50,38 +50,29 @@ class Signal(ABC):
 
     @abstractmethod
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
-        """All of it but multisines, as cubics in time; more than those of the interval may come.
+        """All of it but multisines, as cubics in time, shape (n, pieces.PIECE), or more of them.
 
         Args:
             begin: of the interval [s].
             end: of the interval [s]; what has no pieces of its own is not evaluated beyond.
             step: of the run [s]; cubics through single values are half as long.
-
-        Returns:
-            Shape (n, pieces.PIECE).
         """
 
     def breaks(self, begin: float, end: float) -> np.ndarray:
-        """Times at which value or slope may jump.
+        """Ascending times [s] at which value or slope may jump, and perhaps others outside.
 
         Args:
             begin: of the interval [s].
             end: of the interval [s].
-
-        Returns:
-            Ascending [s], shape (n,); some may lie outside the interval.
         """
         return self.pieces(begin, end, math.inf)[1:, 0]
 
     def mean(self, t: Any, h: Any) -> np.ndarray:
-        """Mean over [t - h, t + h]; the value at t for h = 0.
+        """Mean over [t - h, t + h], shape (2,) or (n, 2); the value at t for h = 0.
 
         Args:
             t: centre of the interval [s], a number or shape (n,).
             h: half its length [s], a number or shape (n,).
-
-        Returns:
-            Shape (2,) or (n, 2).
         """
         t, h = np.broadcast_arrays(np.asarray(t, float), np.asarray(h, float))
         return self._means(t.ravel(), h.ravel()).reshape(*t.shape, 2)
@@ -103,13 +94,10 @@ class Signal(ABC):
         return 0.0
 
     def __call__(self, t: Any) -> np.ndarray:
-        """Value at a time.
+        """Value at a time, shape (2,) or (n, 2).
 
         Args:
             t: time [s], a number or shape (n,).
-
-        Returns:
-            Shape (2,) or (n, 2).
         """
         return self.mean(t, 0.0)
 
@@ -162,34 +150,19 @@ class Sum(Signal):
 
     @property
     def varies(self) -> bool:
-        """Whether any of them changes with time."""
         return any(part.varies for part in self.parts)
 
     @property
     def cosines(self) -> np.ndarray:
-        """Lines of all parts, shape (n, 5)."""
         return np.concatenate([x.cosines * (1.0, 1.0, 1.0, k, k) for x, k in self._terms()])
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
-        """As Signal.pieces.
-
-        Args:
-            begin: as there.
-            end: as there.
-            step: as there.
-        """
         terms = self._terms()
         return pieces.added_pieces(
             [x.pieces(begin, end, step) for x, _ in terms], [k for _, k in terms]
         )
 
     def breaks(self, begin: float, end: float) -> np.ndarray:
-        """As Signal.breaks.
-
-        Args:
-            begin: as there.
-            end: as there.
-        """
         return np.unique(np.concatenate([x.breaks(begin, end) for x in self.parts]))
 
     def _means(self, t: np.ndarray, h: np.ndarray) -> np.ndarray:
@@ -199,12 +172,6 @@ class Sum(Signal):
         return out
 
     def mean_of_multisines(self, t: Any, h: Any) -> Any:
-        """As Signal.mean_of_multisines.
-
-        Args:
-            t: as there.
-            h: as there.
-        """
         return sum(k * x.mean_of_multisines(t, h) for x, k in self._terms())
 
 
@@ -273,38 +240,18 @@ class Multisine(Signal):
 
     @property
     def cosines(self) -> np.ndarray:
-        """As Signal.cosines."""
         amplitude = np.tile(self.amplitude, (len(self.omega), 1))
         return np.column_stack((self.omega, self.phase, amplitude))
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
-        """None.
-
-        Args:
-            begin: as Signal.pieces.
-            end: as Signal.pieces.
-            step: as Signal.pieces.
-        """
         return pieces.NO_PIECES
 
     def mean(self, t: Any, h: Any) -> np.ndarray:
-        """As Signal.mean.
-
-        Args:
-            t: as there.
-            h: as there.
-        """
         t, h = np.asarray(t)[..., None], np.asarray(h)[..., None]
         lines = (multisine_line(self.omega, self.phase[:, i], t, h).sum(-1) for i in (0, 1))
         return np.stack([x * self.amplitude[i] for i, x in enumerate(lines)], -1)
 
     def mean_of_multisines(self, t: Any, h: Any) -> Any:
-        """As Signal.mean.
-
-        Args:
-            t: as there.
-            h: as there.
-        """
         return self.mean(t, h)
 
 

@@ -60,12 +60,6 @@ class Smooth(CellLaw):
         return none, none, none + 1.0
 
     def flows_at(self, x: Any, y: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """As `Grid.flows_at`: it does not yield.
-
-        Args:
-            x: coordinates [m].
-            y: the same along y.
-        """
         none = np.zeros(np.broadcast(x, y).shape)
         return none, none, none + 1.0
 
@@ -107,35 +101,14 @@ class Smooth(CellLaw):
         return windows.max(axis=(2, 3)) > 0.0
 
     def at(self, x: Any, y: Any) -> np.ndarray:
-        """Damping at given places [N.s/m].
-
-        Args:
-            x: coordinates [m].
-            y: the same along y.
-        """
         numbers: Any = self.numbers
         table = memoryview(numbers)
         return np.vectorize(lambda x, y: smooth_damping(table, 0, x, y), otypes=[float])(x, y)
 
     def forces_at(self, kinds: Any, x: Any, y: Any, speed: float, dent: float) -> np.ndarray:
-        """As `Grid.forces_at`, for damping alone.
-
-        Args:
-            kinds: has no effect.
-            x: coordinates [m].
-            y: the same along y.
-            speed: of the tool [m/s].
-            dent: has no effect.
-        """
         return speed * self.at(x, y)
 
     def within(self, low: tuple[float, float], high: tuple[float, float]) -> list[float]:
-        """Control points of the damping in a box [N.s/m].
-
-        Args:
-            low: lowest corner of the box [m].
-            high: highest corner of the box [m].
-        """
         (i, j), (k, m) = self.index(*low), self.index(*high)
         last = np.array(self.damping.shape) - 1
         first, end = np.clip((i - 3, j - 3), 0, last), np.clip((k, m), 0, last) + 1

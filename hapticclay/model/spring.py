@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
 
 from ..arguments import part
 from ..errors import Bound, ParameterError
-from .traits import LEFT_OUT, Law, Refusal, Told, told_pair, told_values
+from .traits import LEFT_OUT, Law, Quantity, Refusal
 
 STIFFNESS_MAX = 1e9  # [N/m]
 RESOLVED = 0.2  # [rad] limit of step times highest frequency of the springs in the loop
@@ -60,16 +59,24 @@ _UNGUARDED = Refusal(
 )
 
 
-def _words(clay: Any) -> list[Told]:
+def _words(clay: Any) -> list[Quantity]:
     """Stiffness, limit and relaxing stiffness over a scene."""
     rows = np.concatenate([law.elastic.reshape(-1, 5) for law in clay.laws])
-    return _told(*(told_values(form, _finite(rows[:, j]), unit) for form, unit, j in _QUANTITIES))
+    return [
+        x
+        for form, unit, j in _QUANTITIES
+        for x in Quantity.of_scene(form, _finite(rows[:, j]), unit)
+    ]
 
 
-def _here(clay: Any, place: tuple[float, float]) -> list[Told]:
+def _here(clay: Any, place: tuple[float, float]) -> list[Quantity]:
     """Stiffness, limit and relaxing stiffness of both axes at a place."""
     x, y = (law.elastic[law.index(*place)] for law in clay.laws)
-    return _told(*(told_pair(form, _finite((x[j], y[j])), unit) for form, unit, j in _QUANTITIES))
+    return [
+        q
+        for form, unit, j in _QUANTITIES
+        for q in Quantity.of_axes(form, _finite((x[j], y[j])), unit)
+    ]
 
 
 _QUANTITIES = (  # words, unit, and place in `Spring.numbers`
@@ -77,10 +84,6 @@ _QUANTITIES = (  # words, unit, and place in `Spring.numbers`
     ("yielding at {}", "N", 1),
     ("relaxing k1 = {}", "N/m", 2),
 )
-
-
-def _told(*quantities: Sequence[Told]) -> list[Told]:
-    return [x for some in quantities for x in some]
 
 
 def _finite(values: Any) -> list[float]:

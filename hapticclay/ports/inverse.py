@@ -8,7 +8,7 @@ Vectors are (x, y, z) in metre, metre per second and newton, z up.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -34,15 +34,10 @@ from .commands import (
 
 LARGEST_MESSAGE = 65_536  # bytes
 JOINTS = ("a0", "a1")  # joints of the planar arm
-KEYS = {  # keys of a command's body, that of version 3.5 first
-    "set_cursor_force": ("vector", "values"),
-    "set_cursor_position": ("position", "values"),
-    "set_angular_torques": ("torques", "values"),
-}
-QUANTITIES = {  # quantity in a command's body
-    "set_cursor_force": FORCE,
-    "set_cursor_position": POSITION,
-    "set_angular_torques": TORQUE,
+COMMANDS = {  # keys of a command's body, that of version 3.5 first; its quantity, and their names
+    "set_cursor_force": (("vector", "values"), FORCE, AXES),
+    "set_cursor_position": (("position", "values"), POSITION, AXES),
+    "set_angular_torques": (("torques", "values"), TORQUE, JOINTS),
 }
 PROBES = ("probe_position", "probe_orientation")
 DEVICES = ("inverse3", "minverse", "verse_grip", "wireless_verse_grip", "custom_verse_grip")
@@ -134,36 +129,37 @@ def read_message(data: str | bytes) -> Message:
         return Message(notices=("not JSON",))
     if not isinstance(tree, dict):
         return Message(notices=("not an object",))
-    notices = [f"unknown key {name}" for name in tree if name not in ("session", *DEVICES)]
-    full, profile = _session(tree.get("session", {}), notices)
-    found = _Found([], [], [], [])
+    found = _Contents()
+    found.notices += [f"unknown key {name}" for name in tree if name not in ("session", *DEVICES)]
+    full, profile = _session(tree.get("session", {}), found.notices)
     for kind in DEVICES:
-        for entry in _entries(tree.get(kind, []), kind, notices):
+        for entry in _entries(tree.get(kind, []), kind, found.notices):
             name = entry.get("device_id")
             if not isinstance(name, str):
-                notices.append(f"{kind} without device_id")
+                found.notices.append(f"{kind} without device_id")
                 continue
             found.devices.append(name)
-            _read_commands(name, entry, found, notices)
+            _read_commands(name, entry, found)
     return Message(
         tuple(found.forces),
         tuple(found.devices),
         full,
         profile,
-        tuple(dict.fromkeys(notices)),
+        tuple(dict.fromkeys(found.notices)),
         tuple(found.targets),
         tuple(found.torques),
     )
 
 
 @dataclass
-class _Found:
-    """Contents of the entries of a message."""
+class _Contents:
+    """Contents of a message, as it is read."""
 
-    devices: list[str]
-    forces: list[Force]
-    targets: list[Target]
-    torques: list[Torques]
+    devices: list[str] = field(default_factory=list)
+    forces: list[Force] = field(default_factory=list)
+    targets: list[Target] = field(default_factory=list)
+    torques: list[Torques] = field(default_factory=list)
+    notices: list[str] = field(default_factory=list)
 
 
 def _session(part: Any, notices: list[str]) -> tuple[bool, str]:
@@ -195,46 +191,43 @@ def _entries(part: Any, kind: str, notices: list[str]) -> Iterator[Mapping[str, 
             notices.append(f"entry of {kind} is no object")
 
 
-def _read_commands(
-    device: str, entry: Mapping[str, Any], found: _Found, notices: list[str]
-) -> None:
+def _read_commands(device: str, entry: Mapping[str, Any], found: _Contents) -> None:
     """Adds the commands in a device's entry to the contents found so far."""
-    notices += [
+    found.notices += [
         f"unknown key {name} of a device"
         for name in entry
         if name not in ("device_id", "commands", "configure")
     ]
     if "configure" in entry:
-        notices.append("configure is not simulated")
+        found.notices.append("configure is not simulated")
     commands = entry.get("commands", {})
     if not isinstance(commands, Mapping):
-        notices.append("commands is no object")
+        found.notices.append("commands is no object")
         return
     for name, body in commands.items():
         if name == "set_cursor_force":
-            x, y, z = _numbers(name, body, AXES, notices) or NOTHING
+            x, y, z = _numbers(name, body, found.notices) or NOTHING
             found.forces.append(Force(device, (x, y, z)))
         elif name == "set_cursor_position":
-            if place := _numbers(name, body, AXES, notices):  # no position, no target
+            if place := _numbers(name, body, found.notices):  # no position, no target
                 found.targets.append(Target(device, (place[0], place[1], place[2])))
         elif name == "set_angular_torques":
-            a0, a1 = _numbers(name, body, JOINTS, notices) or (0.0, 0.0)
+            a0, a1 = _numbers(name, body, found.notices) or (0.0, 0.0)
             found.torques.append(Torques(device, (a0, a1)))
         elif name not in PROBES:
-            notices.append(f"command {name} is not simulated")
+            found.notices.append(f"command {name} is not simulated")
 
 
-def _numbers(
-    command: str, body: Any, names: Sequence[str], notices: list[str]
-) -> tuple[float, ...] | None:
+def _numbers(command: str, body: Any, notices: list[str]) -> tuple[float, ...] | None:
     """The numbers of a command's body; 0 if missing, None if one is unusable."""
+    keys, quantity, names = COMMANDS[command]
     given = None
     if isinstance(body, Mapping):
-        given = next((body[key] for key in KEYS[command] if key in body), None)
+        given = next((body[key] for key in keys if key in body), None)
     if not isinstance(given, Mapping):
-        notices.append(f"{command} without {KEYS[command][0]}")
+        notices.append(f"{command} without {keys[0]}")
         return None
-    values, dropped = read_numbers(given, names, QUANTITIES[command])
+    values, dropped = read_numbers(given, names, quantity)
     if dropped:
         notices.append(dropped)
     return values
@@ -248,16 +241,13 @@ def message_text(message: Message) -> str:
         session["configure"] = {"profile": {"name": message.profile}}
     if session:
         tree["session"] = session
-    entries = [_entry(x.device_id, *_body(x)) for x in _commands(message)]
+    commands = *message.forces, *message.targets, *message.torques
+    entries = [_entry(x.device_id, *_body(x)) for x in commands]
     named = {entry["device_id"] for entry in entries}
     entries += [_entry(name, "probe_position", {}) for name in message.devices if name not in named]
     if entries:
         tree["inverse3"] = entries
     return json.dumps(tree, allow_nan=False)
-
-
-def _commands(message: Message) -> Sequence[Force | Target | Torques]:
-    return *message.forces, *message.targets, *message.torques
 
 
 def _body(command: Force | Target | Torques) -> tuple[str, dict[str, Any]]:

@@ -48,9 +48,9 @@ class Limits:
 PLAIN = Limits()
 
 
-def allowed(force: Vector, largest: float, grown: float) -> Vector:
+def allowed(force: Vector, largest: float, share: float) -> Vector:
     """A force within its largest length, times the share of the ramp."""
-    scale = grown * shortening(force, largest)
+    scale = share * shortening(force, largest)
     if not scale:
         return NOTHING
     return force[0] * scale, force[1] * scale, force[2] * scale
@@ -62,14 +62,14 @@ class ForceLimiter:
     def __init__(self, limits: Limits):
         """Starts with the ramp, before any force."""
         self._limits, self.withheld = limits, 0  # forces not sent: the position was frozen
-        self._ramp_from = 0.0  # [s]
+        self._ramp_start = 0.0  # [s]
         self._sent, self._sent_at = NOTHING, -limits.Ts  # the newest force, and when [s]
         self._position: Vector | None = None  # the newest
         self._pushed_at: float | None = None  # [s] when a force first acted at this position
         self._is_frozen = False
 
     def restart(self, t: float) -> None:
-        self._ramp_from, self._pushed_at = t, None
+        self._ramp_start, self._pushed_at = t, None
 
     def see(self, position: Vector, t: float) -> None:
         """Compares a position with the one before."""
@@ -83,16 +83,16 @@ class ForceLimiter:
         self._sent_at = t
         if passed > limits.Ts + limits.patience:  # the device may have let go meanwhile
             self.restart(t)
-        asked = NOTHING if lost else allowed(force, limits.largest_force, self._grown(t))
+        asked = NOTHING if lost else allowed(force, limits.largest_force, self._ramp_share(t))
         if not shortening(force, limits.largest_force):
             self._pushed_at = None
             self._thaw(t)
         self._sent = self._slewed(self._unless_frozen(asked, t), passed)
         return self._sent
 
-    def _grown(self, t: float) -> float:
+    def _ramp_share(self, t: float) -> float:
         """Share of the ramp that has passed, 0 to 1."""
-        ramp, passed = self._limits.ramp, t - self._ramp_from
+        ramp, passed = self._limits.ramp, t - self._ramp_start
         return 1.0 if passed >= ramp else max(0.0, passed / ramp)
 
     def _unless_frozen(self, asked: Vector, t: float) -> Vector:

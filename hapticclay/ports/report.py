@@ -339,9 +339,9 @@ def _ages(
     if later.sum() < FEWEST:
         later, tried = contact, FIRST
     fits = [_fitted(exchanges, force, normal, later, back) for back in range(1, tried + 1)]
-    left = np.array([1.0 - fit.explained for fit in fits])
-    alike = max(left.min(), ROUNDING**2) * math.exp(min(ALIKE / later.sum(), 1.0))
-    good = np.flatnonzero(left <= alike) + 1
+    unexplained = np.array([1.0 - fit.explained for fit in fits])
+    threshold = max(unexplained.min(), ROUNDING**2) * math.exp(min(ALIKE / later.sum(), 1.0))
+    good = np.flatnonzero(unexplained <= threshold) + 1
     return int(good[0]), int(good[-1]), tried
 
 
@@ -352,19 +352,21 @@ def _fitted(
     at = np.flatnonzero(contact)
     at = at[at >= back]
     place, rate = exchanges.position[at - back], exchanges.velocity[at - back]
-    given = np.column_stack([place @ normal, rate @ normal, np.ones(len(at))])
-    scale = np.maximum(np.abs(given).max(axis=0), 1e-300)
+    regressors = np.column_stack([place @ normal, rate @ normal, np.ones(len(at))])
+    scale = np.maximum(np.abs(regressors).max(axis=0), 1e-300)
     y = force[at]
-    solution, _, rank, _ = np.linalg.lstsq(given / scale, y)
-    missed = y - given @ (solution / scale)
-    square = float(missed @ missed) / max(1, len(at) - 3)
-    spread = np.linalg.pinv((given / scale).T @ (given / scale))
-    error = math.sqrt(square * spread[0, 0]) / scale[0] if rank == 3 else math.inf
+    solution, _, rank, _ = np.linalg.lstsq(regressors / scale, y)
+    residual = y - regressors @ (solution / scale)
+    variance = float(residual @ residual) / max(1, len(at) - 3)
+    covariance = np.linalg.pinv((regressors / scale).T @ (regressors / scale))
+    error = math.sqrt(variance * covariance[0, 0]) / scale[0] if rank == 3 else math.inf
     K, B, _ = 0.0 - solution / scale
     total = float(((y - y.mean()) ** 2).sum())
-    even = total < 1e-12 * float(y @ y)  # a constant force does not show a wall
-    explained = 0.0 if even else 1.0 - float(missed @ missed) / total
+    is_constant = total < 1e-12 * float(y @ y)  # a constant force does not show a wall
+    explained = 0.0 if is_constant else 1.0 - float(residual @ residual) / total
     mean = place.mean(axis=0)
-    way = float(normal[0]), float(normal[1])
-    where = float(mean[0]), float(mean[1])
-    return WallFit(float(K), float(B), error, explained, back, back, back, way, where, len(at))
+    direction = float(normal[0]), float(normal[1])
+    centre = float(mean[0]), float(mean[1])
+    return WallFit(
+        float(K), float(B), error, explained, back, back, back, direction, centre, len(at)
+    )

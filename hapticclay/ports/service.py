@@ -177,7 +177,7 @@ class Service:
     def start(self) -> None:
         """Starts the wall clock; does nothing with the clock "tick"."""
         if self.clock == "wall":
-            self._thread = threading.Thread(target=self._go, name="device", daemon=True)
+            self._thread = threading.Thread(target=self._run_clock, name="device", daemon=True)
             self._thread.start()
 
     def stop(self) -> None:
@@ -186,7 +186,7 @@ class Service:
             self._thread.join()
         self.device.drive(LIMP)
 
-    def _go(self) -> None:
+    def _run_clock(self) -> None:
         sample = float(self.device.scenario.Ts or self.device.scenario.dt)
         begin = time.perf_counter()
         while not self._stop.is_set() and not self.device.ended:

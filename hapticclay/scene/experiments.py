@@ -89,7 +89,8 @@ class Experiment:
         control: "continuous", part of the differential equation, or "sampled": measured and held
             every Ts.
         Ts: control sample [s], a whole multiple of dt, at most 1; None for dt.
-        render: clay of a sampled loop: its force "held" by the motors, or "physical" (physical).
+        render: clay of a sampled loop: its force "held" by the motors, or "physical": there all
+            the time.
     """
 
     operator: Operator | None = None

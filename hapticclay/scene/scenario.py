@@ -82,7 +82,7 @@ class Scenario:
             equation; or "sampled", the paper's hardware: measured, computed and held every Ts.
         Ts: control sample [s], a whole multiple of dt, at most 1; None for dt.
         render: where control is sampled, the clay is "held" (the motors hold its force, computed
-            from the sample) or "physical" (physical, there all the time).
+            from the sample) or "physical" (there all the time).
         muscle: variable part of uh [N], any signal or sum of signals; None for none.
         command: displacement added to the compensator's output [m]: the signal less its value at
             t = 0, so that the run starts without a jump; None for none.

@@ -32,10 +32,10 @@ def scenario_rows(scenario: Any) -> list[tuple[str, str]]:
     rows.append(("control", _control(s)))
     goal = "" if s.length is None else f"p_x = {s.length:g} m, or "
     rows.append(("ends at", f"{goal}{s.t_max:g} s"))
-    plain = {f: type(s).__dataclass_fields__[f].default for f in ("arm", "servo", "compensator")}
-    own = [name for name, default in plain.items() if getattr(s, name) != default]
-    if own:
-        rows.append(("replaced", ", ".join(own)))
+    defaults = {f: type(s).__dataclass_fields__[f].default for f in ("arm", "servo", "compensator")}
+    replaced = [name for name, default in defaults.items() if getattr(s, name) != default]
+    if replaced:
+        rows.append(("replaced", ", ".join(replaced)))
     if s.hardware is not None:
         rows.append(("hardware", hardware_words(s)))
     return rows

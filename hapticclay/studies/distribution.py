@@ -85,9 +85,6 @@ class Distribution:
 
         Args:
             u: shares, 0 < u < 1, any shape.
-
-        Returns:
-            Values, of the shape of u.
         """
         if self.law == "uniform":
             return self.first + (self.second - self.first) * u
@@ -100,9 +97,6 @@ class Distribution:
 
         Args:
             z: standard normal numbers, any shape.
-
-        Returns:
-            Values, of the shape of z.
         """
         if self.law == "normal":
             return self.first + self.second * z
@@ -112,13 +106,10 @@ class Distribution:
         return self.spread(_normal_share(z))
 
     def share_below(self, x: np.ndarray) -> np.ndarray:
-        """Cumulative distribution: share of the numbers below given values.
+        """Cumulative distribution: share of the numbers below given values, 0 to 1.
 
         Args:
             x: values, any shape.
-
-        Returns:
-            Shares from 0 to 1, of the shape of x.
         """
         x = np.asarray(x, dtype=float)
         if self.law == "normal":
@@ -157,7 +148,7 @@ def _normal_share(z: np.ndarray) -> np.ndarray:
 
 
 def parse_laws(text: str, unit_of: Callable[[str], str] = lambda _: "") -> dict[str, Distribution]:
-    """Reads "delay=uniform:0:1e-3 pose.x=normal:0:0.02"."""
+    """Reads "delay=uniform:0:1e-3 pose.x=normal:0:0.02", each name once."""
     if not isinstance(text, str):
         raise ParameterError("vary", text, "must be a text such as delay=uniform:0:1e-3")
     how = "must be name=law:number:number, as in delay=uniform:0:1e-3, each name once"

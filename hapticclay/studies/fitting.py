@@ -55,14 +55,10 @@ from .sliding import (
     sliding_along_positions,
     sliding_at_known_speed,
 )
-from .trajectory import (
-    Joint,
-    Minimum,
-    correlation_time,
-)
+from .trajectory import JointFit, Minimum, correlation_time
 
-LEAST_INDEPENDENT = 10  # ... of which so many are independent
-FEW_SLIDING = 300
+LEAST_INDEPENDENT = 10  # independent sliding samples
+FEW_SLIDING = 300  # independent sliding samples, below which a warning is given
 NARROW = 3.0  # ratio of speeds below which n is hardly identifiable
 MIDDLE = 0.96  # share of the samples whose speeds are compared
 EXACT = 1e-4  # of the force: smaller residuals are errors of splines or steps, not noise
@@ -75,7 +71,7 @@ CORRELATED = 2.0  # samples per independent sample, above which a warning is giv
 @named
 @dataclass(frozen=True)
 class FittedLaw:
-    """One candidate.
+    """A law fitted to a motion, beside other candidates.
 
     Attributes:
         law: its name, in FLOW_LAWS.
@@ -155,11 +151,11 @@ class Fitted(Result):
 
     def headline(self) -> str:
         """The law and its parameters with their intervals, in one line."""
-        told = (
+        parameters = (
             f"{p.name} {p.value:.4g} ({p.low:.4g} to {p.high:.4g}) {p.unit}".rstrip()
             for p in self.parameters
         )
-        return f"{self.law}: {', '.join(told)}"
+        return f"{self.law}: {', '.join(parameters)}"
 
     @property
     def flow(self) -> Flow:
@@ -219,7 +215,6 @@ class Fitted(Result):
         return [line, *(f"warning: {x}" for x in self.warnings)]
 
     def figures(self) -> dict[str, Any]:
-        """The law and its samples."""
         tables = self.tables()
         shown = {name: tables[name] for name in ("samples", "parameters")}  # fit.csv: samples
         return {"fit": figure_of(self, tables=shown)}
@@ -332,7 +327,7 @@ class _Columns(NamedTuple):
     inside: np.ndarray
 
     def sliding(self, out: np.ndarray) -> Sliding:
-        """The sliding samples without the forces of a mask."""
+        """The sliding samples without outliers of the force, a mask."""
         if self.place is None:
             assert self.v is not None
             return sliding_at_known_speed(self.t, self.v, self.f, self.inside & ~out)
@@ -340,16 +335,16 @@ class _Columns(NamedTuple):
 
 
 class _Laws(NamedTuple):
-    """Every candidate fitted: best within bounds, and with Fy and b of any sign."""
+    """Every candidate fitted."""
 
-    joint: Joint
-    found: dict[str, tuple[Minimum, Minimum]]
+    joint: JointFit
+    found: dict[str, tuple[Minimum, Minimum]]  # best within bounds; with Fy and b of any sign
     least: float  # variance of a force: smaller ones are errors of splines or steps
     tau: float  # samples per independent sample
 
 
-def _joint(s: Sliding, ratio: float) -> Joint:
-    return Joint(s.f, s.p, s.motion, s.v, ratio, 0.5 * s.slowest)
+def _joint(s: Sliding, ratio: float) -> JointFit:
+    return JointFit(s.f, s.p, s.motion, s.v, ratio, 0.5 * s.slowest)
 
 
 def _without_outliers(data: _Columns) -> tuple[Sliding, np.ndarray]:
@@ -366,7 +361,7 @@ def _without_outliers(data: _Columns) -> tuple[Sliding, np.ndarray]:
 
 
 def _check_resisting(f: np.ndarray) -> None:
-    """Refuse forces that drive the motion; a few of them, as far off as they like, do not count."""
+    """Refuse forces that drive the motion; clipping keeps a few outliers from deciding."""
     limit = float(np.quantile(np.abs(f), MIDDLE))
     if float(np.sum(np.clip(f, -limit, limit))) <= 0.0:
         bound = "must resist the motion: of the sign of the velocity, and not 0"
@@ -378,12 +373,12 @@ def _fit_laws(s: Sliding, names: list[str]) -> _Laws:
     n = len(s.f)
     v = s.speeds
     least = EXACT**2 * float(np.mean(s.f**2))
-    of_place = s.position_variance * s.position_correlation
+    position_variance = s.position_variance * s.position_correlation
     variance, tau = max(s.force_variance, least), 1.0
     starts = {law: first_guesses(law, v, s.f) for law in names}
     joint, found = _joint(s, 0.0), {}
     for _ in range(4):  # weights and fit; they settle in two
-        joint = _joint(s, variance * tau / of_place if s.motion else 0.0)
+        joint = _joint(s, variance * tau / position_variance if s.motion else 0.0)
         found = {law: best_fit(joint, law, starts[law]) for law in names}
         refit_nested(joint, found)
         starts = {law: a.theta for law, (a, _) in found.items()}
@@ -441,19 +436,19 @@ def _fitted(
         tuple(data.t[bad].tolist()),
         tuple(data.t[out].tolist()),
     )
-    told = _left_out(result, data, out) + _warnings(result, s, quantum(data.f[data.inside]))
-    return dataclasses.replace(result, warnings=told)
+    warnings = _left_out(result, data, out) + _warnings(result, s, quantum(data.f[data.inside]))
+    return dataclasses.replace(result, warnings=warnings)
 
 
 def _left_out(r: Fitted, data: _Columns, out: np.ndarray) -> tuple[str, ...]:
     """Warnings about outliers."""
-    told, n = [], r.samples
+    warnings, n = [], r.samples
     if len(r.position_outliers):
-        told.append(sentence("position", r.position_outliers, n, LOST))
+        warnings.append(sentence("position", r.position_outliers, n, LOST))
     steps = data.place.steps if data.place else ()
     steps = [i for i in steps if data.inside[i]]
     if steps:
-        told.append(
+        warnings.append(
             f"the position jumps and does not return at t = {times(data.t[steps])} s: the motion "
             "is fitted in parts"
         )
@@ -463,8 +458,8 @@ def _left_out(r: Fitted, data: _Columns, out: np.ndarray) -> tuple[str, ...]:
             why += (
                 f"; {n_wrong} of them drive the motion: wrong signs, or a delay between the columns"
             )
-        told.append(sentence("force", r.force_outliers, n, why))
-    return tuple(told)
+        warnings.append(sentence("force", r.force_outliers, n, why))
+    return tuple(warnings)
 
 
 def _compared(

@@ -11,20 +11,16 @@ import numpy as np
 from ..arguments import named
 from .outliers import robust_deviation
 from .sliding import Sliding
-from .trajectory import (
-    FIT_RANGES,
-    Flowing,
-    Joint,
-    Minimum,
-)
+from .trajectory import FIT_RANGES, ForceLaw, JointFit, Minimum
 
-FLOW_LAWS: dict[str, Flowing] = {  # from simple to rich, named as `Flow.kind`
-    "viscous": Flowing(("b",)),
-    "Coulomb": Flowing(("Fy",)),
-    "Bingham": Flowing(("Fy", "b")),
-    "power law": Flowing(("K", "n")),
-    "Herschel-Bulkley": Flowing(("Fy", "K", "n")),
+FLOW_LAWS: dict[str, ForceLaw] = {  # from simple to rich, named as `Flow.kind`
+    "viscous": ForceLaw(("b",)),
+    "Coulomb": ForceLaw(("Fy",)),
+    "Bingham": ForceLaw(("Fy", "b")),
+    "power law": ForceLaw(("K", "n")),
+    "Herschel-Bulkley": ForceLaw(("Fy", "K", "n")),
 }
+RICHEST = "Herschel-Bulkley"
 FLOW_UNITS = {"Fy": "N", "K": "N/(m/s)^n", "n": "", "b": "N.s/m"}
 PARSIMONY = 6.0  # of AICc: a richer law needs odds of 20 to 1, exp(6/2), over a simpler one
 OUTLYING = 6.0  # deviations from every law that make a force an outlier
@@ -55,13 +51,13 @@ class FlowParameter:
 
 
 def theta_of(values: Sequence[float], law: str) -> np.ndarray:
-    """Converts parameters to the vector theta of `Flowing`."""
+    """Parameters as the vector theta of a law: log K in place of K."""
     pairs = zip(FLOW_LAWS[law].names, values, strict=True)
     return np.array([math.log(max(x, 1e-300)) if name == "K" else x for name, x in pairs])
 
 
 def parameters_of(theta: np.ndarray, law: str) -> list[float]:
-    """Converts the vector theta of `Flowing` to parameters of a law."""
+    """The parameters in a vector theta."""
     pairs = zip(FLOW_LAWS[law].names, theta.tolist(), strict=True)
     return [math.exp(min(x, 700.0)) if name == "K" else x for name, x in pairs]
 
@@ -86,33 +82,31 @@ def first_guesses(law: str, v: np.ndarray, f: np.ndarray) -> np.ndarray:
     return theta_of(best[1], law)
 
 
-def best_fit(joint: Joint, law: str, start: np.ndarray) -> tuple[Minimum, Minimum]:
+def best_fit(joint: JointFit, law: str, start: np.ndarray) -> tuple[Minimum, Minimum]:
     """Least-squares fits with Fy, b >= 0, and with Fy, b of any sign."""
     flowing = FLOW_LAWS[law]
-    free = found = joint.least(flowing, start)
+    free = found = joint.solve(flowing, start)
     held = np.zeros(len(start), dtype=bool)
     signed = np.array([x in ("Fy", "b") for x in flowing.names])
     while (bad := signed & (found.theta < 0.0)).any():
         held |= bad
-        found = joint.least(flowing, np.where(held, 0.0, found.theta), held.tolist())
+        found = joint.solve(flowing, np.where(held, 0.0, found.theta), held.tolist())
     return found, free
 
 
 def outlying_forces(s: Sliding) -> np.ndarray:
-    """Forces far from the law of most of them, (n,): spikes, wrong signs.
+    """Mask of forces far from the richest law, (n,): spikes, wrong signs.
 
-    The law is the richest, fitted to the speeds of the motion; the noise is that of the median.
-    Near rest it grows by that of the speed. None is far where many are: the law is then wrong.
+    The noise is that of the median, and near rest also that of the speed. Where many forces are
+    far, the law is wrong, and none counts as an outlier.
     """
-    law, v = FLOW_LAWS["Herschel-Bulkley"], s.speeds
+    v = s.speeds
     least = SMALLEST_OUTLIER / OUTLYING * float(np.median(np.abs(s.f)))
     out = np.zeros(len(v), dtype=bool)
     for _ in range(40):
-        joint = Joint(s.f[~out], s.p[:0], None, v[~out], 0.0, 0.5 * s.slowest)
-        found = best_fit(
-            joint, "Herschel-Bulkley", first_guesses("Herschel-Bulkley", v[~out], s.f[~out])
-        )[0]
-        force, slope, _ = law.slopes(found.theta, v)
+        joint = JointFit(s.f[~out], s.p[:0], None, v[~out], 0.0, 0.5 * s.slowest)
+        found, _ = best_fit(joint, RICHEST, first_guesses(RICHEST, v[~out], s.f[~out]))
+        force, slope, _ = FLOW_LAWS[RICHEST].slopes(found.theta, v)
         rest = np.abs(s.f - force)
         usual = OUTLYING * max(robust_deviation(rest[~out]), least)
         usual = usual + (2.0 * s.slowest * np.abs(slope) if s.motion else 0.0)
@@ -126,20 +120,18 @@ def outlying_forces(s: Sliding) -> np.ndarray:
     return out
 
 
-def refit_nested(joint: Joint, found: dict[str, tuple[Minimum, Minimum]]) -> None:
+def refit_nested(joint: JointFit, found: dict[str, tuple[Minimum, Minimum]]) -> None:
     """Fit the richest law again from a simpler law that it contains, if that one fits better."""
-    rich = "Herschel-Bulkley"
-    for law in found:
-        a, least = (
-            dict(zip(FLOW_LAWS[law].names, found[law][0].theta, strict=True)),
-            found[law][0].sum,
-        )
-        if rich not in found or found[rich][0].sum <= least:
+    if RICHEST not in found:
+        return
+    for law, (fit, _) in found.items():
+        if found[RICHEST][0].sum <= fit.sum:
             continue
+        a = dict(zip(FLOW_LAWS[law].names, fit.theta, strict=True))
         values = a.get("Fy", 0.0), a.get("K", math.log(max(a.get("b", 0.0), 1e-6))), a.get("n", 1.0)
-        again = best_fit(joint, rich, np.array(values))
-        if again[0].sum < found[rich][0].sum:
-            found[rich] = again
+        again = best_fit(joint, RICHEST, np.array(values))
+        if again[0].sum < found[RICHEST][0].sum:
+            found[RICHEST] = again
 
 
 def student_quantile(level: float, freedom: float) -> float:
@@ -150,7 +142,7 @@ def student_quantile(level: float, freedom: float) -> float:
 
 
 def parameter_intervals(
-    joint: Joint, law: str, best: Minimum, free: Minimum, variance: float, quantile: float
+    joint: JointFit, law: str, best: Minimum, free: Minimum, variance: float, quantile: float
 ) -> tuple[FlowParameter, ...]:
     """Profile intervals: where the profiled sum of squares rises by quantile^2 variance."""
     names, out = FLOW_LAWS[law].names, []
@@ -165,7 +157,7 @@ def parameter_intervals(
 
 
 def _crossing(
-    joint: Joint,
+    joint: JointFit,
     law: str,
     free: Minimum,
     j: int,
@@ -184,7 +176,7 @@ def _crossing(
         step = x - float(theta[j])
         start = theta + spread[:, j] * (step / spread[j, j])
         start[j] = x
-        rise = joint.least(FLOW_LAWS[law], start, held, free.c).sum - free.sum
+        rise = joint.solve(FLOW_LAWS[law], start, held, free.c).sum - free.sum
         ratio = math.sqrt(max(rise, 0.0) / variance) / abs(target)
         if abs(ratio - 1.0) < 0.01 or (x in limits and ratio < 1.0):
             break

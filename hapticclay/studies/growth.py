@@ -40,13 +40,12 @@ LINEAR_SHARE = 1e-4  # of the largest sample: residual allowed for a linear moti
 def growth_rate(
     record: Record, axis: str, sample: float = GROWTH_SAMPLE, slowest: float = SLOWEST_MODE
 ) -> float:
-    """Growth rate of the oscillation of a free motion: the rate of its least damped mode.
+    """Growth rate of a free motion's least damped mode [1/s]; inf for a run that ended too early.
 
-    The modes of the velocity are those of a linear prediction of low rank (ESPRIT: Roy, Kailath,
-    IEEE Trans. ASSP 37, 1989), exact for a linear loop, whatever the sampling.
+    `sample` is about the time between samples [s]; modes below `slowest` do not count.
     """
     i, dt = AXES.index(choice("axis", axis, AXES)), record.scenario.dt
-    if len(record.t) > 2:  # kept each so many steps
+    if len(record.t) > 2:  # a record may keep one step in many
         dt *= max(1, round((record.t[1] - record.t[0]) / dt))
     v = record.v[:-1, i]  # the last step may be short
     v = v[int((1.0 - FITTED_SHARE) * len(v)) :]
@@ -82,10 +81,8 @@ def _least_damped(v: np.ndarray, dt: float, slowest: float) -> float:
 
 
 def _motions(z: np.ndarray, samples: int) -> np.ndarray:
-    """Samples of modes, with 1 as the largest of each, along a new axis before that of the modes.
-
-    Without this scale, one that grows fast would hide the others from a least-squares fit.
-    """
+    """Samples of modes, along a new axis before that of the modes, each with 1 as its largest."""
+    # else one that grows fast would hide the others from a least-squares fit
     k = np.arange(samples)[:, None] - np.where(np.abs(z) > 1.0, samples - 1, 0)[..., None, :]
     return np.exp(k * np.log(z.astype(complex))[..., None, :])
 
@@ -93,20 +90,14 @@ def _motions(z: np.ndarray, samples: int) -> np.ndarray:
 def _mode_rates(
     z: np.ndarray, weight: np.ndarray, dt: float, slowest: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Growth rates of modes [1/s]; which exceed rounding; which of these oscillate or diverge.
-
-    Modes lie along the last axis of z and of weight, their largest magnitudes.
-    """
+    """Growth rates of modes [1/s]; which exceed rounding; which of these oscillate or diverge."""
     rate, omega = np.log(np.abs(z)) / dt, np.abs(np.angle(z)) / dt
     strong = weight > MODE_SHARE * weight.max(axis=-1, keepdims=True, initial=0.0)
     return rate, strong, strong & ((omega > slowest) | (rate > slowest))
 
 
 def short_growth(v: np.ndarray, dt: float) -> np.ndarray:
-    """Growth rates of the oscillations of many free motions, from their least damped modes.
-
-    Modes slower than `SLOWEST_MODE` do not count.
-    """
+    """Growth rates [1/s] of free motions (motions, samples); NaN where they are undecided."""
     out = np.full(len(v), np.nan)
     size = np.abs(v).max(axis=1, initial=0.0)
     good = np.flatnonzero(np.isfinite(size) & (size > 0.0))
@@ -166,7 +157,7 @@ def _least_damped_of_many(
 
 
 def growth_of_map(m: PeriodMap, slowest: float = SLOWEST_MODE) -> float:
-    """Growth rate of the oscillation after a push, from the map of a period."""
+    """Growth rate after a push [1/s], from the map of a period; NaN for defective modes."""
     rate, swings = _rates(np.linalg.eigvals(m.matrix), m.period, slowest)
     if not (swings & (rate > -NEUTRAL / m.period)).any():
         return float(rate.max(where=swings, initial=-math.inf))
@@ -180,7 +171,7 @@ def growth_of_map(m: PeriodMap, slowest: float = SLOWEST_MODE) -> float:
 
 
 def mapped_growth(s: Scenario, axis: str, maps: PeriodMaps, slowest: float = SLOWEST_MODE) -> float:
-    """As `growth_of_map`, of a scene; NaN for one without a map."""
+    """As `growth_of_map`, for a scene; NaN without a map."""
     m = maps.of(s, AXES.index(axis))
     return math.nan if m is None else growth_of_map(m, slowest)
 

@@ -106,20 +106,12 @@ class Coefficient:
 
 
 class Estimate(NamedTuple):
-    """A frequency response estimated from runs.
+    """A frequency response estimated from runs, (lines,) each."""
 
-    Attributes:
-        response: complex, shape (lines,).
-        deviation: standard deviation of response, shape (lines,).
-        coherence: of measured input and output, shape (lines,).
-        errors: contribution of each run to the response, shape (runs, lines); None for a single
-            run.
-    """
-
-    response: np.ndarray
-    deviation: np.ndarray
-    coherence: np.ndarray
-    errors: np.ndarray | None
+    response: np.ndarray  # complex
+    deviation: np.ndarray  # of the response
+    coherence: np.ndarray  # of measured input and output
+    errors: np.ndarray | None  # contribution of each run, (runs, lines); None for a single run
 
 
 @named
@@ -165,11 +157,11 @@ class Identified(Result):
 
     def headline(self) -> str:
         """Block, axis or source, and coefficients with their intervals, in one line."""
-        told = (
+        coefficients = (
             f"{c.name} {c.value:.5g} ({c.low:.5g} to {c.high:.5g}) {c.unit}"
             for c in self.coefficients
         )
-        return f"{self.what} of {self.source or self.axis}: {', '.join(told)}"
+        return f"{self.what} of {self.source or self.axis}: {', '.join(coefficients)}"
 
     def tables(self) -> dict[str, dict[str, Any]]:
         """Coefficients, and the response beside those of the fit and of the paper."""
@@ -204,7 +196,7 @@ class Identified(Result):
         return tuple(c.value for c in self.coefficients)
 
     def contents(self) -> dict[str, Any]:
-        """Everything; of the scenario and the source, the one that there is."""
+        """Everything, with the scenario or the source."""
         data = fields_of(self, "response", "source", "scenario")
         if self.scenario:
             data["scenario"] = self.scenario
@@ -219,7 +211,7 @@ class Identified(Result):
 
 
 def response_tables(results: Sequence[Identified], paper: bool = True) -> dict[str, dict[str, Any]]:
-    """Returns the numbers of one block's figure: the response on each axis, and its equations."""
+    """The response of a block by axis, beside those of its fit and, with `paper`, of the paper."""
     unit = RESPONSE_UNITS[results[0].what]
     out: dict[str, dict[str, Any]] = {}
     for r in results:
@@ -249,7 +241,7 @@ def endpoint_mobility(x: float, y: float) -> tuple[float, float]:
 def measured(
     record: Record, noise: Noise | None, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Handle position [m] and hand force [N] as measured by the sensors."""
+    """Handle position [m] and hand force [N], (n, 2) each, as measured by the sensors."""
     if noise is None:
         return record.p, record.fh
     count = 2.0 * np.pi / noise.encoder_counts
@@ -357,10 +349,13 @@ class Identification:
         step = base.dt if self.control == "continuous" else None
         settling = SHAPED if what == "S" and self.inertia_shaping else SETTLING[what]
         floor = settling * (size / AMPLITUDE[what]) ** 2
-        fitted = fitted_coefficients(what, self.axis, frequency, found, step, floor)
+        value, half = fit(
+            what, frequency, found.response, noise_deviation(found), found.errors, step
+        )
+        half = np.hypot(half, floor * np.abs(value))
         return Identified(
-            what, self.axis, frequency, *found[:3], fitted, scenarios[0], noise, seed, periods,
-            realisations,
+            what, self.axis, frequency, *found[:3], coefficients_of(what, self.axis, value, half),
+            scenarios[0], noise, seed, periods, realisations,
         )  # fmt: skip
 
 
@@ -376,7 +371,7 @@ identify = function_of(
 def _multisine(
     rms: tuple[float, float], band: object, period: float, lines: int, limit: float
 ) -> Multisine:
-    """A multisine with the requested lines, or as many as fit into the period, at least three."""
+    """A multisine with the requested lines, or as many as the period has, at least three."""
     low, high = numbers_of("band", band, ("low", "high"), 0.0, limit, above=True, unit="Hz")
     most = math.floor(high * period + 1e-9) - math.ceil(low * period - 1e-9) + 1
     if most < 3:
@@ -415,7 +410,7 @@ def response(
     frequency: np.ndarray,
     dt: float | None = None,
 ) -> np.ndarray:
-    """Complex response of a block, shape (n,)."""
+    """Complex response of a block at frequencies [Hz], (n,); `dt`: that of the stepped loop."""
     s2, s, one = _derivatives(frequency, dt)
     a, b, c = coefficients
     return a * s2 + b * s + c * one if what == "Th" else a / (s2 + b * s + c)
@@ -424,7 +419,10 @@ def response(
 def _derivatives(
     frequency: np.ndarray, dt: float | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Responses of the loop's second derivative, first derivative and mean at frequency [Hz]."""
+    """Responses of second derivative, first derivative and mean at frequencies [Hz].
+
+    With `dt` those of the loop's steps: central differences, and the mean (1, 2, 1)/4 of positions.
+    """
     omega = 2.0 * np.pi * frequency
     if dt is None:
         return -(omega**2), 1j * omega, np.ones_like(omega)
@@ -433,10 +431,10 @@ def _derivatives(
 
 
 def estimate_response(signals: np.ndarray, n: int, bins: np.ndarray) -> Estimate:
-    """Response at the lines of a multisine.
+    """Response at multiples `bins` of 1/period, from (runs, 3, samples): reference, input, output.
 
     The reference has no noise, so S_ry/S_ru is unbiased even with noise on the input and in a
-    closed loop (Pintelon, Schoukens 2012, sec. 2.6.4). Windows of whole periods do not leak.
+    closed loop (Pintelon, Schoukens 2012, sec. 2.6.4). Windows of n samples, a period, do not leak.
     """
     from scipy.signal import csd
 
@@ -453,7 +451,7 @@ def estimate_response(signals: np.ndarray, n: int, bins: np.ndarray) -> Estimate
     ru, ry = spectrum(r, u), spectrum(r, y)
     H = ry.mean(axis=0) / ru.mean(axis=0)
     errors = (ry - H * ru) / ru.mean(axis=0)
-    share = _smooth(_scatter(errors) / np.abs(H) ** 2)
+    share = moving_mean(_scatter(errors) / np.abs(H) ** 2, SMOOTHED_LINES // 2)
     uu, yy, uy = (spectrum(a, b).mean(axis=0) for a, b in ((u, u), (y, y), (u, y)))
     coherence = np.minimum(np.abs(uy) ** 2 / (uu.real * yy.real), 1.0)
     return Estimate(H, np.sqrt(share) * np.abs(H), coherence, None if single else errors)
@@ -467,9 +465,8 @@ def _scatter(errors: np.ndarray) -> np.ndarray:
 def noise_deviation(found: Estimate) -> np.ndarray:
     """Standard deviation of each line under white noise of input and output, (lines,).
 
-    The model has two parameters, fitted to the scatter of all lines. Weights from the scatter of a
-    few lines over a few runs favour lines with accidentally small errors, and the fit becomes worse
-    than its intervals. The intervals hold for any weights; for coloured noise they are wider.
+    Two parameters are fitted to the scatter of all lines: that of few lines over few runs would
+    favour lines with accidentally small errors. Intervals hold for any weights.
     """
     from scipy.optimize import nnls
 
@@ -484,12 +481,16 @@ def noise_deviation(found: Estimate) -> np.ndarray:
     return np.sqrt(variance)
 
 
-def _smooth(x: np.ndarray) -> np.ndarray:
-    """Mean of each value and its SMOOTHED_LINES - 1 nearest neighbours, fewer at the ends."""
-    half, at = SMOOTHED_LINES // 2, np.arange(len(x))
-    total = np.cumsum(np.concatenate(([0.0], x)))
+def moving_mean(x: np.ndarray, half: int) -> np.ndarray:
+    """Mean of each value and its `half` neighbours on each side, fewer at the ends."""
+    at, total = np.arange(len(x)), np.concatenate(([0.0], np.cumsum(x)))
     low, high = np.maximum(at - half, 0), np.minimum(at + half + 1, len(x))
     return (total[high] - total[low]) / (high - low)
+
+
+def real_and_imaginary(z: np.ndarray) -> np.ndarray:
+    """Real parts, then imaginary parts, along the last axis."""
+    return np.concatenate((z.real, z.imag), axis=-1)
 
 
 def fit(
@@ -500,12 +501,12 @@ def fit(
     errors: np.ndarray | None = None,
     dt: float | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Fit the coefficients of a block to a response.
+    """Coefficients of a block, and half of their 95 % intervals, from a response.
 
-    Least squares of the complex misfit, each line weighted by its deviation. The 95 % intervals
-    follow from the influence of each run on the coefficients (Student's t, one degree of freedom
-    fewer than runs). The misfit would not do: encoder counts cause errors common to all lines,
-    which leave no misfit. For a single run the intervals follow from the misfit.
+    Least squares of the complex misfit, each line weighted by its deviation. Intervals follow from
+    the influence of each run on the coefficients (Student's t, one degree of freedom fewer than
+    runs): encoder counts cause errors common to all lines, which leave no misfit. For a single run
+    (`errors` None) they follow from the misfit.
     """
     from scipy.optimize import least_squares
     from scipy.special import stdtrit
@@ -513,11 +514,8 @@ def fit(
     sigma = np.hypot(deviation, LINE_FLOOR * np.abs(H))
     start = _linear(what, frequency, H, dt)
 
-    def parts(e: np.ndarray) -> np.ndarray:
-        return np.concatenate((e.real, e.imag), axis=-1)
-
     def misfit(x: np.ndarray) -> np.ndarray:
-        return parts((H - response(what, x * start, frequency, dt)) / sigma)
+        return real_and_imaginary((H - response(what, x * start, frequency, dt)) / sigma)
 
     found = least_squares(misfit, np.ones(3), method="lm", xtol=1e-14, ftol=1e-14)
     if errors is None:
@@ -526,7 +524,7 @@ def fit(
     else:
         runs = len(errors)
         freedom = runs - 1
-        moves = np.linalg.pinv(found.jac) @ parts(errors / sigma).T
+        moves = np.linalg.pinv(found.jac) @ real_and_imaginary(errors / sigma).T
         variance = np.sum(moves**2, axis=1) / (runs * freedom)
     half = stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE) * np.sqrt(variance)
     return found.x * start, half * np.abs(start)
@@ -545,17 +543,10 @@ def _linear(what: str, frequency: np.ndarray, H: np.ndarray, dt: float | None) -
     return np.linalg.lstsq(*both, rcond=None)[0]
 
 
-def fitted_coefficients(
-    what: str,
-    axis: str,
-    frequency: np.ndarray,
-    found: Estimate,
-    dt: float | None,
-    floor: float,
+def coefficients_of(
+    what: str, axis: str, value: np.ndarray, half: np.ndarray
 ) -> tuple[Coefficient, ...]:
-    """Fit a block and return the coefficients with the printed ones."""
-    value, half = fit(what, frequency, found.response, noise_deviation(found), found.errors, dt)
-    half = np.hypot(half, floor * np.abs(value))
+    """Fitted coefficients and half of their intervals, (3,) each, beside the printed ones."""
     names, units = COEFFICIENT_NAMES[what], COEFFICIENT_UNITS[what]
     rows = zip(names, units, printed_form(what, axis), value.tolist(), half.tolist(), strict=True)
     return tuple(

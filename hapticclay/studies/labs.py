@@ -87,11 +87,6 @@ class Lab(Result):
         return out
 
     def text(self, form: str = "") -> str:
-        """Task, table, result and questions.
-
-        Args:
-            form: as in `Result.text`.
-        """
         return f"{self.title}. {self.task}\n\n{super().text(form)}"
 
     def remarks(self) -> list[str]:
@@ -99,7 +94,6 @@ class Lab(Result):
         return ["", self.found, "", *(f"{i}. {q}" for i, q in enumerate(self.questions, 1))]
 
     def figures(self) -> dict[str, Any]:
-        """The charts."""
         return {chart.name: figure_of(chart) for chart in self.charts}
 
     def contents(self) -> dict[str, Any]:
@@ -203,16 +197,16 @@ def delay_lab(quick: bool, tell: Tell) -> Lab:
     stable = _limits(walls)
     tell("passive walls")
     passive = [passivity_limit(w, STEPS) for w in walls]
-    fine = np.linspace(0.0, delays[-1], 201)
-    late = [replace(WALL, delay=float(d) * TS) for d in fine]
+    line = np.linspace(0.0, delays[-1], 201)
+    late = [replace(WALL, delay=float(d) * TS) for d in line]
     chart = Chart(
         "delay", "Largest stiffness over the delay",
         "Stable without a hand, and passive in every hand; lines are theory, marks runs.",
         "delay [samples]", "largest stiffness K [N/m]",
         (
-            curve("stable: b/(Ts/2 + delay)", fine, [wall_limits.hulin_limit(w) for w in late]),
+            curve("stable: b/(Ts/2 + delay)", line, [wall_limits.hulin_limit(w) for w in late]),
             curve("runs: stable", delays, stable, "marks"),
-            curve("passive: Colgate, Schenkel", fine,
+            curve("passive: Colgate, Schenkel", line,
                   [wall_limits.colgate_schenkel_limit(w) for w in late]),
             curve("runs: passive", delays, passive, "marks"),
         ),

@@ -101,7 +101,11 @@ class Measurement:
         for key in dict(columns or {}):
             choice("columns", key, tuple(COLUMNS))
         wanted = {key: key for key in ("t", "input", "output")} | dict(columns or {})
-        cells = _read_columns(Path(path), wanted)
+        try:
+            sheet = Sheet.read("csv", Path(path))
+        except OSError as error:
+            raise unreadable("csv", Path(path), error) from None
+        cells = sheet.numbers(_places(Path(path), sheet.head, wanted), UNITS)
         steps = np.diff(cells["t"])
         if len(steps) > 1 and 0.0 < steps[-1] < (1.0 - JITTER) * float(np.median(steps)):
             cells = {key: x[:-1] for key, x in cells.items()}
@@ -116,9 +120,9 @@ def _column(name: str, value: Any, t: Any) -> np.ndarray:
         raise ParameterError(name, f"shape {x.shape}", bound)
     if len(x) != len(t):
         raise ParameterError(name, f"{len(x)} samples", f"must be as long as t, {len(t)} samples")
-    fine = np.abs(x) <= LARGEST_VALUE
-    if not np.all(fine):
-        row = int(np.argmin(fine))
+    within = np.abs(x) <= LARGEST_VALUE
+    if not np.all(within):
+        row = int(np.argmin(within))
         bound = f"must be a finite number within +- {LARGEST_VALUE:g}"
         raise ParameterError(f"{name}[{row}]", float(x[row]), bound)
     return x
@@ -137,15 +141,6 @@ def _check_sampling(t: np.ndarray) -> None:
             f"that from row {row} to {row + 1} is {t[row + 1] - t[row]:.6g} s"
         )
         raise ParameterError(f"t[{row + 1}]", float(t[row + 1]), bound)
-
-
-def _read_columns(path: Path, wanted: Mapping[str, str]) -> dict[str, np.ndarray]:
-    """Columns of a CSV file as floats, by the keys of `wanted`."""
-    try:
-        sheet = Sheet.read("csv", path)
-    except OSError as error:
-        raise unreadable("csv", path, error) from None
-    return sheet.numbers(_places(path, sheet.head, wanted), UNITS)
 
 
 def _places(path: Path, head: list[str], wanted: Mapping[str, str]) -> dict[str, int]:

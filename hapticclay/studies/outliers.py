@@ -28,17 +28,11 @@ NAMED = 3  # times that a sentence names
 
 
 class Cleaned(NamedTuple):
-    """A column without its outliers.
+    """A column without its outliers."""
 
-    Attributes:
-        x: the column, with outliers replaced by a curve through the samples around, (n,).
-        bad: mask of the outliers, (n,).
-        steps: indices of the samples after a jump that does not return, (m,).
-    """
-
-    x: np.ndarray
-    bad: np.ndarray
-    steps: np.ndarray
+    x: np.ndarray  # with a curve through the samples around in place of outliers, (n,)
+    bad: np.ndarray  # mask of the outliers, (n,)
+    steps: np.ndarray  # indices of the samples after a jump that does not return, (m,)
 
 
 def robust_deviation(x: np.ndarray) -> float:
@@ -47,7 +41,7 @@ def robust_deviation(x: np.ndarray) -> float:
 
 
 def cleaned(x: np.ndarray, count: float = 0.0) -> Cleaned:
-    """A column that is smooth but for noise, without its outliers."""
+    """An evenly sampled column, smooth but for noise; `count`: its quantum, 0 for none."""
     given, bad = np.asarray(x, dtype=float), np.zeros(len(x), dtype=bool)
     now, at = given, _jumps(given, count)
     for _ in range(5):  # small outliers stand beside large ones
@@ -81,7 +75,7 @@ def runs_of(mask: np.ndarray) -> list[tuple[int, int]]:
 
 
 def sentence(column: str, t: Sequence[float] | np.ndarray, samples: int, why: str) -> str:
-    """A warning about samples that are left out."""
+    """A warning about samples that are left out, at times t [s]."""
     are = "are" if len(t) > 1 else "is"
     return f"{len(t)} of {samples} {column}s {are} left out, at t = {times(t)} s: {why}"
 

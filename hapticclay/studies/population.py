@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named, part
-from ..errors import Bound, ParameterError, choice, integer, number
+from ..errors import Bound, ParameterError, choice, number
 from ..fields import Seed
 from ..model.operator import Operator
 from ..results import Result
@@ -102,13 +102,12 @@ class Hands:
         return np.array([[1.0, md, ms], [md, 1.0, ds], [ms, ds, 1.0]])
 
     def spread_over(self, u: np.ndarray) -> np.ndarray:
-        """Maps uniform samples to hands with the population's correlation (a Gaussian copula).
+        """Masses [kg], dampers [N.s/m] and springs [N/m] for samples, shape (n, 3).
+
+        A Gaussian copula gives them the correlation of the population.
 
         Args:
             u: samples of the unit cube, 0 < u < 1, shape (n, 3).
-
-        Returns:
-            Mass [kg], damper [N.s/m] and spring [N/m], shape (n, 3).
         """
         z = normal_score(u)
         if any(self.correlation):
@@ -119,24 +118,25 @@ class Hands:
             out[:, i] = x.of_score(z[:, i]) if isinstance(x, Distribution) else x
         return out
 
-    def sample(self, n: int, seed: int = 0) -> list[Operator]:
+    @checked
+    def sample(self, n: Annotated[int, Bound(1, MOST_HANDS)], seed: Seed = 0) -> list[Operator]:
         """Draw hands.
 
         Args:
             n: number of hands, 1 to 100000.
             seed: seed of the generator.
         """
-        n = integer("n", n, 1, MOST_HANDS)
         u = open_uniform(np.random.default_rng(seed), (n, 3))
         return [Operator(*row) for row in self.spread_over(u).tolist()]
 
-    def box(self, share: float = 0.9) -> Box:
+    @checked
+    def box(self, share: Annotated[float, Bound(0.0, 1.0 - 1e-9)] = 0.9) -> Box:
         """Ranges that contain a given share of each number separately, for `worst_case`.
 
         Args:
             share: share of the population between the ends of each range, 0 to 1.
         """
-        out = 0.5 * (1.0 - number("share", share, 0.0, 1.0 - 1e-9))
+        out = 0.5 * (1.0 - share)
         ends = {}
         for name, x in self._values.items():
             both = x.spread(np.array([out, 1.0 - out])) if isinstance(x, Distribution) else x
@@ -219,13 +219,13 @@ class Band(Result):
         least = f"{self.y_name} at least {self.least[i]:.4g}"
         return f"{self.told}: {least}, at {self.x_name} = {self.x[i]:.4g}"
 
-    def quantile(self, share: float) -> np.ndarray:
+    @checked
+    def quantile(self, share: Annotated[float, Bound(0.0, 1.0)]) -> np.ndarray:
         """Limit that a share of the hands does not exceed, shape (n,).
 
         Args:
             share: 0 to 1.
         """
-        share = number("share", share, 0.0, 1.0)
         return np.quantile(self.limits, share, axis=1, method="inverted_cdf")
 
     @property

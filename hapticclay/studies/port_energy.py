@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, part
-from ..errors import Bound, ParameterError, integer
+from ..errors import Bound, ParameterError
 from ..formulas import hardware
 from ..model.samples import Samples
 from ..model.spring import STIFFNESS_MAX
@@ -65,6 +65,8 @@ class Path:
 
 Amplitude = Annotated[float, Bound(0.0, 0.1, "m", above=True)]
 Turn = Annotated[tuple[float, float], Bound(1.0, 1e6, names=("p", "q"))]
+Periods = Annotated[int, Bound(1, 10_000)]
+Steps = Annotated[int, Bound(2, 10_000)]
 
 
 @checked
@@ -106,29 +108,23 @@ def polygon(wall: VirtualWall, turn: Turn, amplitude: Amplitude = 1e-4) -> Path:
     )
 
 
-def imposed(wall: VirtualWall, path: Path, periods: int = 3, steps: int = PATH_STEPS) -> Scenario:
-    """Build the run in which a hand moves the device along a path.
+def imposed(wall: VirtualWall, path: Path, periods: int, steps: int) -> tuple[Scenario, int]:
+    """The run in which a hand supplies the force that a path requires, and the first step to count.
 
-    The hand supplies, kick by kick, the force that mass, damper, friction and wall require along
-    the path. The wall's force is its law applied to the path as measured by encoder and difference.
+    The wall's force is its law applied to the path as measured by encoder and difference.
     """
-    return _imposed(wall, path, periods, steps)[0]
-
-
-def _imposed(wall: VirtualWall, path: Path, periods: int, steps: int) -> tuple[Scenario, int]:
-    """The run, and the step from which energy is counted."""
     d, Ts = wall.device, wall.Ts
     if wall.operator is not None:
         raise ParameterError("wall.operator", wall.operator, "must be None: the path is the hand")
     if wall.unilateral:
         raise ParameterError("wall.unilateral", True, "must be False: the wall acts along the path")
-    steps = min(integer("steps", steps, 2, 10_000), max(2, int(Ts / LEAST_STEP)))
+    steps = min(steps, max(2, int(Ts / LEAST_STEP)))
     n, h = len(path.places), Ts / steps
     memory = wall.velocity_window + math.ceil(wall.delay / Ts) + 2.0
     if wall.velocity_filter is not None:
         memory += FILTER_TIMES / (2.0 * math.pi * wall.velocity_filter * Ts)
     first = math.ceil(memory / n)
-    samples, corner = n * (first + integer("periods", periods, 1, 10_000)) + 1, 0
+    samples, corner = n * (first + periods) + 1, 0
     at, place = np.arange(samples + 1) * Ts, np.resize(path.places, samples + 1)
     if path.middles:
         corner = h * min(max(round(math.fmod(wall.delay, Ts) / h), 1), steps - 1)
@@ -180,10 +176,13 @@ def _wall_force(wall: VirtualWall, place: np.ndarray, t: np.ndarray, h: float) -
 
 
 @checked
-def taken_energy(wall: VirtualWall, path: Path, periods: int = 3, steps: int = PATH_STEPS) -> float:
+def taken_energy(
+    wall: VirtualWall, path: Path, periods: Periods = 3, steps: Steps = PATH_STEPS
+) -> float:
     """Energy that the device absorbs from the hand over a period of a path, by a run [J].
 
-    It is the integral of fh v over the run, minus the negligible energy stored in the mass.
+    It is the integral of fh v over the run, minus the negligible energy stored in the mass. A
+    negative one proves that the wall is active.
 
     Args:
         wall: the wall with its K, without a hand of its own; not "exact" in velocity with B or M.
@@ -191,11 +190,8 @@ def taken_energy(wall: VirtualWall, path: Path, periods: int = 3, steps: int = P
         periods: number of periods in the mean.
         steps: engine steps per sample, with steps of at least 1e-6 s; along a zigzag damping and
             friction are too low by one part in this number.
-
-    Returns:
-        The energy; a negative one proves that the wall is active.
     """
-    scenario, first = _imposed(wall, path, periods, steps)
+    scenario, first = imposed(wall, path, periods, steps)
     found = simulate(scenario)
     d, v = wall.device, found.v[first:, 0]
     if found.outcome.code != "time limit":
@@ -209,21 +205,19 @@ def taken_energy(wall: VirtualWall, path: Path, periods: int = 3, steps: int = P
 
 
 @checked
-def passivity_limit(wall: VirtualWall, steps: int = PATH_STEPS) -> float:
+def passivity_limit(wall: VirtualWall, steps: Steps = PATH_STEPS) -> float:
     """Largest K at which no path of a hand takes energy from the wall, by runs [N/m].
 
     The paths are polygons at several frequencies up to pi/Ts and at the worst frequency by theory.
     With friction or an encoder a large and a small zigzag are added, which isolate the damper and
-    one encoder edge. For each path the sign of the energy determines K. Other paths may draw energy
-    at a lower K, so the result is an upper bound of the true limit.
+    one encoder edge. For each path the sign of the energy determines K; 0 stands for a wall that is
+    active at any K, inf for one that no path shows active up to 1e9 N/m. Other paths may draw
+    energy at a lower K, so the result is an upper bound of the true limit.
 
     Args:
         wall: all but K, without a hand of its own; not "exact" in velocity with B or M, nor with a
             surface.
         steps: engine steps per sample, see `taken_energy`.
-
-    Returns:
-        K; 0 if the wall is active at any K, inf if no path shows it active up to 1e9 N/m.
 
     Raises:
         ParameterError: the wall has a hand, a surface, or B or M on an exact velocity, where the

@@ -32,7 +32,7 @@ TOOL = Tool()
 
 
 def block_of_clay(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
-    """Extent of the block of clay in a picture; without clay, of the work area.
+    """Lowest and highest corner of the block of clay in a picture, or of the work area [m].
 
     The block ends at the borders of the clay; without borders it extends slightly beyond the path.
     """
@@ -59,20 +59,9 @@ class Removal:
     """Clay removed so far: the share of each cell of a grid that the tool has covered.
 
     A cell at the edge of the tool is covered in proportion, so a straight cut has its exact area
-    for any cell size. Along a path, no cell straddles a border of the clay.
-
-    Attributes:
-        tool: the cutter.
-        x: centres of the cells [m], shape (nx,).
-        y: centres of the cells [m], shape (ny,).
-        wide: sizes of the cells along x [m], shape (nx,).
-        high: sizes of the cells along y [m], shape (ny,).
-        cell: the largest size [m].
-        clay: share of each cell that is clay, 0 to 1, shape (ny, nx); of a groove, height above
-            its floor over the depth of the tool.
-        cut: share of each cell that is cut, 0 to 1, shape (ny, nx).
-        volume: removed so far [m^3].
-        ground: the cells that are cut for good; None for other clay.
+    for any cell size. Along a path, no cell straddles a border of the clay. Arrays of cells have
+    shape (ny, nx), lengths are in m, `volume` in m^3. `clay` is the share of each cell that is
+    clay; in a groove, height above its floor over the depth of the tool.
     """
 
     def __init__(
@@ -82,7 +71,7 @@ class Removal:
         cell: float | None = None,
         path: np.ndarray | None = None,
     ):
-        """Lays the grid over the block, or over the path where one is given."""
+        """Lays the grid over the block, or over the path of the handle [m], shape (n, 2)."""
         fit = tool.width / VOLUME_CELLS
         if path is None:
             fit = min(CELL_SIZE, tool.width / PICTURE_CELLS)
@@ -99,7 +88,7 @@ class Removal:
         if np.max((high - low) / self.cell) > MOST_CELLS:
             raise ParameterError("record", scenario.name, "path too long for a map of the clay")
         lines = [_border_lines(low[i], high[i], borders[i], self.cell) for i in (0, 1)]
-        self.x, self.y = (0.5 * (at[1:] + at[:-1]) for at in lines)
+        self.x, self.y = (0.5 * (at[1:] + at[:-1]) for at in lines)  # centres, then sizes
         self.wide, self.high = (np.diff(at) for at in lines)
         self.clay = _clay_share(scenario.clay, spans, lines)
         self._initial_cut = np.zeros(self.clay.shape)
@@ -133,9 +122,7 @@ class Removal:
             x, y = x - along * dx, y - along * dy
         wide, high = self.wide[i], self.high[j][:, None]
         away = np.maximum(np.sqrt(x * x + y * y), 1e-9)
-        across = np.maximum(
-            np.hypot(x * wide, y * high) / away, 1e-9
-        )  # the cell, as the edge moves
+        across = np.maximum(np.hypot(x * wide, y * high) / away, 1e-9)  # the cell's size that way
         cover = np.clip(0.5 + (r - away) / across, 0.0, 1.0)
         cut = self.cut[j, i]
         np.maximum(cut, cover, out=cover)
@@ -145,10 +132,7 @@ class Removal:
         return gained
 
     def heights(self, thickness: float) -> np.ndarray:
-        """Height of the clay over the ground at the cells [m], shape (ny, nx).
-
-        For a groove whose clay exceeds the thickness, heights are reduced in proportion.
-        """
+        """Height of each cell over the ground [m]; a groove is scaled to fit into the thickness."""
         if self.ground:
             scale = min(1.0, HIGHEST * thickness / (self.ground.highest or thickness))
             above = self.clay * self.tool.depth
@@ -160,7 +144,7 @@ class Removal:
 def removed(
     record: Record, width: float = TOOL.width, depth: float = TOOL.depth, cell: float | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Volume of clay that a tool at the handle has removed in a run, to 0.5 % of it.
+    """Volume [m^3] of clay removed by a tool at the handle, to 0.5 %, and its rate [m^3/s], (n,).
 
     In clay that stays cut (`Clay.groove`) it is the volume removed in the run by its own tool.
 
@@ -169,12 +153,6 @@ def removed(
         width: diameter of the tool [m]; not used in clay that stays cut.
         depth: depth of the cut [m]; not used in clay that stays cut.
         cell: largest cell of the map [m]; None for 1/32 of the width, which the accuracy requires.
-
-    Returns:
-        (volume [m^3], rate [m^3/s]), at the samples of the record, shape (n,) each.
-
-    Raises:
-        ParameterError: a value is out of its bounds.
     """
     p = record.p
     tool = Tool(width, depth)

@@ -20,7 +20,7 @@ from .trajectory import (
     correlation_time,
 )
 
-LEAST_SLIDING = 50  # samples that slide ...
+LEAST_SLIDING = 50  # samples that slide
 FAST = 10.0  # [m/s]: no hand is as fast
 LEAST_SIGNAL = 5.0  # standard deviations above which a velocity counts as motion ...
 DEVIATIONS = 60  # samples for the estimate of the usual deviation
@@ -32,50 +32,28 @@ UNDITHERED = 0.4  # counts: rounding alone leaves 0.29, noise of 0.3 beside it 0
 
 
 class SampledClay(NamedTuple):
-    """The clay at the samples of a record.
+    """The clay at the samples of a record."""
 
-    Attributes:
-        flows: b, Fy, K and n at each, shape (n, 4).
-        dented: where an elastic law resists an indented tool at rest, by name of the law.
-    """
-
-    flows: np.ndarray
-    dented: dict[str, np.ndarray]
+    flows: np.ndarray  # b, Fy, K and n at each, shape (n, 4)
+    dented: dict[str, np.ndarray]  # by law: where it resists an indented tool at rest
 
 
 class Sliding(NamedTuple):
-    """Sliding samples.
+    """Samples that slide; positions and their splines where speeds are not known."""
 
-    Attributes:
-        t: their time [s].
-        sign: of their velocity.
-        f: force against the motion [N].
-        p: positions of these samples and of those between them [m]; empty where speeds are known.
-        v: speeds [m/s], or the coefficients of the motion.
-        slowest: least speed of a sliding sample [m/s].
-        motion: splines through the positions; None where speeds are known.
-        spacing: of their knots [s].
-        force_variance: variance of the force about a free curve [N^2]; nan without one.
-        position_variance: variance of a position [m^2].
-        position_correlation: position samples per independent sample.
-        position_tails: standard deviation of a position over that of normal noise with the same
-            median residual; far above 1, some positions have other errors than noise.
-        at: indices of these samples in the data.
-    """
-
-    t: np.ndarray
-    sign: np.ndarray
-    f: np.ndarray
-    p: np.ndarray
-    v: np.ndarray
-    slowest: float
-    motion: Motion | None
-    spacing: float
-    force_variance: float
-    position_variance: float
-    position_correlation: float
-    position_tails: float
-    at: np.ndarray
+    t: np.ndarray  # [s]
+    sign: np.ndarray  # of the velocity
+    f: np.ndarray  # against the motion [N]
+    v: np.ndarray  # speeds [m/s], or the coefficients of the motion
+    slowest: float  # least speed of a sliding sample [m/s]
+    at: np.ndarray  # indices in the data
+    p: np.ndarray = np.zeros(0)  # positions of these samples and of those between them [m]
+    motion: Motion | None = None  # splines through the positions
+    spacing: float = 0.0  # of their knots [s]
+    force_variance: float = math.nan  # about a free curve [N^2]
+    position_variance: float = 0.0  # [m^2]
+    position_correlation: float = 1.0  # samples per independent one
+    position_tails: float = 1.0  # deviation over that of normal noise with the same median
 
     @property
     def speeds(self) -> np.ndarray:
@@ -138,19 +116,15 @@ def check_one_law(met: SampledClay, inside: np.ndarray) -> None:
 def sliding_at_known_speed(
     t: np.ndarray, v: np.ndarray, f: np.ndarray, inside: np.ndarray
 ) -> Sliding:
-    """Moving samples of known velocity whose velocity changes little in a step."""
+    """Moving samples whose known velocity changes little in a step."""
     change = np.abs(np.diff(v, prepend=v[:1]))
     change = np.maximum(change, np.append(change[1:], 0.0))
     speed = np.abs(v)
     at = inside & (change <= STEADY_STEP * speed) & (speed > 1e-4 * np.max(speed[inside]))
     if np.count_nonzero(at) < LEAST_SLIDING:
         raise _too_few(int(np.count_nonzero(at)))
-    sign = np.sign(v[at])
-    speed, none = speed[at], np.zeros(0)
-    slowest = float(speed.min())
-    index = np.flatnonzero(at)
-    known = none, speed, slowest, None, 0.0, math.nan, 0.0, 1.0, 1.0
-    return Sliding(t[at], sign, sign * f[at], *known, index)
+    sign, speed = np.sign(v[at]), speed[at]
+    return Sliding(t[at], sign, sign * f[at], speed, float(speed.min()), np.flatnonzero(at))
 
 
 def _too_few(count: int) -> ParameterError:
@@ -161,7 +135,7 @@ def _too_few(count: int) -> ParameterError:
 def sliding_along_positions(
     t: np.ndarray, p: Cleaned, f: np.ndarray, inside: np.ndarray, out: np.ndarray
 ) -> Sliding:
-    """Sliding stretches and the splines along them."""
+    """Samples of sliding stretches, without outliers `out` of the force, and their splines."""
     inside, good, p = _unbroken(inside, p), ~p.bad, p.x - p.x.mean()
     usable, count = good & ~out, quantum(p[good])
     runs = [(a, b) for a, b in runs_of(inside) if b - a >= LEAST_STRETCH]
@@ -198,29 +172,28 @@ def sliding_along_positions(
     usable_at = np.concatenate([np.arange(*x) for x in one_way])
     forces = [Stretch(t[a:b], (), usable[a:b]) for a, b in one_way]
     series = [Series(stretches, place), Series(forces, direction[usable_at] * f[usable_at])]
-    spacing, (of_p, of_f) = chosen_spacing(series)
+    spacing, (position_variance, force_variance) = chosen_spacing(series)
     sliding = sliding[usable[sliding]]
     sign = direction[sliding]
     motion = Motion(stretches, spacing, np.searchsorted(at, sliding), sign)
     c = motion.follow(place)
     left = (place - motion.place(c))[good[at]]
-    correlation = correlation_time(left)
-    of_p = max(of_p, (1e-12 * float(np.ptp(p))) ** 2)  # rounding
+    position_variance = max(position_variance, (1e-12 * float(np.ptp(p))) ** 2)  # rounding
     usual = max(robust_deviation(left), ROUNDED * count, 1e-12 * float(np.ptp(p)))
     return Sliding(
         t[sliding],
         sign,
         sign * f[sliding],
-        place,
         c,
         float(slow.min()),
+        sliding,
+        place,
         motion,
         spacing,
-        of_f,
-        of_p,
-        correlation,
-        math.sqrt(of_p) / usual,
-        sliding,
+        force_variance,
+        position_variance,
+        correlation_time(left),
+        math.sqrt(position_variance) / usual,
     )
 
 
@@ -268,7 +241,7 @@ def _slowest(motion: Motion, runs: list[tuple[int, int]], margin: int, sigma: fl
 def _between_rests(
     direction: np.ndarray, start: int, stop: int, margin: int
 ) -> list[tuple[int, int]]:
-    """Parts of a run without rests, which last longer than a knot's width, and its like around."""
+    """Parts of a run between rests; a rest longer than a knot's width loses that margin too."""
     rests = [(a + start, b + start) for a, b in runs_of(direction[start:stop] == 0.0)]
     out, begin = [], start
     for a, b in rests:
@@ -290,7 +263,7 @@ def quantum(x: np.ndarray) -> float:
 
 
 def driving_forces(f: np.ndarray, p: Cleaned | None, v: np.ndarray | None) -> np.ndarray:
-    """Mask of the forces that drive the motion, (n,)."""
+    """Mask of the forces that drive the motion, (n,), by known velocities or by positions."""
     if v is None:
         assert p is not None
         v = np.gradient(p.x)

@@ -11,8 +11,6 @@ from ..arguments import checked
 from ..errors import ParameterError, numbers_of
 from ..fields import Axis
 from .identification import (
-    COEFFICIENT_NAMES,
-    COEFFICIENT_UNITS,
     COHERENT,
     CONFIDENCE,
     IDENTIFICATION_BAND,
@@ -20,9 +18,10 @@ from .identification import (
     MULTISINE_LINES,
     Band,
     Block,
-    Coefficient,
     Identified,
-    printed_form,
+    coefficients_of,
+    moving_mean,
+    real_and_imaginary,
     response,
 )
 from .measurement import Measurement
@@ -39,6 +38,9 @@ TRANSIENT_TERMS = 4  # two of a second-order block's start and end, two of sampl
 USUAL, FAR_BEYOND = 0.99, 2.0  # quantile of a column, and times that an impossible value is of it
 NEIGHBOURS = 20  # lines to each side over which noise is averaged, at most
 WEIGHT_ROUNDS = 4  # of fit and noise; the weights settle in two
+
+# frequency [Hz], response, its deviation, coherence
+Averaged = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 @checked
@@ -75,7 +77,7 @@ def identify_data(
     """
     if held and what == "Th":
         raise ParameterError("held", held, 'must be False for "Th", whose input is a position')
-    columns, warnings = _Columns.of(data), []
+    columns, warnings = _Columns(data.input, data.output, data.reference), []
     place = cleaned(columns.output, quantum(columns.output))
     if place.bad.any():
         warnings.append(sentence("position", data.t[place.bad], len(data.t), LOST))
@@ -85,38 +87,15 @@ def identify_data(
             "identify the parts one by one"
         )
     columns = columns._replace(output=place.x)
-    found, told = _better(what, columns, data, band, held)
-    fitted, periods = found.fitted, found.periods
-    frequency, H, deviation, coherence = found.shown
-    warnings += told
-    rows = zip(
-        COEFFICIENT_NAMES[what],
-        COEFFICIENT_UNITS[what],
-        printed_form(what, axis),
-        fitted.value.tolist(),
-        fitted.half.tolist(),
-        strict=True,
-    )
-    coefficients = tuple(Coefficient(a, b, c, x, x - h, x + h) for a, b, c, x, h in rows)
+    found, left_out = _without_wrong_readings(what, columns, data, band, held)
+    coefficients = coefficients_of(what, axis, found.fitted.value, found.fitted.half)
     if all(c.high < 0.0 for c in coefficients[: 3 if what == "Th" else 1]):
         bound = "must not be negative: input or output has the wrong sign (fh is on the handle)"
         raise ParameterError(coefficients[0].name, float(f"{coefficients[0].value:.4g}"), bound)
     return Identified(
-        what,
-        axis,
-        frequency,
-        H,
-        deviation,
-        coherence,
-        coefficients,
-        None,
-        None,
-        0,
-        periods,
-        1,
-        data.name,
-        tuple(warnings),
-    )
+        what, axis, *found.averaged, coefficients, None, None, 0, found.periods, 1, data.name,
+        (*warnings, *left_out),
+    )  # fmt: skip
 
 
 class _Columns(NamedTuple):
@@ -126,17 +105,13 @@ class _Columns(NamedTuple):
     output: np.ndarray
     reference: np.ndarray | None
 
-    @classmethod
-    def of(cls, data: Measurement) -> _Columns:
-        return cls(data.input, data.output, data.reference)
-
 
 class _Estimate(NamedTuple):
-    """A block fitted to columns: what is shown of it, and periods used."""
+    """A block fitted to columns, its response averaged over bands, and the periods used."""
 
     spectrum: _Spectrum
     fitted: _Fitted
-    shown: tuple[np.ndarray, ...]
+    averaged: Averaged
     periods: int
 
     @property
@@ -146,24 +121,24 @@ class _Estimate(NamedTuple):
         return float(np.sum(np.abs(self.fitted.left) ** 2)) / max(power, 1e-300)
 
 
-def _better(
+def _without_wrong_readings(
     what: str, columns: _Columns, data: Measurement, band: object, held: bool
 ) -> tuple[_Estimate, list[str]]:
-    """The columns as they are, or without outliers of input and reference: what explains more.
+    """The better fit, with or without outliers of input and reference, and warnings about these.
 
-    A force may well jump away and back, as in a blow; then the motion follows it. Of a wrong
-    reading the motion knows nothing, and without it the block explains more.
+    A force may jump away and back, as in a blow: the motion then follows it. It does not follow a
+    wrong reading, without which the block explains more.
     """
     names = {"input": "command" if what == "G" else "force", "reference": "reference"}
     values = {name: getattr(columns, name) for name in names}
     found = {name: cleaned(x, quantum(x)) for name, x in values.items() if x is not None}
     found = {name: clean for name, clean in found.items() if clean.bad.any()}
     best: _Estimate | ParameterError | None = None
-    told: list[str] = []
-    for few in (None, True, False) if found else (None,):
-        bad = {} if few is None else {k: _far(values[k], x, few) for k, x in found.items()}
+    warnings: list[str] = []
+    for extreme in (None, True, False) if found else (None,):
+        bad = {} if extreme is None else {k: _far(values[k], x, extreme) for k, x in found.items()}
         other = {k: bridged(values[k], x) for k, x in bad.items() if x.any()}
-        if few is not None and (not other or min(map(np.ptp, other.values())) == 0.0):
+        if extreme is not None and (not other or min(map(np.ptp, other.values())) == 0.0):
             continue
         try:
             made = _estimate(what, columns._replace(**other), data, band, held)
@@ -174,16 +149,16 @@ def _better(
             continue
         best = made
         why = "jumps away and back that the position does not follow: lost packets, wrong signs?"
-        told = [sentence(names[k], data.t[bad[k]], len(data.t), why) for k in other]
+        warnings = [sentence(names[k], data.t[bad[k]], len(data.t), why) for k in other]
     if not isinstance(best, _Estimate):
         assert best is not None
         raise best
-    return best, told
+    return best, warnings
 
 
-def _far(x: np.ndarray, clean: Cleaned, few: bool) -> np.ndarray:
-    """The outliers of a column, or the few of them that lie far beyond all its other values."""
-    if not few:
+def _far(x: np.ndarray, clean: Cleaned, extreme: bool) -> np.ndarray:
+    """The outliers of a column, or only those that lie far beyond all its other values."""
+    if not extreme:
         return clean.bad
     size = np.abs(x - np.median(x))
     peaks = [np.max(size[first:stop]) for first, stop in runs_of(clean.bad)]
@@ -207,13 +182,13 @@ def _estimate(
     try:
         with np.errstate(all="ignore"):  # of what cannot be fitted
             fitted = _fit_spectrum(what, spectrum, columns.reference is not None)
-            shown = _shown(spectrum, fitted)
-        if not np.all(np.isfinite(np.concatenate((fitted.value, fitted.half, shown[2])))):
+            averaged = _averaged_response(spectrum, fitted)
+        if not np.all(np.isfinite(np.concatenate((fitted.value, fitted.half, averaged[2])))):
             raise np.linalg.LinAlgError("no bounded intervals")
     except (np.linalg.LinAlgError, ValueError) as error:
         bound = f"must be that of a block of the form of {what}; none fits ({error})"
         raise ParameterError("output", f"{len(spectrum.y)} lines", bound) from None
-    return _Estimate(spectrum, fitted, shown, periods)
+    return _Estimate(spectrum, fitted, averaged, periods)
 
 
 def _band(what: str, band: object, dt: float, n: int) -> tuple[float, float]:
@@ -234,7 +209,7 @@ def _band(what: str, band: object, dt: float, n: int) -> tuple[float, float]:
 
 
 def _period(u: np.ndarray, high: float) -> int:
-    """Samples per period of u, if it has at least three periods; 0 otherwise."""
+    """Samples per period of u, if it has at least three; else 0. `high`: in lines of a sample."""
     from scipy.fft import irfft, next_fast_len, rfft
     from scipy.signal import find_peaks
 
@@ -264,17 +239,14 @@ def _between_lines(x: np.ndarray, period: int, high: float) -> float:
 
 
 class _Spectrum(NamedTuple):
-    """Discrete Fourier transforms at the excited lines, (n,) each.
+    """Discrete Fourier transforms of reference, input and output at the excited lines, (n,)."""
 
-    Reference, input and output; frequency [Hz]; mean step [s]; count of terms of start and end.
-    """
-
-    frequency: np.ndarray
+    frequency: np.ndarray  # [Hz]
     r: np.ndarray
     u: np.ndarray
     y: np.ndarray
-    dt: float
-    terms: int
+    dt: float  # mean step [s]
+    terms: int  # of start and end
 
 
 def _spectrum(
@@ -331,22 +303,21 @@ class _Fitted(NamedTuple):
 
 
 def _fit_spectrum(what: str, x: _Spectrum, instrument: bool) -> _Fitted:
-    """Fit a block, and the terms of start and end, to an output.
+    """Fit a block, and the terms of start and end, to an output; LinAlgError where nothing fits.
 
-    The method is least squares of the output, each line weighted by its noise; with a reference it
-    uses instrumental variables. The intervals follow from the residual at each line (HC3 of
-    MacKinnon, White 1985), so they hold for inexact weights. Student's t has as many degrees of
-    freedom as lines determine the coefficient (Satterthwaite 1946). LinAlgError where nothing fits.
+    Least squares of the output, each line weighted by its noise; instrumental variables with a
+    reference. Intervals from the residual at each line (HC3 of MacKinnon, White 1985) hold for
+    inexact weights; Student's t with the degrees of freedom of Satterthwaite (1946).
     """
     from scipy.special import stdtrit
 
     known = x.u if not instrument else x.r * (_near(x.u * x.r.conj()) / _near(np.abs(x.r) ** 2))
-    theta, left = _start(what, x), x.y
+    theta, left = _first_guess(what, x), x.y
     noise = np.full(len(x.y), float(np.std(x.y)))
     for _ in range(WEIGHT_ROUNDS):
-        theta = _least(what, x, theta, noise)
+        theta = _least_squares(what, x, theta, noise)
         if instrument:
-            theta = _settle(what, x, known, theta, noise)
+            theta = _orthogonal(what, x, known, theta, noise)
         if not np.all(np.isfinite(theta)) or (what != "Th" and min(theta[1:3]) <= 0.0):
             raise np.linalg.LinAlgError("no stable block")
         left = _misfit(what, x, theta)
@@ -354,7 +325,7 @@ def _fit_spectrum(what: str, x: _Spectrum, instrument: bool) -> _Fitted:
         floor = LINE_FLOOR * np.abs(x.y)
         noise = np.sqrt(spent * _near(np.abs(left) ** 2) + floor**2)
     columns, tools = (_slopes(what, x, u, theta) for u in (x.u, known))
-    J, Z = (_parts(c.T / noise).T for c in (columns, tools))
+    J, Z = (real_and_imaginary(c.T / noise).T for c in (columns, tools))
     size = np.linalg.norm(J, axis=0)
     # influence of the residual at each line on the coefficients, (p, 2 lines)
     gain = np.linalg.solve(Z.T @ J / size, Z.T) / size[:, None]
@@ -366,24 +337,17 @@ def _fit_spectrum(what: str, x: _Spectrum, instrument: bool) -> _Fitted:
     half = stdtrit(np.maximum(freedom, 1.0), 0.5 + 0.5 * CONFIDENCE) * np.sqrt(variance)
     # the motion between samples is unknown
     lost = response(what, theta[:3], x.frequency) * x.u * (2.0 * np.pi * x.frequency * x.dt) ** 2
-    half = np.hypot(half, gain @ _parts(lost / 6.0 / noise))[:3]
+    half = np.hypot(half, gain @ real_and_imaginary(lost / 6.0 / noise))[:3]
     model = response(what, theta[:3], x.frequency)
     return _Fitted(theta[:3], half, model, known, left, noise)
 
 
 def _near(a: np.ndarray) -> np.ndarray:
     """Mean of each value and its neighbours, fewer where there are few lines."""
-    half, at = min(max(len(a) // 4, 2), NEIGHBOURS), np.arange(len(a))
-    total = np.concatenate(([0.0], np.cumsum(a)))
-    low, high = np.maximum(at - half, 0), np.minimum(at + half + 1, len(a))
-    return (total[high] - total[low]) / (high - low)
+    return moving_mean(a, min(max(len(a) // 4, 2), NEIGHBOURS))
 
 
-def _parts(e: np.ndarray) -> np.ndarray:
-    return np.concatenate((e.real, e.imag), axis=-1)
-
-
-def _terms(x: _Spectrum) -> np.ndarray:
+def _edge_terms(x: _Spectrum) -> np.ndarray:
     """Powers of s of the terms of start and end, scaled, (lines, terms)."""
     return (1j * x.frequency / x.frequency[-1])[:, None] ** np.arange(x.terms)
 
@@ -398,14 +362,14 @@ def _denominator(what: str, theta: np.ndarray, f: np.ndarray) -> np.ndarray:
 
 def _misfit(what: str, x: _Spectrum, theta: np.ndarray) -> np.ndarray:
     """Output minus the block's output and minus the terms of start and end, (lines,)."""
-    edge = _terms(x) @ theta[3:] / _denominator(what, theta, x.frequency)
+    edge = _edge_terms(x) @ theta[3:] / _denominator(what, theta, x.frequency)
     return x.y - response(what, theta[:3], x.frequency) * x.u - edge
 
 
 def _slopes(what: str, x: _Spectrum, u: np.ndarray, theta: np.ndarray) -> np.ndarray:
     """Derivatives of the output for an input u by the coefficients, (lines, 3 + terms)."""
     s = 2j * np.pi * x.frequency
-    edge = _terms(x) / _denominator(what, theta, x.frequency)[:, None]
+    edge = _edge_terms(x) / _denominator(what, theta, x.frequency)[:, None]
     if what == "Th":
         return np.column_stack((s * s * u, s * u, u, edge))
     A = s * s + theta[1] * s + theta[2]
@@ -413,12 +377,12 @@ def _slopes(what: str, x: _Spectrum, u: np.ndarray, theta: np.ndarray) -> np.nda
     return np.column_stack((u / A, -s * out / A, -out / A, edge))
 
 
-def _start(what: str, x: _Spectrum) -> np.ndarray:
+def _first_guess(what: str, x: _Spectrum) -> np.ndarray:
     """Start of the fit: linear least squares, for G and S at the best of some denominators."""
     f = x.frequency
     s = 2j * np.pi * f
     if what == "Th":
-        return _solve(np.column_stack((s * s * x.u, s * x.u, x.u, _terms(x))), x.y)[0]
+        return _solve(np.column_stack((s * s * x.u, s * x.u, x.u, _edge_terms(x))), x.y)[0]
     best, least = np.zeros(3 + x.terms), math.inf
     for omega in 2.0 * np.pi * np.geomspace(f[0], f[-1], 12):
         for ratio in (0.3, 0.7, 2.0):
@@ -432,25 +396,25 @@ def _start(what: str, x: _Spectrum) -> np.ndarray:
 
 def _solve(columns: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
     """Real least squares of complex equations: unknowns, and the squared residual."""
-    A = _parts(columns.T).T
+    A = real_and_imaginary(columns.T).T
     size = np.linalg.norm(A, axis=0)
     A = A / size
-    found = np.linalg.lstsq(A, _parts(y), rcond=None)[0]
-    return found / size, float(np.sum((_parts(y) - A @ found) ** 2))
+    found = np.linalg.lstsq(A, real_and_imaginary(y), rcond=None)[0]
+    return found / size, float(np.sum((real_and_imaginary(y) - A @ found) ** 2))
 
 
-def _least(what: str, x: _Spectrum, theta: np.ndarray, noise: np.ndarray) -> np.ndarray:
+def _least_squares(what: str, x: _Spectrum, theta: np.ndarray, noise: np.ndarray) -> np.ndarray:
     """Least squares of the residual, each line weighted by its noise."""
     from scipy.optimize import least_squares
 
     size = 1.0 / np.linalg.norm(_slopes(what, x, x.u, theta) / noise[:, None], axis=0)
 
     def slope(z: np.ndarray) -> np.ndarray:
-        return -_parts((_slopes(what, x, x.u, z * size) * size).T / noise).T
+        return -real_and_imaginary((_slopes(what, x, x.u, z * size) * size).T / noise).T
 
     derivative: Any = slope
     found = least_squares(
-        lambda z: _parts(_misfit(what, x, z * size) / noise),
+        lambda z: real_and_imaginary(_misfit(what, x, z * size) / noise),
         theta / size,
         derivative,
         method="lm",
@@ -460,14 +424,14 @@ def _least(what: str, x: _Spectrum, theta: np.ndarray, noise: np.ndarray) -> np.
     return found.x * size
 
 
-def _settle(
+def _orthogonal(
     what: str, x: _Spectrum, known: np.ndarray, theta: np.ndarray, noise: np.ndarray
 ) -> np.ndarray:
-    """Iterates until the residual is orthogonal to the columns of the known part of the input."""
+    """Iterate until the residual is orthogonal to the columns of the known part of the input."""
     for _ in range(100):
-        J, Z = (_parts(_slopes(what, x, u, theta).T / noise).T for u in (x.u, known))
+        J, Z = (real_and_imaginary(_slopes(what, x, u, theta).T / noise).T for u in (x.u, known))
         size = np.linalg.norm(Z, axis=0)
-        left = _parts(_misfit(what, x, theta) / noise)
+        left = real_and_imaginary(_misfit(what, x, theta) / noise)
         step = np.linalg.lstsq((Z / size).T @ J / size, (Z / size).T @ left, rcond=None)[0] / size
         theta = theta + step
         if np.all(np.abs(step[:3]) <= 1e-9 * np.abs(theta[:3])):
@@ -475,11 +439,10 @@ def _settle(
     return theta
 
 
-def _shown(x: _Spectrum, found: _Fitted) -> tuple[np.ndarray, ...]:
+def _averaged_response(x: _Spectrum, found: _Fitted) -> Averaged:
     """Frequency, response, its deviation and coherence, averaged over up to 40 bands.
 
-    In each band the residual is projected on the block's output. This gives a mean response that is
-    independent of the curvature of the response within the band.
+    The residual is projected on the block's output, so curvature within a band has no effect.
     """
     edges = np.geomspace(x.frequency[0], x.frequency[-1], MULTISINE_LINES + 1)
     place = np.clip(np.searchsorted(edges, x.frequency, "right") - 1, 0, MULTISINE_LINES - 1)

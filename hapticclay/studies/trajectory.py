@@ -28,17 +28,11 @@ WINDOW = 5.0  # correlation times over which autocorrelations are summed (Sokal 
 
 
 class Stretch(NamedTuple):
-    """Samples fitted by one spline.
+    """Samples fitted by one spline."""
 
-    Attributes:
-        t: times [s], (n,), ascending.
-        bends: times at which the acceleration may jump [s], ascending.
-        kept: mask of the samples that count, (n,); None for all.
-    """
-
-    t: np.ndarray
-    bends: Sequence[float] = ()
-    kept: np.ndarray | None = None
+    t: np.ndarray  # [s], (n,), ascending
+    bends: Sequence[float] = ()  # times at which the acceleration may jump [s]
+    kept: np.ndarray | None = None  # mask of the samples that count, (n,); None for all
 
     @property
     def counted(self) -> np.ndarray:
@@ -49,15 +43,7 @@ class Stretch(NamedTuple):
 class Motion:
     """Quartic splines over time, one for each stretch, and their velocities.
 
-    Args:
-        stretches: one or more; their samples are concatenated.
-        spacing: approximate spacing of the knots [s].
-        sliding: indices of the samples whose velocity is used; None for all.
-        sign: direction of each of these, 1.0 or -1.0; None for 1.0.
-
-    Attributes:
-        size: number of coefficients.
-        counted: mask of the samples that count; the position at others is 0.
+    Of `sliding` samples (indices; None for all) the velocity is used, in the direction `sign`.
     """
 
     def __init__(
@@ -68,7 +54,7 @@ class Motion:
         sign: np.ndarray | None = None,
     ):
         places, velocities, first = [], [], []
-        self.size = 0
+        self.size = 0  # of the coefficients
         for stretch in stretches:
             P, V, at = _basis(stretch, spacing)
             places.append(P)
@@ -77,7 +63,7 @@ class Motion:
             self.size += int(at[-1]) + DEGREE + 1
         self._first, self._place = np.concatenate(first), np.concatenate(places)
         self.counted = np.concatenate([x.counted for x in stretches])
-        self._place[~self.counted] = 0.0
+        self._place[~self.counted] = 0.0  # samples that do not count have position 0
         velocity = np.concatenate(velocities)
         chosen = np.arange(len(velocity)) if sliding is None else sliding
         self._velocity, self._near = velocity[chosen], self._first[chosen]
@@ -86,7 +72,7 @@ class Motion:
         self._gram = self._products(self._place, self._first)
 
     def place(self, c: np.ndarray) -> np.ndarray:
-        """Positions at the samples [m]."""
+        """Positions at the samples [m], from coefficients."""
         return np.einsum("ij,ij->i", self._place, c[_nearby(self._first)])
 
     def velocity(self, c: np.ndarray) -> np.ndarray:
@@ -98,7 +84,7 @@ class Motion:
         return _solved(self._gram, self._gathered(self._place, self._first, p))
 
     def deviation(self, some: np.ndarray) -> np.ndarray:
-        """Standard deviation of velocities per standard deviation of the positions [1/s]."""
+        """Deviation of some velocities, by index, over that of the positions [1/s]."""
         rows = np.zeros((self.size, len(some)))
         for k, i in enumerate(some.tolist()):
             rows[_nearby(self._near[i : i + 1])[0], k] = self._velocity[i]
@@ -107,7 +93,11 @@ class Motion:
     def eliminated(
         self, ratio: float, slope: np.ndarray, columns: np.ndarray, rest: np.ndarray, p: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The coefficients' part of a Gauss-Newton step, normal equations A c + G theta = g."""
+        """A^-1 g, A^-1 G and G of a Gauss-Newton step, with normal equations A c + G theta = g.
+
+        `slope` and `columns` are changes of the forces by velocity and by theta, `rest` and `p`
+        residuals of force and position, `ratio` the weight of a squared position.
+        """
         A = ratio * self._gram + self._products(self._velocity, self._near, slope * slope)
         g = ratio * self._gathered(self._place, self._first, p)
         g += self._gathered(self._velocity, self._near, slope * rest)
@@ -169,19 +159,14 @@ def _basis(stretch: Stretch, spacing: float) -> tuple[np.ndarray, np.ndarray, np
 
 
 class Series(NamedTuple):
-    """Values to fit.
-
-    Attributes:
-        stretches: their samples.
-        y: the values, (n,), concatenated over the stretches.
-    """
+    """Values to fit over stretches."""
 
     stretches: Sequence[Stretch]
     y: np.ndarray
 
 
 def chosen_spacing(series: Sequence[Series]) -> tuple[float, list[float]]:
-    """Best spacing of the knots of splines for some series, by Akaike's criterion."""
+    """Spacing of knots [s] by Akaike's criterion, and the residual variance of each series."""
     times = [x.t for x in series[0].stretches]
     finest = LEAST_PER_KNOT * float(np.median(np.diff(times[0])))
     longest = max(2.0 * finest, *(float(t[-1] - t[0]) for t in times))
@@ -203,21 +188,17 @@ def chosen_spacing(series: Sequence[Series]) -> tuple[float, list[float]]:
     return best[1:]
 
 
-class Flowing(NamedTuple):
-    """A law of force as a function of the speed.
+class ForceLaw(NamedTuple):
+    """A law of force as a function of the speed; its theta holds log K in place of K."""
 
-    Attributes:
-        names: of its parameters, some of Fy, K, n, b.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # some of Fy, K, n, b
 
     def force(self, theta: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Forces at some speeds [N]."""
+        """Forces [N] at speeds [m/s], above 0."""
         return self.slopes(theta, v)[0]
 
     def slopes(self, theta: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Forces, and how they change with speed and parameters."""
+        """Forces [N], (n,), and their derivatives by speed, (n,), and by theta, (n, k)."""
         a = dict(zip(self.names, theta.tolist(), strict=True))
         force = np.full(len(v), a.get("Fy", 0.0))
         slope = np.full(len(v), a.get("b", 0.0))
@@ -232,53 +213,34 @@ class Flowing(NamedTuple):
 
 
 class Minimum(NamedTuple):
-    """The best joint fit of position and force.
+    """The best joint fit of position and force."""
 
-    Attributes:
-        theta: parameters of the law, with log K in place of K.
-        c: coefficients of the motion [m]; empty where the speed is known.
-        sum: sum of squares of the force without the contribution of velocity noise [N^2].
-        spread: inverse of the normal matrix of the parameters, (k, k); times the variance of a
-            force their covariance.
-        v: speeds [m/s], (n,).
-        rest: residual forces [N], (n,).
-    """
-
-    theta: np.ndarray
-    c: np.ndarray
-    sum: float
-    spread: np.ndarray
-    v: np.ndarray
-    rest: np.ndarray
+    theta: np.ndarray  # with log K in place of K
+    c: np.ndarray  # coefficients of the motion [m]; empty where the speed is known
+    sum: float  # of squared forces, without the part of velocity noise [N^2]
+    spread: np.ndarray  # inverse normal matrix of theta; its covariance per variance of a force
+    v: np.ndarray  # speeds [m/s], (n,)
+    rest: np.ndarray  # residual forces [N], (n,)
 
 
-class Joint(NamedTuple):
-    """Forces with positions or with known speeds.
+class JointFit(NamedTuple):
+    """Forces to fit together with positions, or at known speeds."""
 
-    Attributes:
-        f: resisting forces [N], (n,), positive against the motion.
-        p: positions in the direction of motion [m], (n,); empty where the speed is known.
-        motion: splines; None where the speed is known.
-        start: coefficients fitted to the positions alone, or the known speeds [m/s].
-        ratio: variance of a force over that of a position [N^2/m^2].
-        slowest: speed below which laws are continued by their tangents [m/s].
-    """
+    f: np.ndarray  # against the motion [N], (n,)
+    p: np.ndarray  # in the direction of motion [m], (n,); empty where the speed is known
+    motion: Motion | None  # None where the speed is known
+    start: np.ndarray  # coefficients fitted to the positions alone, or the known speeds [m/s]
+    ratio: float  # variance of a force over that of a position [N^2/m^2]
+    slowest: float  # laws are continued by their tangents below this speed [m/s]
 
-    f: np.ndarray
-    p: np.ndarray
-    motion: Motion | None
-    start: np.ndarray
-    ratio: float
-    slowest: float
-
-    def least(
+    def solve(
         self,
-        law: Flowing,
+        law: ForceLaw,
         theta: np.ndarray,
         held: Sequence[bool] = (),
         near: np.ndarray | None = None,
     ) -> Minimum:
-        """Least sum of squares over parameters and motion, by the Gauss-Newton method."""
+        """Least sum of squares by the Gauss-Newton method, from theta and coefficients `near`."""
         k = len(law.names)
         free = ~np.array(held, dtype=bool) if len(held) else np.ones(k, dtype=bool)
         low, high = np.array([FIT_RANGES[x] for x in law.names]).T
@@ -315,20 +277,20 @@ class Joint(NamedTuple):
         return self.ratio * float(np.sum((self.p - self.motion.place(c)) ** 2))
 
     def _look(
-        self, law: Flowing, theta: np.ndarray, c: np.ndarray
+        self, law: ForceLaw, theta: np.ndarray, c: np.ndarray
     ) -> tuple[float, np.ndarray, np.ndarray]:
         v = c if self.motion is None else self.motion.velocity(c)
         with np.errstate(over="ignore", invalid="ignore"):
             rest = self.f - self._continued(law, theta, v)[0]
             return float(rest @ rest) + self._position_sum(c), v, rest
 
-    def _continued(self, law: Flowing, theta: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _continued(self, law: ForceLaw, theta: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, ...]:
         """Forces and slopes of a law, continued by its tangent below the slowest speed."""
         force, slope, columns = law.slopes(theta, np.maximum(v, self.slowest))
         return force + slope * np.minimum(v - self.slowest, 0.0), slope, columns
 
     def _step(
-        self, law: Flowing, theta: np.ndarray, c: np.ndarray, free: np.ndarray
+        self, law: ForceLaw, theta: np.ndarray, c: np.ndarray, free: np.ndarray
     ) -> tuple[np.ndarray, Any, np.ndarray]:
         """Step of the free parameters and of the motion; spread of the parameters."""
         v = c if self.motion is None else self.motion.velocity(c)
@@ -350,8 +312,8 @@ class Joint(NamedTuple):
 def correlation_time(x: np.ndarray) -> float:
     """Samples per independent sample: 1 + 2 sum of the autocorrelations; 1 for white noise.
 
-    The sum runs over a window that grows until it holds WINDOW correlation times (A. Sokal 1997). A
-    value that differs from 1 by less than twice its standard deviation is set to 1.
+    The window grows until it holds WINDOW correlation times (A. Sokal 1997). A value within twice
+    its standard deviation of 1 is set to 1.
     """
     from scipy.fft import irfft, next_fast_len, rfft
 

@@ -21,26 +21,21 @@ from . import boundary, growth
 from .wall import Wall
 
 LEAST_OF_MAP = 1e-3  # [1/s] slower growth or decay of a map of a loop is left undecided
-WALL_MAP_TOLD = 1e-3  # so is a smaller relative change over a wall's run: a kick changes 3e-4 of it
+LEAST_MAP_CHANGE = 1e-3  # so is a smaller change over a wall's run: a kick changes 3e-4 of it
 ENDED = ("limit cycle", "saturated")  # runs that the motors bound: a small push has grown to that
 LOST = ("diverged", "out of reach", "singular")  # runs that nothing bounds
 SPAN_STEPS = 200.0  # of a repeated run, at least
 WALL_SPANS = (1.0, 4.0)  # of a wall's run, then of the one that repeats it
-WALL_TOLD = 0.01  # a wall's run with a smaller relative change is repeated
+LEAST_RUN_CHANGE = 0.01  # a wall's run with a smaller relative change is repeated
 WALL_BATCH = 100  # walls per batch, limited by the memory for their samples
 NOT_RUN = -1  # in place of 0, stable, and 1, unstable
 
 
 class Case(NamedTuple):
-    """A run to judge.
-
-    Attributes:
-        wall: the wall, or the arm in clay.
-        scenario: scenario of the run; a trial may change more of it than the wall.
-    """
+    """A run to judge: a wall, or an arm in clay."""
 
     wall: Wall
-    scenario: Scenario
+    scenario: Scenario  # a trial may change more of it than the wall
 
 
 Cases = dict[int, Case]  # by index
@@ -48,28 +43,22 @@ Rates = dict[int, float]  # growth rates by index [1/s], NaN where the verdict i
 
 
 class Reading(NamedTuple):
-    """How the growth of runs is read.
+    """How the growth of runs is read."""
 
-    Attributes:
-        scale: rates below which a mode does not count, and growth is left open [1/s].
-        short: growth rates of short runs.
-        long: growth rates of longer runs, none of them open.
-    """
-
+    # rates below which a mode does not count, and below which growth is left open [1/s]
     scale: Callable[[Case], tuple[float, float]]
     short: Callable[[Cases, int | None], Rates]
-    long: Callable[[Cases, int | None], Rates]
+    long: Callable[[Cases, int | None], Rates]  # none of them open
 
 
 def judge(
     cases: Cases, n: int, pushed: bool, threads: int | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Decides which runs are unstable.
+    """Whether each of n runs is unstable (1, 0, or NOT_RUN), and whether it took a longer run.
 
-    A run is unstable if its oscillation grows, as the map of a period says (`growth_of_map`). Where
-    a scene has no map, or where the push matters, a short run is made and read; so is a longer one
-    if map or run leaves the verdict open. A run that ends early, or saturates the motors after so
-    small a push, is unstable.
+    A run is unstable if its oscillation grows, by the map of a period or, where a scene has no map
+    or is pushed, by a short run; a longer run decides what is left open. A run that ends early, or
+    saturates the motors after so small a push, is unstable.
     """
     reading = WALLS if any(x.wall.read_by_samples for x in cases.values()) else ARMS
     rate = {} if pushed else mapped_rates(cases, reading)
@@ -77,10 +66,10 @@ def judge(
         rate |= reading.short(left, threads)
     if again := {i: cases[i] for i, x in rate.items() if math.isnan(x)}:
         rate |= reading.long(again, threads)
-    unstable, longer = np.full(n, NOT_RUN), np.zeros(n, dtype=bool)
+    unstable, repeated = np.full(n, NOT_RUN), np.zeros(n, dtype=bool)
     unstable[[*rate]] = np.array([*rate.values()]) > 0.0
-    longer[[*again]] = True
-    return unstable, longer
+    repeated[[*again]] = True
+    return unstable, repeated
 
 
 def mapped_rates(cases: Cases, reading: Reading) -> Rates:
@@ -96,7 +85,7 @@ def mapped_rates(cases: Cases, reading: Reading) -> Rates:
 
 
 def lasting(s: Scenario, steps: float) -> Scenario:
-    """A scenario of another length."""
+    """The scenario with a length of so many steps."""
     return replace(s, t_max=steps * s.dt)
 
 
@@ -120,7 +109,7 @@ def short_arms(cases: Cases, threads: int | None) -> Rates:
 
 
 def _short_arms(cases: list[Case], every: int, threads: int | None) -> list[float]:
-    """The rates of loops of which one step of so many is read."""
+    """The rates of loops, from one step in `every`."""
     n = growth.MOTION_SAMPLES
     jobs = [lasting(x.scenario, (n + 0.5) * every) for x in cases]
     rate, v = np.full(len(cases), math.inf), np.full((len(cases), n), np.nan)
@@ -152,7 +141,7 @@ def long_arms(cases: Cases, threads: int | None) -> Rates:
 def wall_scale(case: Case) -> tuple[float, float]:
     """Reading.scale of a wall."""
     n, _, slowest = case.wall.growth_reading()
-    return slowest, WALL_MAP_TOLD / (n * case.wall.subject.Ts)
+    return slowest, LEAST_MAP_CHANGE / (n * case.wall.subject.Ts)
 
 
 def short_walls(cases: Cases, threads: int | None) -> Rates:
@@ -161,12 +150,12 @@ def short_walls(cases: Cases, threads: int | None) -> Rates:
     for i, x in cases.items():
         n, *_ = x.wall.growth_reading(WALL_SPANS[0])
         span[i] = n * x.wall.subject.Ts
-    return {i: x if abs(x) * span[i] >= WALL_TOLD else math.nan for i, x in rate.items()}
+    return {i: x if abs(x) * span[i] >= LEAST_RUN_CHANGE else math.nan for i, x in rate.items()}
 
 
 def long_walls(cases: Cases, threads: int | None, span: float = WALL_SPANS[1]) -> Rates:
     """Growth rates of walls from longer runs."""
-    # Those with as many steps a sample run together: their records keep one step of so many.
+    # walls with as many steps per sample run together: their records keep one step per sample
     steps = {i: round(x.wall.subject.Ts / x.scenario.dt) for i, x in cases.items()}
     rate = {}
     for every in sorted(set(steps.values())):

@@ -58,7 +58,7 @@ class Drift(Result):
     mobility: np.ndarray
 
     def tables(self) -> dict[str, dict[str, Any]]:
-        """Returns the numbers of the figure: the gain of Sh at each pose."""
+        """The gain of Sh at each pose, and the range of each coefficient."""
         table: dict[str, Any] = {"world x [m]": self.x, "world y [m]": self.y}
         for i, axis in enumerate(AXES):
             for k, way in enumerate(("without shaping", "with shaping")):
@@ -76,11 +76,10 @@ class Drift(Result):
         return f"workspace: {len(self.x)} poses, {100.0 * self.spacing:g} cm apart"
 
     def figures(self) -> dict[str, Any]:
-        """The gain of Sh over the workspace."""
         return {"map": figure_of(self, tables={"poses": self.tables()["poses"]})}
 
     def ranges(self) -> list[dict[str, Any]]:
-        """Return the range of each coefficient over the poses, and the printed value."""
+        """The range of each coefficient over the poses, beside the printed value."""
         out = []
         for j, i, n, k in np.ndindex(2, 2, 3, 2):
             what, axis, values = DRIFT_BLOCKS[j], AXES[i], self.coefficients[:, k, j, i, n]
@@ -91,14 +90,13 @@ class Drift(Result):
         return out
 
     def contents(self) -> dict[str, Any]:
-        """Everything."""
         axes = "pose", "shaping (off, on)", "block (G, S)", "axis (x, y)"
         order = (*axes, "gain, damping, stiffness")
         return {**fields_of(self), "order": order, "ranges": self.ranges()}
 
 
 def poses(spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points of a square grid through the nominal pose that lie within reach, y >= 0."""
+    """World x and y [m] of a square grid through the nominal pose, within reach, y >= 0."""
     reach = L1 + L2
 
     def along(nominal: float, lowest: float) -> np.ndarray:
@@ -127,9 +125,6 @@ def drift_map(
         spacing: distance of neighbouring poses [m], 0.01 to 0.3.
         seed: seed of the phases of the tones.
         progress: called after each pose with (poses done, poses in all).
-
-    Raises:
-        ParameterError: a value is out of its bounds.
     """
     x, y = poses(spacing)
     out = np.empty((len(x), 2, 2, 2, 3))

@@ -36,73 +36,45 @@ PushClass = Literal["sticks", "limit cycle", "grows"]
 
 @dataclass(frozen=True)
 class MeasuredCycle:
-    """The oscillation in the last half of a run.
+    """The oscillation in the last half of a run."""
 
-    Attributes:
-        speed: largest velocity [m/s].
-        fundamental: amplitude of the velocity at omega [m/s].
-        amplitude: half the distance between its ends [m].
-        omega: frequency [rad/s].
-        change: relative growth of its speed from the third to the last quarter of the run.
-    """
-
-    speed: float
-    fundamental: float
-    amplitude: float
-    omega: float
-    change: float
+    speed: float  # largest velocity [m/s]
+    fundamental: float  # amplitude of the velocity at omega [m/s]
+    amplitude: float  # half the distance between its ends [m]
+    omega: float  # [rad/s]
+    change: float  # relative growth of the speed from the third to the last quarter of the run
 
 
 @dataclass(frozen=True)
 class YieldCell:
-    """One point of the map.
+    """A push at one yield force and gain: theory, and a run. Speeds are NaN without a cycle."""
 
-    Attributes:
-        Fy: yield force [N].
-        K: gain of the compensator.
-        expected: outcome of the push by theory.
-        predicted: V of the limit cycle by the describing function [m/s]; NaN without one.
-        exact: its exact largest velocity [m/s]; NaN without one.
-        simulated: outcome of a run.
-        speed: largest velocity of the cycle in the run [m/s]; NaN without one.
-    """
-
-    Fy: float
-    K: float
-    expected: PushClass
-    predicted: float
-    exact: float
-    simulated: PushClass
-    speed: float
+    Fy: float  # [N]
+    K: float  # gain of the compensator
+    expected: PushClass  # by theory
+    predicted: float  # V of the limit cycle by the describing function [m/s]
+    exact: float  # largest velocity of the limit cycle [m/s]
+    simulated: PushClass  # by a run
+    speed: float  # largest velocity of the cycle in that run [m/s]
 
 
 @dataclass(frozen=True, repr=False)
 class YieldMap(Result):
     """Outcome of a push over yield force and gain.
 
-    Motions of the loop scale with Fy. Each gain therefore has two numbers, both for a yield force
-    of 1 N: the least push that does not stick, and the speed of the limit cycle.
-
-    Attributes:
-        loop: the fixed parts, with the push and the damping b of the clay.
-        least: gain below which every push ends stuck, because there is no limit cycle.
-        limit: gain from which a push that does not stick grows.
-        K: gains of the lines, ascending, from least on.
-        critical: least velocity of a push that does not stick [m/s per N].
-        speed: largest velocity of the limit cycle [m/s per N]; NaN at and above `limit`.
-        cells: points at which theory and a run are compared.
+    Motions of the loop scale with Fy: lines over the gain hold for a yield force of 1 N.
     """
 
     drawn_by = "hapticclay.views.stability_map_plots:yield_map_plot"
     written_as = "gain-yield"
 
-    loop: PushedLoop
-    least: float
-    limit: float
-    K: tuple[float, ...]
-    critical: tuple[float, ...]
-    speed: tuple[float, ...]
-    cells: tuple[YieldCell, ...]
+    loop: PushedLoop  # the fixed parts, with the push and the damping b of the clay
+    least: float  # gain below which every push ends stuck: there is no limit cycle
+    limit: float  # gain from which a push that does not stick grows
+    K: tuple[float, ...]  # of the lines, ascending, from least on
+    critical: tuple[float, ...]  # least velocity of a push that does not stick [m/s per N]
+    speed: tuple[float, ...]  # largest of the limit cycle [m/s per N]; NaN at and above `limit`
+    cells: tuple[YieldCell, ...]  # at which theory and a run are compared
 
     def tables(self) -> dict[str, dict[str, Any]]:
         """Returns the numbers of the figure: cells, and lines over the gain."""
@@ -141,7 +113,7 @@ class YieldMap(Result):
 
 
 def yielding_run(loop: PushedLoop, flow: Flow, t_max: float) -> Scenario:
-    """The scenario of a pushed loop in yielding clay, with unlimited motors."""
+    """The scenario of a pushed loop in yielding clay, not its own, with unlimited motors."""
     scenario = replace(loop, torque_limit=NO_LIMITS).scenario(t_max, stop_when_unstable=False)
     return replace(scenario, clay=slab(flow))
 
@@ -188,10 +160,7 @@ def classify_push(loop: PushedLoop, flow: Flow) -> tuple[PushClass, float]:
 def yield_map(
     loop: PushedLoop, quick: bool = False, progress: Callable[[Iterable], Iterable] = iter
 ) -> YieldMap:
-    """Make the map of yield force and gain, for Bingham clay of the loop's b.
-
-    Theory and runs use continuous time, no delay and unlimited motors.
-    """
+    """The map for Bingham clay of the loop's b: continuous time, no delay, unlimited motors."""
     loop = replace(loop, **TIMING, push=LARGE_PUSH)
     linear, unit = loop.linear, Flow(Fy=1.0, b=loop.b)
     lines, rows, columns = (6, 4, 4) if quick else (12, 6, 7)

@@ -51,7 +51,7 @@ class LinearLoop:
         delay: from a measurement to the torque computed from it [s], 0 to 1, at most 100 Ts. It
             delays every action of the motors: the servo's feedback, the compensator's command, and
             held clay.
-        render: the clay is "held" (a force of the motors) or "physical" (physical, never delayed).
+        render: the clay is "held" (a force of the motors) or "physical" (never delayed).
         mobility: mobility of the bare handle where the servo shapes its inertia [1/kg], needed with
             sampling or delay; None for the gain of Sh.
         k: stiffness of the clay, an elastic wall with its rest at p = 0, Te = b s + k [N/m], 0 to

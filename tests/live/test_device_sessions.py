@@ -209,7 +209,7 @@ def test_a_lost_device_lets_go(device_hand):
     server.close()
     slices(session, 3)
     assert session.point is None and hand.client.lost
-    assert session.run.pull.carried == (0.0, 0.0)
+    assert session.run.pull.damper_force == (0.0, 0.0)
 
 
 def test_a_player_paces_itself_by_the_device():

@@ -14,7 +14,7 @@ from hapticclay.kernel.row import CHUNK
 from hapticclay.live.clock import FRAME_TIME, LONGEST_SLICE, Clock
 from hapticclay.live.player import Player
 from hapticclay.live.replay import Replay
-from hapticclay.live.run import played
+from hapticclay.live.run import session_scenario
 from hapticclay.live.session import Session
 from hapticclay.live.verdict import live_verdict
 from hapticclay.views.stage import Stage
@@ -74,7 +74,9 @@ def test_slices_are_no_part_of_the_result():
             way = session.advance(min(frame, end - session.t + 1e-9))
             assert len(way) == 2 or frame < 1e-3
         ends.append(session.record())
-    still = dataclasses.replace(played(endless, 10.0), force=(2.0, 0.0), t_max=ends[0].t[-1])
+    still = dataclasses.replace(
+        session_scenario(endless, 10.0), force=(2.0, 0.0), t_max=ends[0].t[-1]
+    )
     reference = hc.simulate(still)
     for record in ends:
         n = min(len(record.t), len(reference.t)) - 2

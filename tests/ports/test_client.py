@@ -455,7 +455,9 @@ def test_a_hand_is_identified_from_what_a_device_exchanged(tmp_path):
     hand = hc.Operator(0.25, 8.0, 150.0)
     scene = hc.Scenario(operator=hand, force=(0.0, 0.0), origin=NOMINAL, length=None)
     rng = np.random.default_rng(2)
-    with serve(scene, period=PERIOD) as server, connect(server.url, BY_MESSAGE) as client:
+    # a lost sample would be a step of its own
+    patient = Limits(period=PERIOD, ramp=0.0, patience=1.0)
+    with serve(scene, period=PERIOD) as server, connect(server.url, patient) as client:
         for push in np.repeat(rng.choice([-0.4, 0.4], 80), 8):
             client.exchange((float(push), 0.0, 0.0))
         client.log.save(tmp_path / "device.csv")

@@ -76,15 +76,15 @@ def test_minimum_is_that_of_all_unknowns_at_once():
     rng = np.random.default_rng(3)
     t = np.linspace(0.0, 1.0, 240)
     p, v = 0.05 * np.sin(2.0 * t + 0.3) + 0.02 * t, 0.1 * np.cos(2.0 * t + 0.3) + 0.02
-    law = trajectory.Flowing(("Fy", "K", "n"))
+    law = trajectory.ForceLaw(("Fy", "K", "n"))
     truth = np.array([2.0, math.log(15.0), 0.5])
     keep = np.flatnonzero(v > 0.03)
     f = law.force(truth, v[keep]) + 0.05 * rng.standard_normal(len(keep))
     p = p + 2e-5 * rng.standard_normal(len(t))
     motion = trajectory.Motion([trajectory.Stretch(t, (0.4,))], 0.2, keep)
     ratio = (0.05 / 2e-5) ** 2
-    joint = trajectory.Joint(f, p, motion, motion.follow(p), ratio, 1e-3)
-    found = joint.least(law, np.array([1.5, 2.0, 0.7]))
+    joint = trajectory.JointFit(f, p, motion, motion.follow(p), ratio, 1e-3)
+    found = joint.solve(law, np.array([1.5, 2.0, 0.7]))
 
     k = trajectory.DEGREE
     inner = [*np.linspace(0.0, 0.4, 3)[1:], 0.4, 0.4, *np.linspace(0.4, 1.0, 4)[1:-1]]

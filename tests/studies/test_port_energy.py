@@ -18,7 +18,7 @@ def test_the_path_is_imposed_and_its_energy_is_that_of_the_derivation():
     asked = 2.0 * (4.0 * b * A**2 / Ts - 2.0 * A**2 * (K + 2.0 * B / Ts))
     # the forces of the hand are summed over two reversals of 2 m v, 5e4 times the energy's share
     assert taken_energy(wall, zigzag(A)) == pytest.approx(asked, rel=1e-4)
-    r = hc.simulate(imposed(wall, zigzag(A), steps=16))
+    r = hc.simulate(imposed(wall, zigzag(A), 3, 16)[0])
     # link 1 moves on an arc: (A/lever)^2/2 = 9e-8
     assert np.abs(r.p[::16, 0]) == pytest.approx(A, rel=1e-4)
     assert taken_energy(replace(wall, device=hc.Device(1.0, b)), zigzag(A)) == pytest.approx(

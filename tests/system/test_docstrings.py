@@ -13,14 +13,14 @@ FIRST = ("self", "cls")
 
 def documented(made, *sections):
     """Names on lines of their own in sections of a docstring."""
-    text = inspect.cleandoc(made.__doc__ or "")
+    text = inspect.getdoc(made) or ""
     found = re.findall(rf"^(?:{'|'.join(sections)}):\n((?:[ \t]+.*\n?|\n)+)", text + "\n", re.M)
     return set(re.findall(r"^ {4}\*{0,2}(\w+)(?: \(.*?\))?:", "\n".join(found), re.M))
 
 
 def lacking(made):
-    """Arguments of a function that its docstring leaves out, or the docstring itself."""
-    if not made.__doc__:
+    """Arguments that a function's docstring, or that of what it overrides, leaves out."""
+    if not inspect.getdoc(made):
         return ["a docstring"]
     names = [n for n in inspect.signature(inspect.unwrap(made)).parameters if n not in FIRST]
     told = documented(made, "Args", "Attributes")

@@ -157,7 +157,7 @@ def test_page_says_what_the_monitor_says(page):
     )  # in free space, where no gain is too much for this hand
     onset = hc.Outcome("diverged", 1.0, 1, "y", "growing <oscillation>")
     with page.player.lock:
-        page.session.run.watch.onset, page.session._swung = onset, page.session.t + 1e3
+        page.session.run.watch.onset, page.session._last_swing = onset, page.session.t + 1e3
     while time.monotonic() < deadline and "UNSTABLE" not in page.verdict.content:
         time.sleep(0.05)
     assert "UNSTABLE since 1.0 s: growing &lt;oscillation&gt; of y" in page.verdict.content

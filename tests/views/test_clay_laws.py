@@ -12,7 +12,7 @@ from hapticclay.cli.run import run_table
 from hapticclay.live.status import clay_here
 from hapticclay.model import clay as clay_module
 from hapticclay.model.clay import LAWS
-from hapticclay.model.traits import Column, Hold, Law, Told
+from hapticclay.model.traits import Column, Hold, Law, Quantity
 from hapticclay.scene.text import clay_text
 from hapticclay.views import palette, run_figures
 from hapticclay.views.captions import scenario_parts
@@ -143,8 +143,8 @@ def test_a_law_added_is_shown_everywhere(monkeypatch):
     """Words, column, hold, shade: nothing but the law's own answers has to be written."""
     stick = Law(
         "stick", "clay", lambda c: True, viscous=False, of_velocity=False, seen_in_b=False,
-        columns=(Column("grip", "N/mm"),), words=lambda c: (Told("grip = {}", (7.0,), "N/mm"),),
-        here=lambda c, place: (Told("grip = {}", (7.0,), "N/mm"),) * (0.02 < place[0] < 0.06),
+        columns=(Column("grip", "N/mm"),), words=lambda c: (Quantity("grip = {}", (7.0,), "N/mm"),),
+        here=lambda c, place: (Quantity("grip = {}", (7.0,), "N/mm"),) * (0.02 < place[0] < 0.06),
         at=lambda law, place: (7.0,), force=lambda law, speed, dent: 500.0 * (law.damping > 0.0),
         holds=lambda c, i: Hold(7.0, "grip"),
     )  # fmt: skip
