@@ -2,10 +2,13 @@
 
 import importlib
 import inspect
+from pathlib import Path
 
 import numpy as np
 
 import hapticclay as hc
+
+ARM = Path(__file__).parents[1] / "mjcf" / "arms" / "planar_2r.xml"
 
 
 def good_values(folder):
@@ -34,7 +37,12 @@ def good_values(folder):
     grid = {"x_edges": (), "y_edges": (), "values": ((40.0,),)}
     image = {"image": [[0.5]], "x": (0.0, 0.1), "y": (0.0, 0.1), "b": (0.0, 9.0)}
     smooth = {"x": (0.0, 0.1), "y": (0.0, 0.1), "values": ((1.0, 1.0), (1.0, 1.0))}
+    arm = hc.MjcfArm(ARM)
+    of_joints = {"arm": arm, "law": hc.JointPD((100.0, 50.0), (1.0, 0.5))}
     by_function = {
+        "joint_limits": of_joints, "over_poses": of_joints,
+        "wall_limit": {"arm": arm, "B": 1.0, "operator": hc.Operator()},
+        "MjcfArm": {"file": ARM}, "JointPD": {"Kp": (1.0,), "Kd": (1.0,)},
         "stable_band": {"part": "K"}, "arm_mbk": {"loop": pushed}, "arm_index": {"loop": pushed},
         "gain_band": {"b": [10.0]},
         "wall_band": {"B": [1.0]}, "Chirp": ramp, "Clay": {"x": profile, "y": profile},

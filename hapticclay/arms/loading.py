@@ -111,7 +111,7 @@ def _spec(file: Any) -> Any:
     if not isinstance(file, str | os.PathLike):
         raise ParameterError("file", file, "must be an MJCF or URDF file, or an mujoco.MjSpec")
     path = Path(file)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise ParameterError("file", str(path), "must be an MJCF or URDF file (there is none)")
     return mujoco.MjSpec.from_file(str(path))
 
