@@ -164,9 +164,11 @@ def _handle(model: Any, wanted: str | None) -> tuple[str, int] | None:
             bound = f"must be named: there are {', '.join(model.site(i).name for i in moving)}"
             raise ParameterError("site", None, bound)
         return ("site", moving[0]) if moving else None
+    bodies = {model.body(i).name: i for i in range(1, model.nbody)}
+    if not isinstance(wanted, str):
+        raise ParameterError("site", wanted, "must be the name of a site or body, or None")
     if wanted in sites:
         return "site", sites[wanted]
-    bodies = {model.body(i).name: i for i in range(1, model.nbody)}
     if wanted in bodies:
         return "body", bodies[wanted]
     raise _unknown("site", wanted, [*sites, *bodies], "a site or body")
