@@ -30,6 +30,8 @@ SMALLER = {  # of each unit a smaller one, and its size
     "N.s/m": ("N.s/mm", "1e3"), "N/m": ("N/mm", "1e3"), "Hz": ("kHz", "1e3"),
     "m/s": ("mm/s", "1e-3"), "1/kg": ("1/g", "1e3"), "1/s": ("1/ms", "1e3"),
     "1/s^2": ("1/ms^2", "1e6"), "rad": ("mrad", "1e-3"), "N.m": ("N.mm", "1e-3"),
+    "N.m/rad": ("N.mm/rad", "1e-3"), "N.m.s/rad": ("N.mm.s/rad", "1e-3"),
+    "rad/s": ("mrad/s", "1e-3"),
 }  # fmt: skip
 
 
