@@ -22,6 +22,7 @@ from hapticclay import files
 from hapticclay.gym import baselines, scores
 from hapticclay.gym.draws import Range
 from hapticclay.gym.quantities import Quantity
+from hapticclay.views.captions import unit_text
 
 from . import common
 
@@ -110,11 +111,12 @@ def spaces(id: str) -> dict[str, str]:
     """Return the tables of an environment's spaces and draws, by section."""
     env: Any = gymnasium.make(f"hapticclay/{id}", engine="python").unwrapped
     task = env.task
-    return {
+    found = {
         "actions": quantity_table(task.actions),
         "observations": quantity_table(task.observations),
         "draws": draw_table(task.ranges),
     }
+    return {name: unit_text(text) for name, text in found.items()}
 
 
 def main(argv: list[str] | None = None) -> dict[str, Any]:

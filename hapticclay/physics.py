@@ -1,6 +1,10 @@
-"""MuJoCo, imported for any MUJOCO_GL: physics draws nothing, and views report their own errors."""
+"""MuJoCo and the folder of MJCF files.
+
+MuJoCo is imported for any MUJOCO_GL: physics draws nothing, and views report their own errors.
+"""
 
 import os
+from pathlib import Path
 
 try:
     import mujoco
@@ -14,7 +18,7 @@ except (AttributeError, ImportError, OSError, RuntimeError):  # each backend has
     finally:
         os.environ["MUJOCO_GL"] = wanted
 
-__all__ = ["mujoco", "warnings_caught"]
+__all__ = ["mjcf_folder", "mujoco", "warnings_caught"]
 
 
 class warnings_caught:
@@ -28,3 +32,10 @@ class warnings_caught:
 
     def __exit__(self, *error: object) -> None:
         mujoco.set_mju_user_warning(self.before)
+
+
+def mjcf_folder() -> Path:
+    """The folder of MJCF files: beside the package in a checkout, inside it when installed."""
+    package = Path(__file__).resolve().parent
+    checkout = package.parent / "mjcf"
+    return checkout if (checkout / "arm.xml").is_file() else package / "mjcf"

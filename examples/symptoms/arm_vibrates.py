@@ -12,7 +12,7 @@ import hapticclay as hc
 
 plt.style.use("hapticclay.views.figure")
 
-arm = hc.MjcfArm("mjcf/arms/leader_7.xml")
+arm = hc.MjcfArm("leader_7")
 law = hc.JointPD(
     Kp=(240, 240, 240, 240, 24, 31, 25),  # N.m/rad
     Kd=(3, 3, 3, 3, 0.2, 0.2, 0.2),  # N.m.s/rad
@@ -35,5 +35,10 @@ print(poses.headline())
 wall = hc.theory.wall_limit(arm, "z", 5.0, hc.Operator(), Ts=1e-3, delay=1e-3)
 print(wall.headline())
 
-limits.plot()
+fig, ax = plt.subplots()
+ax.barh(limits.names, limits.Kp[:, 1], height=0.5, alpha=0.4, label="stable")
+ax.plot(law.Kp, limits.names, "ko", label="present")
+ax.set(xscale="log", xlim=(10.0, 3e3), xlabel="Kp [N·m/rad]")
+ax.invert_yaxis()
+fig.legend(loc="outside upper center", ncols=2)
 plt.show()

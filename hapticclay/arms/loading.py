@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..display import one_line
-from ..errors import ParameterError, is_series, nearest, number
+from ..errors import ParameterError, choice, is_series, nearest, number
 from .mechanism import Mechanism
 
 LIGHTEST = 1e-12  # [kg.m^2] least eigenvalue of M of a mechanism with an inverse
@@ -106,11 +106,14 @@ def compiled(file: Any) -> tuple[Any, str]:
 
 
 def _spec(file: Any) -> Any:
-    from ..physics import mujoco
+    from ..physics import mjcf_folder, mujoco
 
     if not isinstance(file, str | os.PathLike):
         raise ParameterError("file", file, "must be an MJCF or URDF file, or an mujoco.MjSpec")
     path = Path(file)
+    if isinstance(file, str) and not path.suffix and os.sep not in file:  # one of the package's
+        own = {x.stem: x for x in sorted((mjcf_folder() / "arms").glob("*.xml"))}
+        path = own[choice("file", file, tuple(own))]
     if not os.path.isfile(path):
         raise ParameterError("file", str(path), "must be an MJCF or URDF file (there is none)")
     return mujoco.MjSpec.from_file(str(path))

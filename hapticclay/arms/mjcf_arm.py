@@ -26,7 +26,8 @@ class MjcfArm:
     contacts and joint limits of the file take no part. What the file leaves open is in `notes`.
 
     Attributes:
-        file: MJCF or URDF file, or an mujoco.MjSpec.
+        file: MJCF or URDF file, an mujoco.MjSpec, or the name of an arm of the package: planar_2r,
+            five_bar, haptic_3, leader_7.
         site: site, or body, at which the hand holds the arm; None for the only site on a moving
             body.
         joints: names of the arm's joints, in the order of its gains; None for those between the

@@ -26,7 +26,8 @@ class ArmCommand:
     with --poses the same over the workspace. Exact for small motions about the pose: no runs.
 
     Attributes:
-        file: MJCF or URDF file of the arm.
+        file: MJCF or URDF file of the arm, or the name of one of the package: planar_2r, five_bar,
+            haptic_3, leader_7.
         gains: File of the gains, .toml, .json or .yaml, as teleoperation projects keep them.
         Kp: Stiffness of each joint [N.m/rad], in place of --gains.
         Kd: Damping of each joint [N.m.s/rad].
@@ -50,7 +51,7 @@ class ArmCommand:
         figures: Format and style of the figures.
     """
 
-    file: Loose[Path]
+    file: Loose[str]
     gains: Path | None = None
     Kp: Annotated[tuple[float, ...], Bound(unit="N.m/rad")] = ()
     Kd: Annotated[tuple[float, ...], Bound(unit="N.m.s/rad")] = ()

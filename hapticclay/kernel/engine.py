@@ -11,20 +11,13 @@ import numpy as np
 
 from ..arguments import checked
 from ..model.arm import PAPER, Arm
-from ..physics import mujoco, warnings_caught
+from ..physics import mjcf_folder, mujoco, warnings_caught
 from ..scene.scenario import Scenario
 
-__all__ = ["mujoco", "warnings_caught"]
+__all__ = ["mjcf_folder", "mujoco", "warnings_caught"]
 
 LINK2_SHARE = 0.4  # of I1, at most, that the mass of link 2 at the elbow takes; 0.396 in arm.xml
 OPTIONS = 32  # numbers before the gravity of a model, among which its timestep is
-
-
-def mjcf_folder() -> Path:
-    """The folder of MJCF files: beside the package in a checkout, inside it when installed."""
-    package = Path(__file__).resolve().parents[1]
-    checkout = package.parent / "mjcf"
-    return checkout if (checkout / "arm.xml").is_file() else package / "mjcf"
 
 
 @checked

@@ -146,9 +146,13 @@ class Simulation:
 
     def close(self) -> None:
         """Closes the simulation; no further step can be made."""
-        if not self._closed and self._recorded and (self._run.filled or self._run.judged):
+        if not self._closed and self._has_record:
             self.record()
         self._closed = True
+
+    @property
+    def _has_record(self) -> bool:
+        return self._recorded and bool(self._run.filled or self._run.judged)
 
     @property
     def scenario(self) -> Scenario:
@@ -172,6 +176,9 @@ class Simulation:
         Velocity, forces and torques of a sample also depend on what acts after it. They are those
         that a step from here would record.
         """
+        if self._state is None and self._closed and self._has_record:
+            record = self.record()
+            self._state = Sample(**{name: getattr(record, name)[-1] for name in Sample._fields})
         if self._state is None:
             self._state = sample_of(self._run.sample_time(), np.array(self.numbers()))
         return self._state

@@ -132,7 +132,8 @@ def of_loop(
                 known_names(name, given, {"loop", *form.parameters})
             first = args[0] if args else given.get("axis")
             try:
-                bound = forms.get(type(first), form).bind(*args, **given)
+                whole = (each for kind, each in forms.items() if isinstance(first, kind))
+                bound = next(whole, form).bind(*args, **given)
             except TypeError as error:
                 raise TypeError(f"{name}(): {error}") from None
             rest = bound.kwargs | dict(zip(bound.signature.parameters, bound.args, strict=False))

@@ -198,3 +198,9 @@ def test_without_handle_the_joints_are_judged_alone(tmp_path):
     assert hc.theory.joint_limits(arm, hc.JointPD([1.0], [0.1]), 1e-3).stable
     with pytest.raises(hc.ParameterError, match="site or body at the handle"):
         arm.jacobian()
+
+
+def test_arms_of_the_package_by_name():
+    assert hc.MjcfArm("leader_7").names == card("leader_7").names
+    with pytest.raises(hc.ParameterError, match="did you mean 'planar_2r'"):
+        hc.MjcfArm("planar2r")

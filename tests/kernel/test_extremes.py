@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from benchmarks import bench, extremes, reference
+from benchmarks import extremes, pages, reference
 from hapticclay.model.cells import Profile
 from hapticclay.model.clay import Clay
 from hapticclay.model.signals import Multisine
@@ -88,7 +88,7 @@ def test_registry_covers_the_list():
 
 
 def test_published_verdicts_agree_and_nothing_escaped():
-    rows = bench.load(Path(__file__).parents[2] / "docs" / "bench")["extremes"]["rows"]
+    rows = pages.load(Path(__file__).parents[2] / "docs" / "bench")["extremes"]["rows"]
     assert [(r["group"], r["name"]) for r in rows] == [(c.group, c.name) for c in CASES]
     for r in rows:
         assert r["nan"] == 0 and r["warnings"] == 0 and r["ours"] != "raised", r

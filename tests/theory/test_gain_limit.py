@@ -482,3 +482,10 @@ def test_bad_input_is_refused(call, field):
     with pytest.raises(ParameterError) as e:
         call()
     assert e.value.field == field
+
+
+def test_a_loop_of_a_subclass_is_a_loop():
+    """A pushed loop of the studies is a loop: it needs no clay beside it."""
+    loop = hc.studies.PushedLoop("x", b=90.0)
+    plain = hc.theory.Loop(b=90.0)
+    assert hc.theory.gain_limit(loop) == hc.theory.gain_limit(plain)

@@ -197,7 +197,7 @@ def test_smooth_pictures_have_soft_edges():
     (["video", "constant", "--camera", "moon"], "moon"),
     (["video", "constnat"], "did you mean 'constant'"),
     (["video", "no/such"], "must be a saved record"),
-    (["view", "constant", "--tool-width", "0"], "tool.width"),
+    (["view", "constant", "--tool-width", "0"], "--tool-width"),
     (["view", "constant", "--every", "0"], "every = 0: must be a whole number"),
     (["view", "constant", "--web", "--port", "99999"], "port = 99999: must be a whole number"),
 ])  # fmt: skip
