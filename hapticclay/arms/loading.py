@@ -116,7 +116,9 @@ def _spec(file: Any) -> Any:
         path = own[choice("file", file, tuple(own))]
     if not os.path.isfile(path):
         raise ParameterError("file", str(path), "must be an MJCF or URDF file (there is none)")
-    return mujoco.MjSpec.from_file(str(path))
+    spec = mujoco.MjSpec.from_file(str(path))
+    spec.compiler.fusestatic = False  # a URDF's tool keeps its name
+    return spec
 
 
 def _bad_file(file: Any, why: str) -> ParameterError:

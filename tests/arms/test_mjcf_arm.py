@@ -204,3 +204,22 @@ def test_arms_of_the_package_by_name():
     assert hc.MjcfArm("leader_7").names == card("leader_7").names
     with pytest.raises(hc.ParameterError, match="did you mean 'planar_2r'"):
         hc.MjcfArm("planar2r")
+
+
+URDF = """<robot name="two"><link name="base"/>
+<link name="a"><inertial><origin xyz="0.1 0 0"/><mass value="1"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="tool"/>
+<joint name="j" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="5" velocity="1"/></joint>
+<joint name="fixed" type="fixed"><parent link="a"/><child link="tool"/>
+<origin xyz="0.2 0 0"/></joint></robot>"""
+
+
+def test_a_urdf_with_its_tool(tmp_path):
+    file = tmp_path / "two.urdf"
+    file.write_text(URDF)
+    arm = hc.MjcfArm(file, site="tool")
+    assert arm.names == ("j",) and arm.ranges.tolist() == [[-1.0, 1.0]]
+    assert arm.mass_matrix() == pytest.approx(0.01 + 1.0 * 0.1**2)
+    np.testing.assert_allclose(arm.handle([0.5]), [0.2 * math.cos(0.5), 0.2 * math.sin(0.5), 0.0])
