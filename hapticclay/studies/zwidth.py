@@ -244,9 +244,7 @@ class ZWidth(Result):
                 f"{self.press.force:g} N at {1e3 * self.press.speed:g} mm/s"
                 f" ({len(rough)} of {len(self.regions)} regions)"
             )
-        return lines + (
-            self.violations() or ["no run was unstable below a line that is sufficient"]
-        )
+        return lines + (self.violations() or [NO_VIOLATION])
 
     def contents(self) -> dict[str, Any]:
         """Push, tables, and the differences between theory and runs."""
