@@ -27,7 +27,14 @@ CASES = [
 ]
 
 
-def grows(arm: hc.MjcfArm, Kp: np.ndarray, integrator: str, substeps: int, late: bool) -> bool:
+def grows(
+    arm: hc.MjcfArm,
+    Kp: np.ndarray,
+    integrator: str,
+    substeps: int,
+    late: bool,
+    seconds: float = SECONDS,
+) -> bool:
     """Whether a run from a small deviation grows."""
     model = mujoco.MjModel.from_xml_path(str(FILE))
     model.dof_frictionloss[:], model.jnt_limited[:] = 0.0, 0
@@ -36,7 +43,7 @@ def grows(arm: hc.MjcfArm, Kp: np.ndarray, integrator: str, substeps: int, late:
     data, static = mujoco.MjData(model), mujoco.MjData(model)
     data.qpos[:] = arm.q + 1e-7 * np.random.default_rng(0).normal(size=model.nv)
     rate, last, sizes, held = np.zeros(model.nv), data.qpos.copy(), [], None
-    for _ in range(round(SECONDS / TS)):
+    for _ in range(round(seconds / TS)):
         q = data.qpos.copy()
         rate, last = (rate + CUTOFF * (q - last)) / (1.0 + CUTOFF * TS), q
         static.qpos[:] = q

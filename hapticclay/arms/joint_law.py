@@ -48,8 +48,7 @@ class JointPD:
             raise ParameterError("Kp", self.Kp, "must have a number for each joint")
         if len(self.Kd) != n:
             raise ParameterError("Kd", self.Kd, f"must have a number for each joint, as Kp ({n})")
-        rows = self.friction or ((0.0, 0.0, 0.0),) * n
-        if len(rows) != n or len(rows[0]) != len(FRICTION):
+        if len(self._frictions) != n or len(self._frictions[0]) != len(FRICTION):
             bound = f"must have ({', '.join(FRICTION)}) for each of {n} joints"
             raise ParameterError("friction", self.friction, bound)
         if (self.velocity == "filter") is not (self.cutoff is not None):
@@ -62,8 +61,11 @@ class JointPD:
     @property
     def slopes(self) -> tuple[float, ...]:
         """Slope of the friction fed forward at rest, Fc k + Fv, of each joint [N.m.s/rad]."""
-        rows = self.friction or ((0.0, 0.0, 0.0),) * len(self)
-        return tuple(Fc * k + Fv for Fc, k, Fv in rows)
+        return tuple(Fc * k + Fv for Fc, k, Fv in self._frictions)
+
+    @property
+    def _frictions(self) -> tuple[tuple[float, ...], ...]:
+        return self.friction or ((0.0, 0.0, 0.0),) * len(self)
 
     @classmethod
     @checked

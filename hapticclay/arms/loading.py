@@ -15,7 +15,6 @@ from ..errors import ParameterError, choice, is_series, nearest, number
 from .mechanism import Mechanism
 
 LIGHTEST = 1e-12  # [kg.m^2] least eigenvalue of M of a mechanism with an inverse
-TIED = 1e-6  # [rad or m] chains of a file that are open by more are closed, and it is noted
 BOUNDS = {  # least and largest value, units at a hinge and at a slide
     "pose": (-1e3, 1e3, "rad", "m"),
     "armature": (0.0, 1e3, "kg.m^2", "kg"),
@@ -37,7 +36,6 @@ class Loaded(NamedTuple):
         name: name of the model.
         mechanism: joints, inertia, Jacobian.
         fields: fields of the arm, as resolved.
-        torque_limits: largest torque of each joint [N.m], shape (n,).
         ranges: range of each joint [rad or m], shape (n, 2).
         notes: what the file leaves open.
     """
@@ -45,7 +43,6 @@ class Loaded(NamedTuple):
     name: str
     mechanism: Mechanism
     fields: dict[str, Any]
-    torque_limits: np.ndarray
     ranges: np.ndarray
     notes: tuple[str, ...]
 
@@ -76,7 +73,6 @@ def load(arm: Any) -> Loaded:
         name,
         mechanism,
         fields,
-        _torque_limits(model, joints),
         _ranges(model, joints),
         tuple(_notes(model, arm, mechanism, joints)),
     )
@@ -86,15 +82,16 @@ def load(arm: Any) -> Loaded:
 
 
 def compiled(file: Any) -> tuple[Any, str]:
-    """The model of a file or spec, with scalar joints alone, and its name."""
+    """The model of a file or spec, and its name."""
     from ..physics import mujoco, warnings_caught
 
+    path = None if isinstance(file, mujoco.MjSpec) else _path(file)
     with warnings_caught() as caught:
         try:
-            spec = file.copy() if isinstance(file, mujoco.MjSpec) else _spec(file)
+            spec = file.copy() if path is None else mujoco.MjSpec.from_file(str(path))
+            if path is not None:
+                spec.compiler.fusestatic = False  # a URDF's tool keeps its name
             model = spec.compile()
-        except ParameterError:
-            raise
         except ValueError as error:
             raise _bad_file(file, one_line(error, 200)) from None
     if caught:
@@ -105,8 +102,9 @@ def compiled(file: Any) -> tuple[Any, str]:
     return model, spec.modelname
 
 
-def _spec(file: Any) -> Any:
-    from ..physics import mjcf_folder, mujoco
+def _path(file: Any) -> Path:
+    """The path of a file, or of an arm of the package by its name."""
+    from ..physics import mjcf_folder
 
     if not isinstance(file, str | os.PathLike):
         raise ParameterError("file", file, "must be an MJCF or URDF file, or an mujoco.MjSpec")
@@ -116,9 +114,7 @@ def _spec(file: Any) -> Any:
         path = own[choice("file", file, tuple(own))]
     if not os.path.isfile(path):
         raise ParameterError("file", str(path), "must be an MJCF or URDF file (there is none)")
-    spec = mujoco.MjSpec.from_file(str(path))
-    spec.compiler.fusestatic = False  # a URDF's tool keeps its name
-    return spec
+    return path
 
 
 def _bad_file(file: Any, why: str) -> ParameterError:
@@ -156,8 +152,8 @@ def _refuse_tendons(model: Any) -> None:
 
 
 def _name(model: Any, site: tuple[str, int]) -> str:
-    kind, number_ = site
-    return (model.site if kind == "site" else model.body)(number_).name
+    kind, index = site
+    return (model.site if kind == "site" else model.body)(index).name
 
 
 def _handle(model: Any, wanted: str | None) -> tuple[str, int] | None:
@@ -205,8 +201,8 @@ def _chain(model: Any, site: tuple[str, int] | None) -> list[int]:
     """Joints between the handle and the world, from the base on; all without a handle."""
     if site is None:
         return list(range(model.njnt))
-    kind, number_ = site
-    body, out = int(model.site_bodyid[number_]) if kind == "site" else number_, []
+    kind, index = site
+    body, out = int(model.site_bodyid[index]) if kind == "site" else index, []
     while body:
         first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
         out = [*range(first, first + count), *out]
@@ -274,15 +270,6 @@ def _pose(model: Any, given: Any, joints: list[int]) -> np.ndarray:
     return start
 
 
-def _torque_limits(model: Any, joints: list[int]) -> np.ndarray:
-    """Largest torque of each joint: its own limit, or that of its actuator."""
-    out = np.full(len(joints), math.inf)
-    for i, j in enumerate(joints):
-        if model.jnt_actfrclimited[j]:
-            out[i] = np.abs(model.jnt_actfrcrange[j]).min()
-    return out
-
-
 def _ranges(model: Any, joints: list[int]) -> np.ndarray:
     free = np.array([-math.inf, math.inf])
     return np.array([model.jnt_range[j] if model.jnt_limited[j] else free for j in joints])
@@ -299,7 +286,7 @@ def _check_mechanism(mechanism: Mechanism, names: Sequence[str]) -> None:
     if free := mechanism.freedom():
         bound = f"must move all that its constraints hold: {free} more joints are free"
         raise ParameterError("joints", list(names), bound)
-    inertia = mechanism.linear(mechanism.pose[mechanism.dofs]).inertia
+    inertia = mechanism.inertia(mechanism.pose[mechanism.dofs])
     if not np.linalg.eigvalsh(inertia).min() > LIGHTEST:
         light = names[int(np.diag(inertia).argmin())]
         bound = (

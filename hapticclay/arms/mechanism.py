@@ -56,13 +56,11 @@ class Mechanism:
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
         self._data = mujoco.MjData(model)
         self.dofs = list(dofs)
-        self._start = self.pose = np.array(pose, float)
-        self.following: list[int] = []
-        self._place(self._start)
+        self._place(pose)
         rows = self._constraints()[0]
         moved = [i for i in range(model.nv) if np.any(rows[:, i])] if len(rows) else []
         self.following = [i for i in moved if i not in self.dofs]
-        self.pose = self._closed(self._start)
+        self.pose = self._closed(pose)
 
     # ---- one pose
 
@@ -72,34 +70,28 @@ class Mechanism:
         Raises:
             ParameterError: constraints cannot be satisfied there.
         """
-        place, model = self._at(q), self._model
-        follow = self._follow()
-        inertia = np.zeros((model.nv, model.nv))
-        self._mujoco.mj_fullM(model, self._data, inertia)
-        damping = follow.T @ (model.dof_damping[:, None] * follow)
+        inertia, follow = self.inertia(q), self._follow()
+        damping = follow.T @ (self._model.dof_damping[:, None] * follow)
         jacobian = self._jacobian() @ follow
         springs, gravity, weight = self._stiffness(q)
-        self._place(place)
-        whole = follow.T @ inertia @ follow
-        return Linear(whole, damping, springs, gravity, weight, jacobian)
+        return Linear(inertia, damping, springs, gravity, weight, jacobian)
 
-    def static_torque(self, q: np.ndarray) -> np.ndarray:
-        """Torque that holds the arm against gravity [N.m], shape (n,)."""
+    def inertia(self, q: np.ndarray) -> np.ndarray:
+        """M, rotors included [kg.m^2 or kg], shape (n, n).
+
+        Raises:
+            ParameterError: constraints cannot be satisfied there.
+        """
         self._at(q)
-        return self._static()[1]
+        whole, follow = np.zeros((self._model.nv,) * 2), self._follow()
+        self._mujoco.mj_fullM(self._model, self._data, whole)
+        return follow.T @ whole @ follow
 
     def handle(self, q: np.ndarray) -> np.ndarray:
         """Position of the handle in the frame of the world [m], shape (3,)."""
         self._at(q)
         kind, number = self._site or ("body", 0)
         return np.array(getattr(self._data, "site_xpos" if kind == "site" else "xpos")[number])
-
-    def misfit(self, q: np.ndarray) -> float:
-        """How far constraints are from closed at the start for this pose, largest [rad or m]."""
-        place = self._start.copy()
-        place[self.dofs] = q
-        self._place(place)
-        return float(np.abs(self._constraints()[1]).max(initial=0.0))
 
     # ---- the engine's terms
 
@@ -108,11 +100,11 @@ class Mechanism:
         self._mujoco.mj_fwdPosition(self._model, self._data)
         self._mujoco.mj_fwdVelocity(self._model, self._data)
 
-    def _at(self, q: np.ndarray) -> np.ndarray:
-        """Places the arm, its followers where constraints hold; returns all positions."""
+    def _at(self, q: np.ndarray) -> None:
+        """Places the arm, its followers where constraints hold."""
         position = self.pose.copy()
         position[self.dofs] = q
-        return self._closed(position)
+        self._closed(position)
 
     def _constraints(self) -> tuple[np.ndarray, np.ndarray]:
         """Rows of the equality constraints, shape (m, nv), and how far each is from closed."""

@@ -82,11 +82,6 @@ class MjcfArm:
         return np.array([self.pose[name] for name in self.names])  # type: ignore[index]
 
     @property
-    def torque_limits(self) -> np.ndarray:
-        """Largest torque of each joint [N.m], inf for none, shape (n,)."""
-        return self._loaded.torque_limits.copy()  # type: ignore[attr-defined]
-
-    @property
     def ranges(self) -> np.ndarray:
         """Least and largest position of each joint [rad or m], infinite for none, shape (n, 2)."""
         return self._loaded.ranges.copy()  # type: ignore[attr-defined]
@@ -111,7 +106,7 @@ class MjcfArm:
         Raises:
             ParameterError: as `linear`.
         """
-        return self.linear(q).inertia
+        return self._loaded.mechanism.inertia(self._place(q))  # type: ignore[attr-defined]
 
     def gravity_stiffness(self, q: Sequence[float] | np.ndarray | None = None) -> np.ndarray:
         """Change of the gravity torques with the joint positions [N.m/rad], shape (n, n).

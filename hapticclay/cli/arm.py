@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from ..errors import Bound, ParameterError
+from ..fields import value_of_text
 from ..files import writable
 from . import console, walls
 from .options import Loose
+from .unused import Unused
 
 if TYPE_CHECKING:
     from ..arms.joint_law import JointPD
@@ -74,6 +76,12 @@ class ArmCommand:
     out: Path | None = None
     figures: console.FigureOptions = console.FigureOptions()
 
+    unused: ClassVar[tuple[Unused, ...]] = (
+        Unused(("rate",), "is 1/Ts: give --Ts or --rate", ("Ts",)),
+        Unused(("Kp", "Kd"), "is in the file of --gains: give one of the two", ("gains",)),
+        Unused(("poses",), "needs gains: give --gains, or --Kp and --Kd", (), ("gains", "Kp")),
+    )
+
     def __call__(self) -> int:
         arm = self._arm()
         out = self.out or console.default_folder("arm", arm)
@@ -94,8 +102,6 @@ class ArmCommand:
                 yield joint_poses.over_poses(arm, law, *timing, self.poses, self.seed)
         elif not self.wall:
             raise ParameterError("gains", None, "must be given, or --Kp and --Kd, or --wall")
-        elif self.poses:
-            raise ParameterError("poses", self.poses, "needs gains: give --gains, or --Kp and --Kd")
         if self.wall:
             hand = walls.operator_of(self.hand)
             velocity = "difference" if self.velocity == "difference" else "exact"
@@ -104,8 +110,6 @@ class ArmCommand:
 
     @property
     def _Ts(self) -> float:
-        if self.Ts is not None and self.rate is not None:
-            raise ParameterError("rate", self.rate, "is 1/Ts: give --Ts or --rate")
         return self.Ts if self.Ts is not None else 1.0 / (self.rate or 1000.0)
 
     def _arm(self) -> MjcfArm:
@@ -128,8 +132,6 @@ class ArmCommand:
             for name in ("velocity", "cutoff", "runs")
             if getattr(self, name) is not None
         }
-        if self.gains and (self.Kp or self.Kd):
-            raise ParameterError("gains", str(self.gains), "is a file of Kp and Kd: give one")
         if self.gains:
             return JointPD.load(self.gains, **given)
         return JointPD(self.Kp, self.Kd, **given)
@@ -137,18 +139,9 @@ class ArmCommand:
 
 def _per_joint(name: str, words: Sequence[str]) -> Any:
     """Values in order, or by the name of the joint, NAME=VALUE; None for none."""
-    if not words:
-        return None
-    pairs = [word.partition("=") for word in words]
-    named = [bool(equals) for _, equals, _ in pairs]
-    if any(named) and not all(named):
-        raise ParameterError(name, " ".join(words), "must be numbers, or NAME=NUMBER, not both")
-    values = [_number(value if equals else word) for word, equals, value in pairs]
-    return dict(zip([p[0] for p in pairs], values, strict=True)) if all(named) else values
+    from ..scene.changes import split_words
 
-
-def _number(text: str) -> float | str:
-    try:
-        return float(text)
-    except ValueError:
-        return text
+    if not any("=" in word for word in words):
+        return [value_of_text(word) for word in words] or None
+    pairs = split_words(name, words, "must be numbers, or NAME=NUMBER, each once, not both")
+    return {joint: value_of_text(text) for joint, text in pairs.items()}

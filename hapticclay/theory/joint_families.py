@@ -35,6 +35,10 @@ class Limit(NamedTuple):
     free_low: float
     theta: float
 
+    def frequency(self, Ts: float) -> float:
+        """Frequency of that eigenvalue at a control sample [Hz]."""
+        return self.theta / (2.0 * math.pi * Ts)
+
 
 NONE = Limit(math.nan, math.nan, math.nan, math.nan)
 

@@ -17,7 +17,7 @@ from ..results import Result, Tables
 from . import joint_crossings, roots
 from .client_loop import Delay, Sample
 from .joint_families import Circle, Family, Limit
-from .joint_loop import JointLoop, grid
+from .joint_loop import JointLoop, grid, timing_words
 
 LATEST = 2.0  # [s] largest added delay that is looked for
 SLOWEST = 1.0  # [s] largest control sample that is looked for
@@ -108,7 +108,7 @@ class JointLimits(Result):
 
     def headline(self) -> str:
         """The verdict in one line."""
-        at = f"{1.0 / self.Ts:.4g} Hz, {1e3 * self.delay:.3g} ms late"
+        at = timing_words(self.Ts, self.delay)
         if not self.stable:
             told = (
                 f"unstable at {at}: radius {self.radius:.4g}, {self.frequency:.4g} Hz, {self.joint}"
@@ -247,25 +247,21 @@ def joint_limits(arm: MjcfArm, law: JointPD, Ts: Sample, delay: Delay = 0.0) -> 
         frequency,
         arm.names[first_joint(all_Kp, scale)],
         scale.high,
-        _frequency(scale, loop),
+        scale.frequency(loop.Ts),
         _ends(of_Kp),
-        np.array([_frequency(x, loop) for x in of_Kp]),
+        np.array([x.frequency(loop.Ts) for x in of_Kp]),
         _ends(of_Kd),
         (of_all_Kd.low, of_all_Kd.high),
         delay_left(loop),
         slowest_rate(study),
         slopes,
-        *study.changes(list(zip(Kp, of_Kp, strict=True)), (all_Kp, scale)),
+        *study.changes([*map(Edge, Kp, of_Kp)], Edge(all_Kp, scale)),
         study.assumed(),
     )
 
 
 def _ends(limits: Sequence[Limit]) -> np.ndarray:
     return np.array([[x.low, x.high] for x in limits])
-
-
-def _frequency(limit: Limit, loop: JointLoop) -> float:
-    return limit.theta / (2.0 * math.pi * loop.Ts)
 
 
 class Study:
@@ -308,22 +304,20 @@ class Study:
         of, held = ("position", "rate")[i], self.law.runs == "host"
         return Family(self.circle, of, left, right, present, changed, held)  # type: ignore[arg-type]
 
-    def changes(
-        self, Kp: Sequence[tuple[Family, Limit]], common: tuple[Family, Limit]
-    ) -> tuple[np.ndarray, np.ndarray, float]:
+    def changes(self, of_Kp: Sequence[Edge], common: Edge) -> tuple[np.ndarray, np.ndarray, float]:
         """How the largest Kp and the factor change with rotor inertia, damping and delay."""
         n = len(self.law)
         of_joint, of_all = np.full((n, 3), math.nan), np.full((n, 2), math.nan)
         step = STEP * self.Ts
         late = [self.remade(delay=self.delay + i * step) for i in (0, 1, 2)]
-        for j, one in enumerate(Kp):
+        for j, edge in enumerate(of_Kp):
             for k, name in enumerate(("inertia", "damping")):
                 size = STEP * max(getattr(self.linear, name)[j, j], LEAST)
                 sides = [self._nudged(name, j, sign * size) for sign in (1.0, -1.0)]
-                of_joint[j, k] = limit_slope(*one, sides, 2.0 * size)
-                of_all[j, k] = limit_slope(*common, sides, 2.0 * size)
-            of_joint[j, 2] = limit_slope(*one, late, step)
-        return of_joint, of_all, limit_slope(*common, late, step)
+                of_joint[j, k] = edge.slope(sides, 2.0 * size)
+                of_all[j, k] = common.slope(sides, 2.0 * size)
+            of_joint[j, 2] = edge.slope(late, step)
+        return of_joint, of_all, common.slope(late, step)
 
     def _nudged(self, name: str, j: int, by: float) -> JointLoop:
         matrix = getattr(self.linear, name).copy()
@@ -336,33 +330,40 @@ class Study:
         return (*self.arm.notes, f"gravity: {gravity}", IGNORED)
 
 
-def limit_slope(family: Family, limit: Limit, loops: Sequence[JointLoop], step: float) -> float:
-    """Change of the upper limit of a held gain per change of a number a of the loop.
+class Edge:
+    """The upper limit of a held gain, and how it moves with a number a of the loop.
 
     At the limit an eigenvalue x = -1/u of the response is real. A change of a moves theta so that
     it stays real: dx/da = Re x_a - Re x_theta Im x_a/Im x_theta, and du/da = dx/da / x^2.
-
-    Args:
-        family: loops of the gain.
-        limit: its limits.
-        loops: loops at a + step/2 and a - step/2, or at a, a + step and a + 2 step.
-        step: step of a.
     """
-    theta, pi = limit.theta, math.pi
-    if not family.held or not 0.0 < theta <= pi:
-        return math.nan
-    here, u = np.array([theta]), limit.high - family.present
-    x = _eigenvalue(family.response(here)[0], -1.0 / u)
-    found = [_eigenvalue(family.response(here, loop)[0], x) for loop in loops]
-    weights = (1.0, -1.0) if len(found) == 2 else (-1.5, 2.0, -0.5)
-    by = sum(w * y for w, y in zip(weights, found, strict=True)) / step
-    turn = min(1e-6 * theta, 0.5 * (pi - theta))
-    if turn:
-        around = family.response(np.array([theta + turn, theta - turn]))
-        right, left = (_eigenvalue(matrix, x) for matrix in around)
-        along = (right - left) / (2.0 * turn)
-        by = by.real - along.real * by.imag / along.imag
-    return float(np.real(by) / x.real**2)
+
+    def __init__(self, family: Family, limit: Limit):
+        theta, pi = limit.theta, math.pi
+        self._family, self._at = family, np.array([theta])
+        self.known = family.held and 0.0 < theta <= pi
+        self._along: complex | None = None  # x_theta; None at z = -1, where all stays real
+        if not self.known:
+            return
+        near = -1.0 / (limit.high - family.present)
+        self._x = _eigenvalue(family.response(self._at)[0], near)
+        if turn := min(1e-6 * theta, 0.5 * (pi - theta)):
+            around = family.response(np.array([theta + turn, theta - turn]))
+            right, left = (_eigenvalue(matrix, self._x) for matrix in around)
+            self._along = (right - left) / (2.0 * turn)
+
+    def slope(self, loops: Sequence[JointLoop], step: float) -> float:
+        """Change of the limit per a; NaN for a limit that is not on the circle.
+
+        The loops are those at a + step/2 and a - step/2, or at a, a + step and a + 2 step.
+        """
+        if not self.known:
+            return math.nan
+        weights = (1.0, -1.0) if len(loops) == 2 else (-1.5, 2.0, -0.5)
+        found = [_eigenvalue(self._family.response(self._at, x)[0], self._x) for x in loops]
+        by = sum(w * y for w, y in zip(weights, found, strict=True)) / step
+        if self._along is not None:
+            by = by.real - self._along.real * by.imag / self._along.imag
+        return float(np.real(by) / self._x.real**2)
 
 
 def _eigenvalue(matrix: np.ndarray, near: complex) -> complex:
@@ -376,11 +377,11 @@ def _eigenvalue(matrix: np.ndarray, near: complex) -> complex:
 def worst_motion(loop: JointLoop) -> tuple[float, float, int]:
     """Size of the largest eigenvalue, its frequency [Hz], and the joint that moves most in it."""
     values, vectors = np.linalg.eig(loop.map())
-    size = np.abs(loop.eigenvalues()[0])
+    size = loop.radius()
     i = int(np.argmin(np.abs(np.abs(values) - size)))
     frequency = abs(np.angle(values[i])) / (2.0 * math.pi * loop.Ts)
     energy = np.abs(vectors[: loop.n, i]) * np.sqrt(np.diag(loop.inertia))
-    return float(size), float(frequency), int(energy.argmax())
+    return size, float(frequency), int(energy.argmax())
 
 
 def first_joint(family: Family, limit: Limit) -> int:

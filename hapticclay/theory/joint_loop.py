@@ -126,6 +126,7 @@ class JointLoop:
         scale = max(np.abs(self.stiffness).max(), np.abs(self.position).max())
         return int(np.sum(size <= FREE * scale)) if scale else self.n
 
+    @cached_property
     def eigenvalues(self) -> np.ndarray:
         """Eigenvalues of the map, largest first, without those of rest anywhere (z = 1)."""
         z = np.linalg.eigvals(self.map())
@@ -138,7 +139,7 @@ class JointLoop:
 
     def radius(self) -> float:
         """Largest size of an eigenvalue: below 1 the loop is stable."""
-        return float(np.abs(self.eigenvalues()).max(initial=0.0))
+        return float(np.abs(self.eigenvalues).max(initial=0.0))
 
     def stable(self) -> bool:
         """Whether all motion but rest decays."""
@@ -178,6 +179,11 @@ class JointLoop:
     def feeding(self, position: np.ndarray, rate: np.ndarray) -> JointLoop:
         """The loop with more feedback in the held torque, shapes (n, n)."""
         return replace(self, position=self.position + position, rate=self.rate + rate)
+
+
+def timing_words(Ts: float, delay: float) -> str:
+    """Rate and delay, as headlines say them."""
+    return f"{1.0 / Ts:.4g} Hz, {1e3 * delay:.3g} ms late"
 
 
 def grid(loop: JointLoop) -> np.ndarray:

@@ -15,6 +15,7 @@ from ..errors import Bound, ParameterError
 from ..results import Result, Tables
 from .client_loop import Delay, Sample
 from .joint_gains import Study, first_joint
+from .joint_loop import timing_words
 
 TRIES = 100  # poses drawn for each one wanted, where a chain cannot be closed at most
 
@@ -69,7 +70,7 @@ class OverPoses(Result):
 
     def headline(self) -> str:
         """The verdict in one line."""
-        at = f"{len(self.q)} poses at {1.0 / self.Ts:.4g} Hz, {1e3 * self.delay:.3g} ms late"
+        at = f"{len(self.q)} poses at {timing_words(self.Ts, self.delay)}"
         unstable = int(np.sum(self.radius >= 1.0))
         if unstable:
             return f"{at}: unstable at {unstable}; worst radius {self.radius.max():.4g}"
@@ -142,5 +143,5 @@ def _at_pose(study: Study) -> tuple[float, float, float, int]:
     """Radius, largest factor of all Kp, frequency there, and the joint that buzzes first."""
     family = study.family("Kp")
     limit = family.limit()
-    buzz = limit.theta / (2.0 * math.pi * study.Ts)
+    buzz = limit.frequency(study.Ts)
     return study.loop.radius(), limit.high, buzz, first_joint(family, limit)

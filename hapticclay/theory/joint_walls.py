@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from ..arguments import checked, named
+from ..arms.joint_law import JointPD
 from ..arms.mechanism import Linear
 from ..arms.mjcf_arm import MjcfArm
 from ..errors import Bound, ParameterError
@@ -17,8 +18,8 @@ from ..model.operator import NO_HAND, Operator
 from ..results import Result, Tables
 from .client_loop import Delay, Sample
 from .joint_families import Circle, Family, Limit
-from .joint_gains import IGNORED
-from .joint_loop import JointLoop
+from .joint_gains import IGNORED, joint_loop
+from .joint_loop import JointLoop, timing_words
 
 AXES = ("x", "y", "z")
 LINE = 40  # dampings of the line of limits
@@ -67,7 +68,7 @@ class WallLimit(Result):
 
     def headline(self) -> str:
         """The limit in one line."""
-        at = f"{1.0 / self.Ts:.4g} Hz, {1e3 * self.delay:.3g} ms late"
+        at = timing_words(self.Ts, self.delay)
         least = f"{self.low:.4g} to " if self.low > 0.0 else "up to "
         return (
             f"wall along {self.axis} at {at}, B = {self.B:g} N.s/m: {least}{self.K:.4g} N/m "
@@ -137,18 +138,9 @@ def wall_limit(
     along = linear.jacobian[AXES.index(axis)]
     if not np.abs(along).max() > STILL:
         raise ParameterError("axis", axis, "must be one along which the handle can move")
-    forward = linear.gravity_stiffness * float(arm.gravity == "compensated")
-    still = np.zeros_like(linear.inertia)
-    loop = JointLoop(
-        linear.inertia,
-        linear.damping,
-        linear.stiffness + linear.gravity_stiffness,
-        -forward,
-        still,
-        Ts,
-        delay,
-        velocity,
-    )
+    none = (0.0,) * len(arm.names)
+    law = JointPD(none, none, velocity=velocity)
+    loop = joint_loop(linear, law, Ts, delay, arm.gravity == "compensated")
     mass = float(1.0 / (along @ np.linalg.solve(linear.inertia, along)))
     limit = _limit(loop, along, B)
     line_B = np.linspace(0.0, max(MOST_B * mass / (Ts + delay), 1.2 * B), LINE)
@@ -157,7 +149,7 @@ def wall_limit(
         axis,
         limit.high,
         limit.low,
-        limit.theta / (2.0 * math.pi * Ts),
+        limit.frequency(Ts),
         mass,
         B,
         Ts,

@@ -4,13 +4,13 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hapticclay as hc
+from benchmarks import arm_integrators
 from hapticclay.arms.mechanism import Linear
 from hapticclay.theory.joint_families import Circle, Family
 from hapticclay.theory.joint_gains import Study, delay_left, joint_loop
@@ -113,41 +113,16 @@ def test_one_joint_is_the_wall_on_a_bare_device(B, delay):
     assert limit.low == pytest.approx(low, abs=1e-6)
 
 
-def grows(arm, law, Ts, seconds):
-    """Whether a run of the engine leaves its pose: RK4, torques a sample late, gravity held."""
-    model = mujoco.MjModel.from_xml_path(str(arm.file))
-    model.dof_frictionloss[:], model.jnt_limited[:] = 0.0, 0
-    model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, 0.5 * Ts
-    data, static = mujoco.MjData(model), mujoco.MjData(model)
-    data.qpos[:] = arm.q + 1e-7 * np.random.default_rng(0).normal(size=model.nv)
-    rate, last, sizes, late = np.zeros(model.nv), data.qpos.copy(), [], None
-    for _ in range(round(seconds / Ts)):
-        q = data.qpos.copy()
-        rate, last = (rate + law.cutoff * (q - last)) / (1.0 + law.cutoff * Ts), q
-        static.qpos[:] = q
-        mujoco.mj_fwdPosition(model, static)
-        mujoco.mj_fwdVelocity(model, static)
-        torque = static.qfrc_bias - np.array(law.Kp) * (q - arm.q) - np.array(law.Kd) * rate
-        data.qfrc_applied[:] = torque if late is None else late
-        mujoco.mj_step(model, data, 2)
-        late = torque
-        sizes.append(np.abs(data.qpos - arm.q).max())
-        if not sizes[-1] < 1e-2:
-            return True
-    last_quarter = len(sizes) // 4
-    return max(sizes[-last_quarter:]) > max(sizes[-2 * last_quarter : -last_quarter])
-
-
 @pytest.mark.parametrize("joint", [0, 2, 4, 6])
 def test_the_engine_flips_at_the_limit(joint):
     """Half a percent on each side of the largest Kp of a joint, seven joints coupled."""
-    arm, Ts = leader(), 2e-3
+    arm, Ts = leader(), arm_integrators.TS
     high = hc.theory.joint_limits(arm, LEADER_LAW, Ts, Ts).Kp[joint, 1]
     verdicts = []
     for share in (0.995, 1.005):
-        Kp = list(LEADER_KP)
+        Kp = np.array(LEADER_KP)
         Kp[joint] = share * high
-        verdicts.append(grows(arm, replace(LEADER_LAW, Kp=tuple(Kp)), Ts, 3.0))
+        verdicts.append(arm_integrators.grows(arm, Kp, "mjINT_RK4", 2, True, 3.0))
     assert verdicts == [False, True]
 
 
