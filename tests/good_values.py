@@ -40,7 +40,9 @@ def good_values(folder):
     smooth = {"x": (0.0, 0.1), "y": (0.0, 0.1), "values": ((1.0, 1.0), (1.0, 1.0))}
     arm = hc.MjcfArm(ARM)
     of_joints = {"arm": arm, "law": hc.JointPD((100.0, 50.0), (1.0, 0.5))}
+    rubbed = hc.JointPD((100.0, 50.0), (1.0, 0.5), friction=((1.0, 9.0, 0.1), (0.2, 9.0, 0.0)))
     by_function = {
+        "friction_cycle": {"arm": arm, "law": rubbed},
         "joint_limits": of_joints, "over_poses": of_joints,
         "wall_limit": {"arm": arm, "B": 1.0, "operator": hc.Operator()},
         "MjcfArm": {"file": ARM}, "JointPD": {"Kp": (1.0,), "Kd": (1.0,)},

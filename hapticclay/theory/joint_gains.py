@@ -55,6 +55,7 @@ class JointLimits(Result):
         Kd_scale: least and largest factor of all Kd.
         delay_left: delay that may be added [s]; 0 if the loop is unstable; inf for more than 2 s.
         slowest_rate: lowest rate up to the present one down to which the loop is stable [Hz].
+        slope: present slope of the friction fed forward at rest [N.m.s/rad], shape (n,).
         friction_slope: largest slope of a friction fed forward at rest, Fc k + Fv, of each joint
             [N.m.s/rad], shape (n,).
         Kp_change: change of the largest Kp of each joint with its rotor inertia
@@ -95,6 +96,7 @@ class JointLimits(Result):
     Kd_scale: tuple[float, float]
     delay_left: float
     slowest_rate: float
+    slope: np.ndarray
     friction_slope: np.ndarray
     Kp_change: np.ndarray
     scale_change: np.ndarray
@@ -135,6 +137,10 @@ class JointLimits(Result):
         """The change that gains most, or that brings an unstable loop back."""
         j = self.names.index(self.joint)
         if not self.stable:
+            slope, most = self.slope[j], self.friction_slope[j]
+            if slope > 0.0 and not slope < most:
+                limit = "" if math.isnan(most) else f", at most {most:.4g}"
+                return f"friction fed forward at {self.joint}: slope {slope:.4g} N.m.s/rad{limit}"
             low, high = self.Kp[j]
             if high > low and high < self.stiffness[j]:
                 return f"Kp of {self.joint}, {self.stiffness[j]:.4g} to {high:.4g} N.m/rad or less"
@@ -160,7 +166,8 @@ class JointLimits(Result):
             "Kd [N.m.s/rad]": self.damping,
             "least Kd [N.m.s/rad]": self.Kd[:, 0],
             "largest Kd [N.m.s/rad]": self.Kd[:, 1],
-            "friction slope [N.m.s/rad]": self.friction_slope,
+            "friction slope [N.m.s/rad]": self.slope,
+            "largest friction slope [N.m.s/rad]": self.friction_slope,
         }
         moves: dict[str, Any] = {
             "joint": self.names,
@@ -236,7 +243,8 @@ def joint_limits(arm: MjcfArm, law: JointPD, Ts: Sample, delay: Delay = 0.0) -> 
     of_Kp, scale = [x.limit() for x in Kp], all_Kp.limit()
     of_Kd, of_all_Kd = [study.family("Kd", j).limit() for j in joints], study.family("Kd").limit()
     radius, frequency, _ = worst_motion(loop)
-    slopes = np.array(law.slopes) + np.array(law.Kd) - np.array([x.free_low for x in of_Kd])
+    slope = np.array(law.slopes)
+    largest_slope = slope + np.array(law.Kd) - np.array([x.free_low for x in of_Kd])
     return JointLimits(
         arm.names,
         np.array(law.Kp),
@@ -254,7 +262,8 @@ def joint_limits(arm: MjcfArm, law: JointPD, Ts: Sample, delay: Delay = 0.0) -> 
         (of_all_Kd.low, of_all_Kd.high),
         delay_left(loop),
         slowest_rate(study),
-        slopes,
+        slope,
+        largest_slope,
         *study.changes([*map(Edge, Kp, of_Kp)], Edge(all_Kp, scale)),
         study.assumed(),
     )
