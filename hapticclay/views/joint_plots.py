@@ -9,11 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ..theory.fed_friction import FrictionCycle
 from ..theory.joint_gains import JointLimits
 from ..theory.joint_poses import OverPoses
 from ..theory.joint_walls import WallLimit
 from .palette import BLACK, BLUE, VERMILION
-from .panels import label_axes, set_title, single
+from .panels import curve_look, hollow, label_axes, level, set_title, single
 from .style import figure_size, figure_style, points, stroke
 
 DECADES = 1.0  # that an axis shows beyond the gains, where one has no limit
@@ -62,6 +63,29 @@ def wall_plot(found: WallLimit) -> Figure:
     ax.set_ylim(0.0)
     label_axes(ax, "wall damping B [N.s/m]", "largest stable K [N/m]")
     set_title(ax, f"walls along {found.axis} at the handle", "the dot is the wall asked for")
+    return figure
+
+
+@figure_style()
+def friction_plot(found: FrictionCycle) -> Figure:
+    """Plots how motion of each joint grows or decays over its largest rate; cycles are dots."""
+    figure, ax = single(3.2)
+    growth = found.line_growth
+    known = growth[np.isfinite(growth)]
+    most = known.max(initial=0.0) or np.abs(known).max(initial=1.0)
+    for j, name in enumerate(found.names):
+        if np.isfinite(growth[j]).any():
+            ax.plot(found.line_rate[j], growth[j], **curve_look(j), label=name)
+    rates = 2.0 * math.pi * found.first_frequency * found.first_amplitude
+    for kind, rate in zip(found.kind, rates, strict=True):
+        face = {"mfc": BLACK} if kind == "limit cycle" else {}
+        ax.plot(rate, 0.0, **(hollow(BLACK, size=5.0) | face))
+    level(ax)
+    ax.set(xscale="log", ylim=(-1.5 * most, 1.2 * most))
+    label_axes(ax, "largest rate of the joint [rad/s]", "growth [1/s]")
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend()
+    set_title(ax, "motion under friction fed forward", "full dots: limit cycles; open: thresholds")
     return figure
 
 

@@ -24,6 +24,21 @@ def test_limits_wall_and_poses(tmp_path, capsys):
     assert found["tables"]["joints"]["joint"] == ["shoulder", "elbow"]
 
 
+def test_friction_fed_forward(tmp_path, capsys):
+    gains = tmp_path / "gains.toml"
+    rows = "[[4, 50, 0.1], [1.5, 50, 0.1]]"
+    gains.write_text(f"Kp = [100, 50]\nKd = [1, 0.5]\nvelocity = 'difference'\nfriction = {rows}\n")
+    out = tmp_path / "out"
+    assert main(["arm", TWO, "--gains", str(gains), "--out", str(out)]) == 0
+    assert "limit cycle of" in capsys.readouterr().out
+    found = json.loads((out / "friction.json").read_text())
+    assert "limit cycle" in found["tables"]["cycles"]["kind"]
+    assert (out / "friction.png").exists()
+    few = ["--counts", "100", "--out", str(tmp_path / "few")]
+    assert main(["arm", TWO, "--gains", str(gains), *few]) == 0
+    assert "100 counts a turn: no limit cycle" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     "words, told",
     [
@@ -36,6 +51,10 @@ def test_limits_wall_and_poses(tmp_path, capsys):
         ([TWO, *GAINS, "--rate", "500", "--Ts", "1ms"], "give --Ts or --rate"),
         ([TWO, *GAINS, "--wall", "z"], "along which the handle can move"),
         ([TWO, "--wall", "x", "--poses", "3"], "needs gains"),
+        ([TWO, *GAINS, "--B", "2"], "give --wall"),
+        ([TWO, *GAINS, "--hand", "0.2", "1", "3"], "give --wall"),
+        ([TWO, *GAINS, "--seed", "2"], "--poses"),
+        ([TWO, *GAINS, "--counts", "4096"], "file of --gains"),
         ([TWO, *GAINS, "--velocity", "filter"], "velocity 'filter'"),
         ([TWO, *GAINS, "--dely", "1ms"], "did you mean --delay"),
         ([TWO, *GAINS, "--delay", "1mm"], "s"),
