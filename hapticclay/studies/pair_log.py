@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..columns import Sheet, unreadable
+from ..columns.log import open_log
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
 from ..files import MOST_TABLE, read_bytes
@@ -112,7 +112,8 @@ class PairLog:
         try:
             table = _scope(file) if file.suffix.lower() == ".mat" else _sheet(file, columns or {})
         except OSError as error:
-            raise unreadable("path", file, error) from None
+            bound = f"must be a readable file ({error.strerror})"
+            raise ParameterError("path", str(path), bound) from None
         return cls(**_chosen(file, table, columns or {}), name=file.stem)
 
 
@@ -160,15 +161,15 @@ def _plain(name: str) -> str:
 
 def _sheet(file: Path, columns: Mapping[str, str]) -> dict[str, np.ndarray]:
     """The columns of a CSV file that a log has, by name without its unit."""
-    sheet = Sheet.read("path", file)
+    log = open_log("path", file)
     wanted = {_plain(w): key for key, words in SPELLINGS.items() for w in words}
     wanted |= {_plain(w): key for key, w in columns.items()}
-    places, units = {}, {}
-    for i, head in enumerate(sheet.head):
-        name = re.sub(r"\s*[\[(][^\[\]()]*[\])]", "", head)
-        if _plain(name) in wanted:
-            places[name], units[name] = i, UNITS[wanted[_plain(name)]]
-    return sheet.numbers(places, units)
+    found = {}
+    for i, head in enumerate(log.table.heads):
+        if _plain(head.name) in wanted:
+            size, _ = log.size(i, UNITS[wanted[_plain(head.name)]])
+            found[head.name] = size * log.table.numbers(i)
+    return found
 
 
 def _scope(file: Path) -> dict[str, np.ndarray]:
