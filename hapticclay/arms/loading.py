@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,6 +21,7 @@ BOUNDS = {  # least and largest value, units at a hinge and at a slide
     "damping": (0.0, 1e6, "N.m.s/rad", "N.s/m"),
     "friction": (0.0, 1e6, "N.m", "N"),
 }
+OPEN = 1e-3  # [rad or m] by which a pose may miss a closed chain
 SLIDE = 2  # MuJoCo's number of a joint that slides
 IN_MODEL = {  # fields of the model with a value per degree of freedom
     "armature": "dof_armature",
@@ -74,7 +75,7 @@ def load(arm: Any) -> Loaded:
         mechanism,
         fields,
         _ranges(model, joints),
-        tuple(_notes(model, arm, mechanism, joints)),
+        (*_notes(model, arm, mechanism, joints), *_moved(model, arm, mechanism, pose)),
     )
 
 
@@ -293,6 +294,16 @@ def _check_mechanism(mechanism: Mechanism, names: Sequence[str]) -> None:
             "must have an inertia: the links behind it have none along its axis, nor has a rotor"
         )
         raise ParameterError("joint", light, bound)
+
+
+def _moved(model: Any, arm: Any, mechanism: Mechanism, pose: np.ndarray) -> Iterator[str]:
+    """A sentence if the pose of the file does not close the arm's chain."""
+    if arm.pose is None and mechanism.following:
+        i = max(mechanism.following, key=lambda i: abs(mechanism.pose[i] - pose[i]))
+        gap = float(mechanism.pose[i] - pose[i])
+        if abs(gap) > OPEN:
+            name = model.joint(i).name
+            yield f"the pose of the file does not close the chain: {name} was moved by {gap:.3g}"
 
 
 def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> list[str]:
