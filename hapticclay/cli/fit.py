@@ -64,7 +64,7 @@ class FitCommand:
         if self.source.suffix == ".toml":
             bound = "must be a log or a record, not a scenario: run it first"
             raise ParameterError("source", str(self.source), bound)
-        for name in ("columns", "units", "counts"):
+        for name in ("columns", "units", "counts", "table", "where"):
             words = self.columns if name == "columns" else getattr(self.log, name)
             if recorded and words:
                 raise ParameterError(name, words, "is for a log: leave it out")

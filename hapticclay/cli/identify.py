@@ -87,7 +87,7 @@ class IdentifyCommand:
             for file in ("file", "csv")
         ),
         Unused(
-            ("what", "columns", "band", "held", "paper", "units", "counts"),
+            ("what", "columns", "band", "held", "paper", "units", "counts", "table", "where"),
             "is for a log: give FILE too",
             (),
             ("file", "csv"),

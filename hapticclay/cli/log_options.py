@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import ParameterError, choice
+from ..fields import value_of_text
 
 if TYPE_CHECKING:
     from ..columns.log import Log
@@ -21,16 +22,22 @@ class LogOptions:
         units: Units of columns, in place of what the file says, as in pos=mm force=lbf.
         counts: Columns of encoders, in counts a turn, or with the size of a count, as in q=4096
             x=0.01mm.
+        table: Group, topic or sheet to read, where a file has several.
+        where: Rows to read, as in episode_index=3.
     """
 
     units: tuple[str, ...] = ()
     counts: tuple[str, ...] = ()
+    table: str = ""
+    where: tuple[str, ...] = ()
 
     def log(self, file: Path, field: str = "file") -> Log:
         """The log in a file."""
         from ..columns.log import open_log
 
-        return open_log(field, file, self._pairs("units"), self._pairs("counts"))
+        where = {name: value_of_text(x) for name, x in self._pairs("where").items()}
+        units, counts = self._pairs("units"), self._pairs("counts")
+        return open_log(field, file, units, counts, self.table, where)
 
     def _pairs(self, option: str) -> dict[str, str]:
         """Values by the name of a column, which may hold an equals sign."""

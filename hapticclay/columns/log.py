@@ -51,6 +51,8 @@ class Log:
         path: str | os.PathLike[str],
         units: Mapping[str, str] | None = None,
         counts: Mapping[str, Any] | None = None,
+        table: str = "",
+        where: Mapping[str, float] | None = None,
     ) -> Log:
         """Reads a file.
 
@@ -59,12 +61,14 @@ class Log:
             units: unit of a column by name, in place of what the file says, as {"x": "mm"}.
             counts: of an encoder's column by name: counts a turn, as 4096, or the size of a count,
                 as "0.01 mm" or "0.088 deg".
+            table: name of a group, a topic or a sheet, where a file has several.
+            where: only the rows in which columns have these values, as {"episode_index": 3}.
 
         Raises:
             ParameterError: the file cannot be read or holds no table, a name is not one of its
                 columns, or a unit is unknown.
         """
-        return open_log("path", path, units, counts)
+        return open_log("path", path, units, counts, table, where)
 
     def stating(
         self, units: Mapping[str, str] | None, counts: Mapping[str, Any] | None = None
@@ -179,9 +183,34 @@ def open_log(
     path: str | os.PathLike[str],
     units: Mapping[str, str] | None = None,
     counts: Mapping[str, Any] | None = None,
+    table: str = "",
+    where: Mapping[str, float] | None = None,
 ) -> Log:
     """As `Log.read`, with the name of the path for errors."""
-    return Log(Path(path), open_table(field, Path(path))).stating(units, counts)
+    log = Log(Path(path), open_table(field, Path(path), table)).stating(units, counts)
+    return _chosen(log, where) if where else log
+
+
+def _chosen(log: Log, where: Mapping[str, float]) -> Log:
+    """The rows in which columns have some values."""
+    import numpy as np
+
+    from .array_tables import Chosen
+
+    kept = np.ones(log.rows, dtype=bool)
+    for name, value in where.items():
+        found = log.table.loose_numbers(log.place(name, "where"))
+        same = found == number(f"where.{name}", value)
+        if not (kept & same).any():
+            values = np.unique(found[np.isfinite(found)])
+            shown = ", ".join(f"{x:g}" for x in values[:8]) + (", ..." if len(values) > 8 else "")
+            raise ParameterError(f"where.{name}", value, f"must be a value of the column: {shown}")
+        kept &= same
+    rows = np.flatnonzero(kept)
+    note = (
+        f"{len(rows)} of {log.rows} rows, by {', '.join(f'{k} = {x:g}' for k, x in where.items())}"
+    )
+    return Log(log.path, Chosen(log.table, rows, (*log.table.notes, note)), log.sizes)
 
 
 def columns_of(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -62,10 +62,11 @@ class TextTable:
     def read(cls, field: str, path: Path) -> TextTable:
         """Reads a file; its cells are read when a column is asked for."""
         text, encoding = decoded(field, path)
-        return cls._of_text(field, path, text, encoding)
+        return cls.of_text(field, path, text, encoding)
 
     @classmethod
-    def _of_text(cls, field: str, path: Path, text: str, encoding: str) -> TextTable:
+    def of_text(cls, field: str, path: Path, text: str, encoding: str) -> TextTable:
+        """Reads a text; its form begins with the encoding."""
         whole = [(i, x) for i, x in enumerate(text.splitlines(), 1) if x.strip(EMPTY)]
         rows, comments = _without_comments(whole)
         if not rows:
@@ -88,12 +89,12 @@ class TextTable:
             line, text = self.lines[-1]
             if len(split(text, self.separator)) < len(self.heads):
                 note = f"line {line}, the last, was cut off: it is left out"
-                return self._with(self.lines[:-1], note)
+                return replace(self.with_note(note), lines=self.lines[:-1], _kept={})
         return self
 
-    def _with(self, lines: list[Line], note: str) -> TextTable:
-        notes = (*self.notes, note)
-        return TextTable(self.field, self.path, self.heads, lines, self.separator, self.form, notes)
+    def with_note(self, note: str) -> TextTable:
+        """The table with another note."""
+        return replace(self, notes=(*self.notes, note))
 
     @property
     def rows(self) -> int:
