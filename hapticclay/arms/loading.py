@@ -20,6 +20,7 @@ BOUNDS = {  # least and largest value, units at a hinge and at a slide
     "armature": (0.0, 1e3, "kg.m^2", "kg"),
     "damping": (0.0, 1e6, "N.m.s/rad", "N.s/m"),
     "friction": (0.0, 1e6, "N.m", "N"),
+    "torque_limit": (0.0, 1e6, "N.m", "N"),
 }
 SLIDE = 2  # MuJoCo's number of a joint that slides
 IN_MODEL = {  # fields of the model with a value per degree of freedom
@@ -66,6 +67,9 @@ def load(arm: Any) -> Loaded:
         values = getattr(model, of)
         values[dofs] = _per_joint(model, field, getattr(arm, field), joints, values[dofs])
         fields[field] = tuple(values[dofs].tolist())
+    limits = _file_limits(model, joints)
+    given = _per_joint(model, "torque_limit", arm.torque_limit, joints, limits)
+    fields["torque_limit"] = tuple(given)
     mechanism = Mechanism(model, dofs, site, pose)
     _check_mechanism(mechanism, names)
     fields["pose"] = {model.joint(j).name: float(q) for j, q in enumerate(mechanism.pose)}
@@ -268,6 +272,12 @@ def _pose(model: Any, given: Any, joints: list[int]) -> np.ndarray:
     which = range(model.njnt) if isinstance(given, Mapping) else joints
     start[which] = _per_joint(model, "pose", given, which, start[which])
     return start
+
+
+def _file_limits(model: Any, joints: list[int]) -> np.ndarray:
+    """Largest torque of each joint that the file allows, infinite for none."""
+    least = np.abs(model.jnt_actfrcrange[joints]).min(axis=1)
+    return np.where(model.jnt_actfrclimited[joints] > 0, least, math.inf)
 
 
 def _ranges(model: Any, joints: list[int]) -> np.ndarray:

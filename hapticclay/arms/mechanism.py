@@ -6,6 +6,7 @@ Constraints are projected out exactly, where the engine's own are soft.
 
 from __future__ import annotations
 
+import copy
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +16,8 @@ from ..errors import ParameterError
 STEP = 1e-5  # [rad or m] of differences of static torques: 1e-10 of them is rounding
 CLOSED = 1e-10  # [rad or m] a closed chain is closed within
 MOST_CLOSING = 50  # Newton steps that close a chain
+STILL = 1e-9  # [m] least motion of the handle per joint rate
+POSES_TRIED, NEARBY = 8, 0.3  # poses at which the handle's motion is asked, rms off [rad or m]
 DEPENDENT = 1e-9  # of the largest singular value: smaller ones belong to redundant constraints
 
 
@@ -92,6 +95,57 @@ class Mechanism:
         self._at(q)
         kind, number = self._site or ("body", 0)
         return np.array(getattr(self._data, "site_xpos" if kind == "site" else "xpos")[number])
+
+    # ---- runs
+
+    def axes(self) -> list[int]:
+        """Axes of the world along which the handle can move, here or at poses nearby."""
+        rng = np.random.default_rng(0)
+        moves = np.zeros(3)
+        for _ in range(POSES_TRIED):
+            self._place(self.pose + rng.normal(0.0, NEARBY, len(self.pose)))
+            moves = np.maximum(moves, np.abs(self._jacobian()[:, self.dofs]).max(axis=1))
+        self._place(self.pose)
+        return np.flatnonzero(moves > STILL).tolist()
+
+    def runnable(self) -> Any:
+        """A copy of the model in which nothing acts but inertia and gravity.
+
+        Raises:
+            ParameterError: constraints move joints, or gravity is compensated in a part of the file.
+        """
+        if self.following:
+            bound = "must be an open chain in runs: its linear theory takes closed ones, too"
+            raise ParameterError("arm", self._model.joint(self.following[0]).name, bound)
+        model, bits = copy.copy(self._model), self._mujoco.mjtDisableBit
+        for name in ("CONSTRAINT", "SENSOR", "EULERDAMP"):
+            model.opt.disableflags |= getattr(bits, f"mjDSBL_{name}")
+        model.jnt_stiffness[:], model.dof_damping[:] = 0.0, 0.0
+        model.opt.integrator = self._mujoco.mjtIntegrator.mjINT_EULER
+        shares = np.unique(model.body_gravcomp[model.body_mass > 0.0][1:])
+        if not self.has_gravity or np.array_equal(shares, [1.0]):
+            model.opt.gravity[:] = 0.0
+        elif np.any(shares):
+            raise ParameterError("gravcomp", shares.tolist(), "must be 0 or 1 in runs, of all bodies")
+        model.body_gravcomp[:] = 0.0
+        return model
+
+    @property
+    def has_gravity(self) -> bool:
+        """Whether weights act."""
+        off = self._model.opt.disableflags & self._mujoco.mjtDisableBit.mjDSBL_GRAVITY
+        return not off and bool(np.any(self._model.opt.gravity))
+
+    @property
+    def springs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stiffness of each joint's spring [N.m/rad], and where it rests [rad]."""
+        model, dofs = self._model, self.dofs
+        return np.array(model.jnt_stiffness[dofs]), np.array(model.qpos_spring[dofs])
+
+    @property
+    def site(self) -> tuple[str, int] | None:
+        """Kind, "site" or "body", and index of the handle."""
+        return self._site
 
     # ---- the engine's terms
 

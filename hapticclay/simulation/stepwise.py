@@ -22,7 +22,7 @@ from ..scene.scenario import Scenario
 from . import record
 from .engines import engine_for
 from .monitor import Outcome
-from .run import COLUMNS, Run, Snapshot, Workspace
+from .run import COLUMNS, Run, Snapshot, Workspace, joint_arrays
 
 MOST = 1e6  # largest force [N] and torque [N.m] that may be given
 MOST_GAIN = 1e6  # largest K of a scenario [1/kg]
@@ -180,7 +180,8 @@ class Simulation:
             record = self.record()
             self._state = Sample(**{name: getattr(record, name)[-1] for name in Sample._fields})
         if self._state is None:
-            self._state = sample_of(self._run.sample_time(), np.array(self.numbers()))
+            m = self._run.row.m
+            self._state = sample_of(self._run.sample_time(), np.array(self.numbers()), m)
         return self._state
 
     def numbers(self) -> list[float]:
@@ -397,9 +398,14 @@ class Alone:
         self.owner._lock.release()
 
 
-def sample_of(t: float, row: np.ndarray) -> Sample:
-    """A sample from its row."""
-    return Sample(t, *[row[place] for place in PLACES])
+def sample_of(t: float, row: np.ndarray, m: Any = None) -> Sample:
+    """A sample from its row; m: the model of a run whose arm may be from a file."""
+    pairs = [row[place] for place in PLACES]
+    if m is None or not m.general:
+        return Sample(t, *pairs)
+    found = {name: x[None] for name, x in zip(Sample._fields[1:], pairs, strict=True)}
+    found |= joint_arrays(m, found, row[None, SHOWN:])
+    return Sample(t, **{name: x[0] for name, x in found.items()})
 
 
 def gain_of(value: object) -> tuple[float, float]:

@@ -1,0 +1,113 @@
+"""Coulomb friction in the joints of an arm on the engine's terms, in a kick under given torques.
+
+The rates after the kick are linear in the friction: w = w0 + C f with C positive definite. Each joint
+slides (f = -F sign w) or rests (w = 0, |f| <= F), which is a linear complementarity problem with
+bounds: Murty's least index rule ends at its one solution (Cottle, Pang, Stone, The linear
+complementarity problem, 4.2).
+"""
+
+import math
+
+
+MOST = 512  # pivots; each joint is in one of three states, and few change
+CLOSE = 1e-13  # a torque or rate so near to its bound, as a share, is at it
+
+
+def find(m, k):
+    """Friction torques in a kick, by the momentum that `joints.drive` prepared [N.m]."""
+    e, n = m.engine, m.joints
+    put_matrix(m, k)
+    for i in range(n):  # begin where each joint slides on
+        e.pivots[i] = 1 if k.o[i] > 0.0 else -1 if k.o[i] < 0.0 else 0
+    for _ in range(MOST):
+        rates(m, k)
+        worst = wrong(m, k)
+        if worst < 0:
+            return
+        if e.pivots[worst] == 0:  # it cannot be held: it slides against the friction
+            e.pivots[worst] = 1 if k.slip[worst] < 0.0 else -1
+        else:
+            e.pivots[worst] = 0
+
+
+def put_matrix(m, k):
+    """Inertia with all dampers of the kick, those at the handle too, and its right side."""
+    e, n, H = m.engine, m.joints, k.H
+    x, y = k.x, k.y
+    for i in range(n):
+        for j in range(n):
+            a = e.M[m.dof[i] * e.freedoms + m.dof[j]]
+            if i == j:
+                a += H * k.R * m.damper[i]
+            px, py, qx, qy = arm(m, 0, i), arm(m, 1, i), arm(m, 0, j), arm(m, 1, j)
+            a += H * (px * (x.d * qx + k.dxy * qy) + py * (y.d * qy + k.dxy * qx))
+            if m.axes > 2:
+                a += H * arm(m, 2, i) * k.z.d * arm(m, 2, j)
+            e.matrix[i * n + j] = a
+        e.matrix[n * n + i] = e.moment[i] + H * pushed(m, k, i)
+
+
+def arm(m, i, j):
+    """Velocity of an axis of the handle per rate of a joint [m]."""
+    return m.engine.J[m.row[i] * m.engine.freedoms + m.dof[j]]
+
+
+def pushed(m, k, j):
+    """Torque of the handle's load on a joint, without its dampers [N.m]."""
+    torque = 0.0
+    for i in range(m.axes):
+        torque += arm(m, i, j) * k.axis[i].f
+    return torque
+
+
+def rates(m, k):
+    """Rates of the joints that slide, and the friction of those that rest, into k."""
+    e, n, H = m.engine, m.joints, k.H
+    A, at = e.matrix, n * n + n
+    for i in range(n):  # unknowns: the rate of a joint that slides, H times the friction of one at rest
+        k.slip[i] = -m.slip[i] * e.pivots[i]
+        A[at + i] = A[n * n + i] + H * k.slip[i] * abs(e.pivots[i])
+    # the rates by elimination among the joints that slide
+    L = at + n
+    for i in range(n):
+        if e.pivots[i] != 0:
+            for j in range(i + 1):
+                if e.pivots[j] != 0:
+                    a = A[i * n + j]
+                    for l in range(j):
+                        if e.pivots[l] != 0:
+                            a -= A[L + i * n + l] * A[L + j * n + l]
+                    A[L + i * n + j] = math.sqrt(a) if i == j else a / A[L + j * n + j]
+    for i in range(n):
+        k.w[i] = 0.0
+        if e.pivots[i] != 0:
+            a = A[at + i]
+            for j in range(i):
+                if e.pivots[j] != 0:
+                    a -= A[L + i * n + j] * k.w[j]
+            k.w[i] = a / A[L + i * n + i]
+    for i in range(n - 1, -1, -1):
+        if e.pivots[i] != 0:
+            a = k.w[i]
+            for j in range(i + 1, n):
+                if e.pivots[j] != 0:
+                    a -= A[L + j * n + i] * k.w[j]
+            k.w[i] = a / A[L + i * n + i]
+    for i in range(n):
+        if e.pivots[i] == 0:
+            a = -A[n * n + i]
+            for j in range(n):
+                a += A[i * n + j] * k.w[j]
+            k.slip[i] = a / H
+
+
+def wrong(m, k):
+    """The first joint whose state contradicts its rate or friction; -1 for none."""
+    e = m.engine
+    for i in range(m.joints):
+        if e.pivots[i] == 0:
+            if abs(k.slip[i]) > m.slip[i] * (1.0 + CLOSE):
+                return i
+        elif m.slip[i] > 0.0 and k.w[i] * e.pivots[i] < 0.0:
+            return i
+    return -1

@@ -1,0 +1,305 @@
+"""An arm of any joints on the engine's terms: its inertia and bias, and how a kick moves it.
+
+The handle moves along the two axes of the clay's plane, x and y here, and perhaps along a third, z.
+Nothing but the hand acts along z, so that it is eliminated: in the plane all laws of the clay see an
+arm of another mobility (docs/equations.md).
+"""
+
+import math
+
+from . import hand, joint_friction, kick
+
+
+def sense(m, s):
+    """Puts the engine to the joints' place: its inertia, and the Jacobian of the handle."""
+    if s.sensed:
+        return
+    s.sensed, e = 1, m.engine
+    for i in range(m.joints):
+        e.q[m.dof[i]] = s.q[i]
+    e.kinematics(e.model, e.data)
+    e.com_pos(e.model, e.data)
+    e.inertia(e.model, e.data)
+    e.factor(e.model, e.data)
+    e.full(e.model, e.data, e.M)
+    e.jacobian(e.model, e.data, e.J, e.none, e.site)
+
+
+def put_rates(m, s, k, rates, g, h):
+    """Bias torques and the handle's centripetal acceleration, at rates some time h later."""
+    e = m.engine
+    for i in range(m.joints):
+        e.w[m.dof[i]] = rates[i] + h * g[i]
+    e.com_vel(e.model, e.data)
+    e.bias(e.model, e.data, 0, e.forces)
+    if not m.hand:
+        return
+    e.jacobian_rate(e.model, e.data, e.Jdot, e.none, e.handle, e.body)
+    for i in range(m.axes):
+        o, at = k.axis[i], m.row[i] * e.freedoms
+        o.c = 0.0
+        for j in range(m.joints):
+            o.c -= e.Jdot[at + m.dof[j]] * e.w[m.dof[j]]
+
+
+def place(m, k, of):
+    """Position of the handle."""
+    for i in range(m.axes):
+        k.axis[i].p = of[m.row[i]] - m.at[i]
+
+
+def handle_velocity(m, k, rates):
+    """Velocity of the handle at joint rates."""
+    e = m.engine
+    for i in range(m.axes):
+        o, at = k.axis[i], m.row[i] * e.freedoms
+        o.v = 0.0
+        for j in range(m.joints):
+            o.v += e.J[at + m.dof[j]] * rates[j]
+
+
+def handle_at(m, s, k):
+    """The handle after a step."""
+    sense(m, s)
+    place(m, k, m.engine.handle)
+    handle_velocity(m, k, s.w)
+
+
+def place_after(m, s, after):
+    """Position of the handle after the step tried, (x, y) [m]."""
+    if not m.places:
+        return s.k.x.p, s.k.y.p
+    e = m.engine
+    for i in range(m.joints):
+        e.scratch_q[m.dof[i]] = s.q[i] + after * s.k.w[i]
+    e.kinematics(e.model, e.scratch)
+    return e.scratch_handle[m.row[0]] - m.at[0], e.scratch_handle[m.row[1]] - m.at[1]
+
+
+# ---- before a kick -------------------------------------------------------------------------------
+
+
+def before_kick(m, s, k):
+    """The arm before a kick across a sample; its bias is that in the middle of the kick."""
+    for i in range(m.joints):
+        k.o[i] = s.w[i]
+    handle_at(m, s, k)
+    put_rates(m, s, k, s.w, s.g, 0.5 * k.H)
+
+
+def from_event(m, s, k):
+    """As `before_kick`, at an event, whose change of the torques gives the acceleration after it."""
+    e, change = m.engine, 0.0
+    for i in range(m.joints):
+        e.free[i] = s.next.tau[i] - s.e.tau[i]
+        change += abs(e.free[i])
+    if change > 0.0:
+        factor_inertia(m, 0.0)
+        solve(e.lower, e.free, 0, m.joints)
+    for i in range(m.joints):
+        e.free[i] += s.e.g[i]
+    put_rates(m, s, k, k.o, e.free, 0.5 * k.H)
+    for i in range(m.axes):
+        o, z = k.axis[i], s.e.axis[i]
+        o.p, o.v, o.owed0, o.stuck0, o.anchor0 = z.p, z.v, z.owed, z.stuck, z.anchor
+
+
+def at_event(m, k):
+    """The handle after the kick to an event."""
+    handle_velocity(m, k, k.w)
+
+
+# ---- a kick --------------------------------------------------------------------------------------
+
+
+def move_under(m, s, k):
+    """Motion in a kick under torques of the motors."""
+    kick.load(m, s, k)
+    for i in range(m.axes):
+        k.axis[i].f += m.weight[i]
+    drive(m, s, k)
+    if m.friction:
+        joint_friction.find(m, k)
+        drive(m, s, k)
+    kick.move(m, s, k)
+
+
+def drive(m, s, k):
+    """Rates after a kick without force at the handle, the mobility, and the law of the plane."""
+    e, n = m.engine, m.joints
+    for i in range(n):
+        torque = k.tau[i] + k.slip[i] - e.forces[m.dof[i]] + m.pull[i] - m.spring[i] * s.q[i]
+        x, at = k.H * (torque - k.L * m.damper[i] * k.o[i]), m.dof[i] * e.freedoms
+        for j in range(n):
+            x += e.M[at + m.dof[j]] * k.o[j]
+        e.moment[i] = e.free[i] = x
+    factor_inertia(m, k.H * k.R)
+    solve(e.lower, e.free, 0, n)
+    put_mobility(m, k)
+    rate = 1.0 / k.H
+    for i in range(m.axes):
+        o, at = k.axis[i], m.row[i] * e.freedoms
+        x = 0.0
+        for j in range(n):
+            x += e.J[at + m.dof[j]] * e.free[j]
+        o.n, o.a, o.rest = rate, rate * x, rate * (x - o.v)
+    k.Sxx, k.Sxy, k.Syy = k.Wxx, k.Wxy, k.Wyy
+    if m.axes > 2:
+        eliminate(k, k.z.d)
+
+
+def factor_inertia(m, h):
+    """Cholesky factor of the inertia, with the damping of the joints over a time h."""
+    e, n = m.engine, m.joints
+    for i in range(n):
+        at = m.dof[i] * e.freedoms
+        for j in range(i + 1):
+            x = e.M[at + m.dof[j]]
+            if i == j:
+                x += h * m.damper[i]
+            for l in range(j):
+                x -= e.lower[i * n + l] * e.lower[j * n + l]
+            e.lower[i * n + j] = math.sqrt(x) if i == j else x / e.lower[j * n + j]
+
+
+def solve(lower, x, at, n):
+    """Solves L L' y = x in place, x from index `at` on."""
+    for i in range(n):
+        for j in range(i):
+            x[at + i] -= lower[i * n + j] * x[at + j]
+        x[at + i] /= lower[i * n + i]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            x[at + i] -= lower[j * n + i] * x[at + j]
+        x[at + i] /= lower[i * n + i]
+
+
+def put_mobility(m, k):
+    """Mobility of the handle, by the factor of the inertia."""
+    e, n = m.engine, m.joints
+    for i in range(m.axes):
+        at = m.row[i] * e.freedoms
+        for j in range(n):
+            e.Y[i * n + j] = e.J[at + m.dof[j]]
+        solve(e.lower, e.Y, i * n, n)
+    k.Wxx, k.Wxy, k.Wyy = mobility(m, 0, 0), mobility(m, 0, 1), mobility(m, 1, 1)
+    if m.axes > 2:
+        k.Wxz, k.Wyz, k.Wzz = mobility(m, 0, 2), mobility(m, 1, 2), mobility(m, 2, 2)
+
+
+def mobility(m, i, j):
+    """Acceleration of the handle along one axis per force along another [1/kg]."""
+    e, x = m.engine, 0.0
+    for l in range(m.joints):
+        x += e.J[m.row[i] * e.freedoms + m.dof[l]] * e.Y[j * m.joints + l]
+    return x
+
+
+def eliminate(k, d):
+    """Eliminates z, where the law is n u = a + W (f - d u), from the law of the plane."""
+    x, y, z = k.x, k.y, k.z
+    per = d / (z.n + k.Wzz * d)
+    force = z.f - per * (z.a + k.Wzz * z.f)
+    x.a, y.a = x.a + k.Wxz * force, y.a + k.Wyz * force
+    x.rest, y.rest = x.rest + k.Wxz * force, y.rest + k.Wyz * force
+    k.Sxx, k.Sxy = k.Sxx - k.Wxz * per * k.Wxz, k.Sxy - k.Wxz * per * k.Wyz
+    k.Syy -= k.Wyz * per * k.Wyz
+
+
+def answer(m, k):
+    """Joint rates after a kick, by the force on the handle."""
+    e, n = m.engine, m.joints
+    if m.axes > 2:
+        z = k.z
+        total = z.a + k.Wxz * k.x.net + k.Wyz * k.y.net + k.Wzz * z.f
+        z.u = total / (z.n + k.Wzz * z.d)
+        z.net, z.fe = z.f - z.d * z.u, 0.0
+    for j in range(n):
+        x = 0.0
+        for i in range(m.axes):
+            x += e.Y[i * n + j] * k.axis[i].net
+        k.w[j] = e.free[j] + k.H * x
+        k.g[j] = (k.w[j] - k.o[j]) / k.H
+
+
+# ---- at a sample ---------------------------------------------------------------------------------
+
+
+def sensed_handle(m, s, k):
+    """The handle at a sample, into k."""
+    for i in range(m.axes):
+        o, z = k.axis[i], s.e.axis[i]
+        o.p, o.v = z.p, z.v
+
+
+def prepare_sensor(m, s, k):
+    """The arm at a sample, before it accelerates: its mobility, and `rest` without any force."""
+    e, n = m.engine, m.joints
+    put_rates(m, s, k, s.e.w, s.e.w, 0.0)
+    for i in range(n):
+        torque = s.e.tau[i] + s.e.slip[i] - e.forces[m.dof[i]] + m.pull[i]
+        e.free[i] = torque - m.spring[i] * s.q[i] - m.damper[i] * s.e.w[i]
+    factor_inertia(m, 0.0)
+    solve(e.lower, e.free, 0, n)
+    put_mobility(m, k)
+    for i in range(m.axes):
+        o, at = k.axis[i], m.row[i] * e.freedoms
+        o.n, o.rest = 1.0, 0.0
+        for j in range(n):
+            o.rest += e.J[at + m.dof[j]] * e.free[j]
+        o.a = o.rest
+    if m.axes > 2:
+        z = k.z
+        z.f = m.weight[2] - hand.resistance(m, z.p, z.v, z.c, 2)
+        k.Sxx, k.Sxy, k.Syy = k.Wxx, k.Wxy, k.Wyy
+        eliminate(k, m.z.mass)
+        k.Wxx, k.Wxy, k.Wyy = k.Sxx, k.Sxy, k.Syy
+
+
+def force_along_z(m, k, fx, fy, ax, ay):
+    """Force of the hand along z on a sensor, under forces in the plane and accelerations there."""
+    z = k.z
+    px, py = fx - m.x.mass * ax, fy - m.y.mass * ay
+    a = (z.a + k.Wxz * px + k.Wyz * py + k.Wzz * z.f) / (1.0 + k.Wzz * m.z.mass)
+    return z.f - m.z.mass * a
+
+
+# ---- the step ------------------------------------------------------------------------------------
+
+
+def step(m, s, k, h):
+    """Lets the engine move the arm to the rates of a kick."""
+    e = m.engine
+    for i in range(e.freedoms):
+        e.w[i], e.applied[i] = 0.0, e.forces[i]
+    for j in range(m.joints):
+        d, a = m.dof[j], (k.w[j] - s.w[j]) / h
+        e.w[d] = s.w[j]
+        for i in range(e.freedoms):
+            e.applied[i] += e.M[i * e.freedoms + d] * a
+    e.timestep[0] = h
+    e.move(e.model, e.data)
+    for j in range(m.joints):
+        s.q[j], s.w[j], s.g[j] = e.q[m.dof[j]], e.w[m.dof[j]], k.g[j]
+    s.sensed = 0
+
+
+# ---- a row ---------------------------------------------------------------------------------------
+
+
+def width(m):
+    """Numbers of the part of a row that such an arm adds: q, q', tau; p, v and force of hand z."""
+    return 3 * m.joints + 3
+
+
+def write(m, s, k, share):
+    """Writes that part; `share`: of a kick to the event at the sample, see sampled.shown_output."""
+    out, n, at = m.extra, m.joints, width(m) * s.row
+    for i in range(n):
+        rate = k.o[i] + k.L * (k.w[i] - k.o[i])
+        driven = m.drive_pull[i] - m.drive_spring[i] * s.q[i] - m.drive_damper[i] * rate
+        out[at + i], out[at + n + i], out[at + 2 * n + i] = s.q[i], rate, k.tau[i] + driven
+    if m.axes > 2:
+        z, at, h = k.z, at + 3 * n, hand.force(m, k, 2)
+        out[at], out[at + 1] = z.p, z.v + k.L * (z.u - z.v)
+        out[at + 2] = h + share * (s.fh[2] - h)
