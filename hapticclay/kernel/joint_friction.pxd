@@ -8,7 +8,6 @@ cdef double CLOSE
 cdef void find(Model m, Kick k) noexcept nogil
 @cython.locals(a=cython.double)
 cdef void put_matrix(Model m, Kick k) noexcept nogil
-cdef double arm(Model m, long i, long j) noexcept nogil
 @cython.locals(torque=cython.double)
 cdef double pushed(Model m, Kick k, long j) noexcept nogil
 @cython.locals(a=cython.double)

@@ -36,27 +36,24 @@ def put_matrix(m, k):
     x, y = k.x, k.y
     for i in range(n):
         for j in range(n):
-            a = e.M[m.dof[i] * e.freedoms + m.dof[j]]
+            a = e.I[i * n + j]
             if i == j:
                 a += H * k.R * m.damper[i]
-            px, py, qx, qy = arm(m, 0, i), arm(m, 1, i), arm(m, 0, j), arm(m, 1, j)
+            if m.closed:
+                a += H * k.R * e.D[i * n + j]
+            px, py, qx, qy = e.A[i], e.A[n + i], e.A[j], e.A[n + j]
             a += H * (px * (x.d * qx + k.dxy * qy) + py * (y.d * qy + k.dxy * qx))
             if m.axes > 2:
-                a += H * arm(m, 2, i) * k.z.d * arm(m, 2, j)
+                a += H * e.A[2 * n + i] * k.z.d * e.A[2 * n + j]
             e.matrix[i * n + j] = a
         e.matrix[n * n + i] = e.moment[i] + H * pushed(m, k, i)
-
-
-def arm(m, i, j):
-    """Velocity of an axis of the handle per rate of a joint [m]."""
-    return m.engine.J[m.row[i] * m.engine.freedoms + m.dof[j]]
 
 
 def pushed(m, k, j):
     """Torque of the handle's load on a joint, without its dampers [N.m]."""
     torque = 0.0
     for i in range(m.axes):
-        torque += arm(m, i, j) * k.axis[i].f
+        torque += m.engine.A[i * m.joints + j] * k.axis[i].f
     return torque
 
 

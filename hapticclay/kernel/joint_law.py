@@ -5,8 +5,9 @@ It also renders clay: its force at the handle, by J'.
 
 import math
 
+from ..formulas import arm as arm_law
 from ..formulas import hardware as law
-from . import hardware, joints, laws
+from . import arm, hardware, joints, laws
 
 EXACT, DIFFERENCE, FILTER = range(3)  # how a rate is had
 
@@ -19,8 +20,8 @@ def respond(m, s, k):
         Fc, slope, Fv = m.fed_friction[3 * i], m.fed_friction[3 * i + 1], m.fed_friction[3 * i + 2]
         tau[i] = m.gains[i] * (m.reference[i] - q[i]) - m.rate_gains[i] * w[i]
         tau[i] += Fc * math.tanh(slope * w[i]) + Fv * w[i]
-    if m.feeds_gravity or m.renders:
-        see_pose(m, s, m.feeds_gravity)
+    if m.feeds_gravity or (m.renders and m.general):
+        see_pose(m, s)
     if m.feeds_gravity:
         feed_gravity(m, k)
     if m.renders:
@@ -42,41 +43,53 @@ def measure_rates(m, s):
         w[i] = law.quantize(w[i], m.rate_bits, m.rate_range)
 
 
-def see_pose(m, s, weighs):
-    """Puts the engine's other data to the measured angles, with the bias of an arm at rest."""
-    e = m.engine
-    for i in range(m.joints):
+def see_pose(m, s):
+    """The arm at the measured angles: place, Jacobian of the handle, torques that hold the arm."""
+    e, n = m.engine, m.joints
+    if m.closed:
+        for i in range(n):
+            e.pose[i] = s.angles[i]
+        e.at_scratch(e.pose)
+        return
+    for i in range(n):
         e.scratch_q[m.dof[i]] = s.angles[i]
     e.kinematics(e.model, e.scratch)
     e.com_pos(e.model, e.scratch)
-    e.jacobian(e.model, e.scratch, e.scratch_J, e.none, e.site)
-    if weighs:
+    e.jacobian(e.model, e.scratch, e.J, e.none, e.site)
+    joints.gather(m, e.J, e.scratch_A)
+    if m.feeds_gravity:
         e.com_vel(e.model, e.scratch)
         e.bias(e.model, e.scratch, 0, e.scratch_forces)
+        for i in range(n):
+            e.scratch_B[i] = e.scratch_forces[m.dof[i]]
 
 
 def feed_gravity(m, k):
     """Adds the torques that hold arm and hand against gravity."""
-    e = m.engine
-    for i in range(m.joints):
-        d = m.dof[i]
-        k.tau[i] += e.scratch_forces[d]
+    e, n = m.engine, m.joints
+    for i in range(n):
+        k.tau[i] += e.scratch_B[i]
         for j in range(m.axes):
-            k.tau[i] -= e.scratch_J[m.row[j] * e.freedoms + d] * m.weight[j]
+            k.tau[i] -= e.scratch_A[j * n + i] * m.weight[j]
 
 
 def render(m, s, k):
     """Adds the force of the clay at the handle as measured."""
-    e, after = m.engine, s.next
-    joints.place(m, k, e.scratch_handle)
-    for i in range(2):
-        o, at = k.axis[i], m.row[i] * e.freedoms
-        o.v = 0.0
-        for j in range(m.joints):
-            o.v += e.scratch_J[at + m.dof[j]] * s.rates[j]
+    e, after, n = m.engine, s.next, m.joints
+    if m.general:
+        joints.place(m, k, e.scratch_handle)
+        for i in range(2):
+            o = k.axis[i]
+            o.v = 0.0
+            for j in range(n):
+                o.v += e.scratch_A[i * n + j] * s.rates[j]
+    else:
+        arm.handle_at(m, k, s.angles[0], s.angles[1], s.rates[0], s.rates[0] + s.rates[1])
     fx, fy = laws.force_for_controller(m, s, k)
-    for i in range(m.joints):
-        d = m.dof[i]
-        k.tau[i] -= e.scratch_J[m.row[0] * e.freedoms + d] * fx
-        k.tau[i] -= e.scratch_J[m.row[1] * e.freedoms + d] * fy
+    if m.general:
+        for i in range(n):
+            k.tau[i] -= e.scratch_A[i] * fx + e.scratch_A[n + i] * fy
+    else:
+        a1, a2 = arm_law.joint_torques(fx, fy, k.u)
+        k.tau[0], k.tau[1] = k.tau[0] - a1, k.tau[1] - a2
     after.x.force, after.y.force = fx, fy

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from . import joint_scene
 from .mover import Mover, address, addresses_of
 
 CALLS = {"factor": "mj_factorM", "full": "mj_fullM", "move": "mj_step2", "jacobian_rate": "mj_jacDot"}
+CALLED = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
 JACOBIANS = {"site": "mj_jacSite", "body": "mj_jacBody"}
 
 
@@ -32,6 +34,17 @@ class JointMover(Mover):
         self.places["scratch_handle"] = getattr(self.scratch, place)[self.site]
         self.places["scratch_q"] = self.scratch.qpos
         self.pivots = np.zeros(len(arm.names), dtype=np.int64)
+        self.closed: Any = (None, None, None)
+        if mechanism.following:
+            self.close(scenario)
+
+    def close(self, scenario: Scenario) -> None:
+        """Functions that project the constraints of a closed chain out."""
+        from .closed_chain import ClosedChain  # imported only for one
+
+        chain = ClosedChain(scenario, self.places)
+        self.places["handle"], self.places["scratch_handle"] = chain.handle, chain.scratch_handle
+        self.closed = chain.at_pose, chain.at_rates, chain.at_scratch
 
     def build(self, scenario: Scenario) -> Any:
         return scenario.arm.mechanism.runnable()  # type: ignore[union-attr]
@@ -42,9 +55,8 @@ class JointMover(Mover):
         made.factor, made.move = mujoco.mj_factorM, mujoco.mj_step2
         made.scratch, made.site, made.body = self.scratch, self.site, self.body
         made.freedoms, made.pivots = model.nv, memoryview(self.pivots)
-        whole, J = self.places["M"].reshape(model.nv, model.nv), {}
-        for name in ("J", "Jdot", "scratch_J"):
-            J[name] = self.places[name].reshape(3, model.nv)
+        whole = self.places["M"].reshape(model.nv, model.nv)
+        J, Jdot = (self.places[name].reshape(3, model.nv) for name in ("J", "Jdot"))
         of = getattr(mujoco, JACOBIANS[self.kind])
 
         def bias(model: Any, data: Any, accelerated: int, out: Any) -> None:
@@ -52,13 +64,14 @@ class JointMover(Mover):
             mujoco.mj_rne(model, data, accelerated, at)
 
         def jacobian(model: Any, data: Any, out: Any, none: Any, site: int) -> None:
-            of(model, data, J["J" if data is self.data else "scratch_J"], None, site)
+            of(model, data, J, None, site)
 
         def jacobian_rate(model: Any, data: Any, out: Any, none: Any, at: Any, body: int) -> None:
-            mujoco.mj_jacDot(model, data, J["Jdot"], None, self.places["handle"], body)
+            mujoco.mj_jacDot(model, data, Jdot, None, self.places["handle"], body)
 
         made.bias, made.jacobian, made.jacobian_rate = bias, jacobian, jacobian_rate
         made.full = lambda model, data, out: mujoco.mj_fullM(model, data, whole)
+        made.at_pose, made.at_rates, made.at_scratch = self.closed
 
     def fill_row(self, made: Any) -> None:
         super().fill_row(made)
@@ -68,6 +81,9 @@ class JointMover(Mover):
         made["scratch"] = addresses_of(self.model, self.scratch)[1]
         made["site"], made["body"], made["freedoms"] = self.site, self.body, self.model.nv
         made["pivots"] = self.pivots.ctypes.data
+        self.called = [CALLED(x) for x in self.closed if x is not None]
+        for name, x in zip(("at_pose", "at_rates", "at_scratch"), self.called, strict=False):
+            made[name] = ctypes.cast(x, ctypes.c_void_p).value
 
     def rest(self, scenario: Scenario) -> None:
         for data in (self.data, self.scratch):

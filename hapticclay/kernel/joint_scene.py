@@ -18,6 +18,7 @@ def put_arm(m: Any, arrays: dict[str, np.ndarray], s: Scenario) -> None:
     arm: Any = s.arm
     n, axes = len(arm.names), ["xyz".index(c) for c in arm.axes]
     m.general, m.joints, m.axes = 1, n, len(axes)
+    m.closed = int(bool(arm.mechanism.following))
     arrays["dof"] = np.array(arm.mechanism.dofs, dtype=np.int64)
     m.row[: len(axes)] = axes
     m.at[: len(axes)] = arm.handle()[axes].tolist()
@@ -33,14 +34,14 @@ def put_arm(m: Any, arrays: dict[str, np.ndarray], s: Scenario) -> None:
 
 def put_weight(m: Any, s: Scenario, axes: list[int]) -> None:
     """Weight of the hand, and whether the law holds it and the arm."""
-    model = s.arm.mechanism.runnable()
-    gravity = np.array(model.opt.gravity)[axes] * s.arm.mechanism.has_gravity
+    mechanism: Any = s.arm.mechanism  # type: ignore[union-attr]
+    weighs, gravity = mechanism.weighs, np.array(mechanism.model.opt.gravity)[axes]
     hand = s.operators[0]
-    m.weight[: len(axes)] = ((hand.mass if hand else 0.0) * gravity).tolist()
-    law, holds = s.controller, s.arm.gravity == "compensated"
+    m.weight[: len(axes)] = ((hand.mass if hand and weighs else 0.0) * gravity).tolist()
+    law, holds = s.controller, s.arm.gravity == "compensated"  # type: ignore[union-attr]
     if isinstance(law, JointPD) and law.gravity is not None:
         holds = law.gravity
-    m.feeds_gravity = int(holds and bool(np.any(model.opt.gravity)))
+    m.feeds_gravity = int(holds and weighs)
 
 
 def put_law(m: Any, law: JointPD) -> None:
@@ -68,7 +69,8 @@ def scratch(n: int, freedoms: int) -> dict[str, np.ndarray]:
     assert n <= records.JOINTS
     sizes = {
         "M": freedoms * freedoms, "J": 3 * freedoms, "Jdot": 3 * freedoms,
-        "scratch_J": 3 * freedoms, "scratch_forces": freedoms, "lower": n * n, "Y": 3 * n,
-        "free": n, "moment": n, "matrix": 2 * n * n + 2 * n,
+        "scratch_forces": freedoms, "scratch_A": 3 * n, "scratch_B": n, "I": n * n, "A": 3 * n,
+        "B": n, "D": n * n, "C": 3, "pose": 2 * n, "lower": n * n, "Y": 3 * n, "free": n,
+        "moment": n, "matrix": 2 * n * n + 2 * n,
     }  # fmt: skip
     return {name: np.zeros(size) for name, size in sizes.items()}

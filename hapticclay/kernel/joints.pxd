@@ -6,7 +6,8 @@ from . cimport joint_friction
 from . cimport kick
 
 cdef void sense(Model m, State s) noexcept nogil
-cdef void put_rates(Model m, State s, Kick k, double *rates, double *g, double h) noexcept nogil
+cdef void gather(Model m, double *J, double *A) noexcept nogil
+cdef void put_rates(Model m, Kick k, double *rates, double *g, double h) noexcept nogil
 cdef void place(Model m, Kick k, double *of) noexcept nogil
 cdef void handle_velocity(Model m, Kick k, double *rates) noexcept nogil
 cdef void handle_at(Model m, State s, Kick k) noexcept nogil
@@ -18,6 +19,8 @@ cdef void at_event(Model m, Kick k) noexcept nogil
 cdef void move_under(Model m, State s, Kick k) noexcept nogil
 @cython.locals(x=cython.double)
 cdef void drive(Model m, State s, Kick k) noexcept nogil
+@cython.locals(x=cython.double)
+cdef double damping(Model m, double *w, long i) noexcept nogil
 @cython.locals(x=cython.double)
 cdef void factor_inertia(Model m, double h) noexcept nogil
 cdef void solve(double *lower, double *x, long at, long n) noexcept nogil

@@ -11,11 +11,16 @@ from . import hand, joint_friction, kick
 
 
 def sense(m, s):
-    """Puts the engine to the joints' place: its inertia, and the Jacobian of the handle."""
+    """Puts the engine to the joints' place: inertia of the joints, and Jacobian of the handle."""
     if s.sensed:
         return
-    s.sensed, e = 1, m.engine
-    for i in range(m.joints):
+    s.sensed, e, n = 1, m.engine, m.joints
+    if m.closed:
+        for i in range(n):
+            e.pose[i] = s.q[i]
+        e.at_pose(e.pose)
+        return
+    for i in range(n):
         e.q[m.dof[i]] = s.q[i]
     e.kinematics(e.model, e.data)
     e.com_pos(e.model, e.data)
@@ -23,22 +28,43 @@ def sense(m, s):
     e.factor(e.model, e.data)
     e.full(e.model, e.data, e.M)
     e.jacobian(e.model, e.data, e.J, e.none, e.site)
+    for i in range(n):
+        at = m.dof[i] * e.freedoms
+        for j in range(n):
+            e.I[i * n + j] = e.M[at + m.dof[j]]
+    gather(m, e.J, e.A)
 
 
-def put_rates(m, s, k, rates, g, h):
+def gather(m, J, A):
+    """A Jacobian of the handle by its axes and the joints, from the engine's."""
+    for i in range(m.axes):
+        for j in range(m.joints):
+            A[i * m.joints + j] = J[m.row[i] * m.engine.freedoms + m.dof[j]]
+
+
+def put_rates(m, k, rates, g, h):
     """Bias torques and the handle's centripetal acceleration, at rates some time h later."""
-    e = m.engine
-    for i in range(m.joints):
+    e, n = m.engine, m.joints
+    if m.closed:
+        for i in range(n):
+            e.pose[n + i] = rates[i] + h * g[i]
+        e.at_rates(e.pose)
+        for i in range(m.axes):
+            k.axis[i].c = e.C[i]
+        return
+    for i in range(n):
         e.w[m.dof[i]] = rates[i] + h * g[i]
     e.com_vel(e.model, e.data)
     e.bias(e.model, e.data, 0, e.forces)
+    for i in range(n):
+        e.B[i] = e.forces[m.dof[i]]
     if not m.hand:
         return
     e.jacobian_rate(e.model, e.data, e.Jdot, e.none, e.handle, e.body)
     for i in range(m.axes):
         o, at = k.axis[i], m.row[i] * e.freedoms
         o.c = 0.0
-        for j in range(m.joints):
+        for j in range(n):
             o.c -= e.Jdot[at + m.dof[j]] * e.w[m.dof[j]]
 
 
@@ -50,12 +76,12 @@ def place(m, k, of):
 
 def handle_velocity(m, k, rates):
     """Velocity of the handle at joint rates."""
-    e = m.engine
+    e, n = m.engine, m.joints
     for i in range(m.axes):
-        o, at = k.axis[i], m.row[i] * e.freedoms
+        o = k.axis[i]
         o.v = 0.0
-        for j in range(m.joints):
-            o.v += e.J[at + m.dof[j]] * rates[j]
+        for j in range(n):
+            o.v += e.A[i * n + j] * rates[j]
 
 
 def handle_at(m, s, k):
@@ -70,9 +96,14 @@ def place_after(m, s, after):
     if not m.places:
         return s.k.x.p, s.k.y.p
     e = m.engine
-    for i in range(m.joints):
-        e.scratch_q[m.dof[i]] = s.q[i] + after * s.k.w[i]
-    e.kinematics(e.model, e.scratch)
+    if m.closed:
+        for i in range(m.joints):
+            e.pose[i] = s.q[i] + after * s.k.w[i]
+        e.at_scratch(e.pose)
+    else:
+        for i in range(m.joints):
+            e.scratch_q[m.dof[i]] = s.q[i] + after * s.k.w[i]
+        e.kinematics(e.model, e.scratch)
     return e.scratch_handle[m.row[0]] - m.at[0], e.scratch_handle[m.row[1]] - m.at[1]
 
 
@@ -84,7 +115,7 @@ def before_kick(m, s, k):
     for i in range(m.joints):
         k.o[i] = s.w[i]
     handle_at(m, s, k)
-    put_rates(m, s, k, s.w, s.g, 0.5 * k.H)
+    put_rates(m, k, s.w, s.g, 0.5 * k.H)
 
 
 def from_event(m, s, k):
@@ -98,7 +129,7 @@ def from_event(m, s, k):
         solve(e.lower, e.free, 0, m.joints)
     for i in range(m.joints):
         e.free[i] += s.e.g[i]
-    put_rates(m, s, k, k.o, e.free, 0.5 * k.H)
+    put_rates(m, k, k.o, e.free, 0.5 * k.H)
     for i in range(m.axes):
         o, z = k.axis[i], s.e.axis[i]
         o.p, o.v, o.owed0, o.stuck0, o.anchor0 = z.p, z.v, z.owed, z.stuck, z.anchor
@@ -128,35 +159,44 @@ def drive(m, s, k):
     """Rates after a kick without force at the handle, the mobility, and the law of the plane."""
     e, n = m.engine, m.joints
     for i in range(n):
-        torque = k.tau[i] + k.slip[i] - e.forces[m.dof[i]] + m.pull[i] - m.spring[i] * s.q[i]
-        x, at = k.H * (torque - k.L * m.damper[i] * k.o[i]), m.dof[i] * e.freedoms
+        torque = k.tau[i] + k.slip[i] - e.B[i] + m.pull[i] - m.spring[i] * s.q[i]
+        x = k.H * (torque - k.L * damping(m, k.o, i))
         for j in range(n):
-            x += e.M[at + m.dof[j]] * k.o[j]
+            x += e.I[i * n + j] * k.o[j]
         e.moment[i] = e.free[i] = x
     factor_inertia(m, k.H * k.R)
     solve(e.lower, e.free, 0, n)
     put_mobility(m, k)
     rate = 1.0 / k.H
     for i in range(m.axes):
-        o, at = k.axis[i], m.row[i] * e.freedoms
-        x = 0.0
+        o, x = k.axis[i], 0.0
         for j in range(n):
-            x += e.J[at + m.dof[j]] * e.free[j]
+            x += e.A[i * n + j] * e.free[j]
         o.n, o.a, o.rest = rate, rate * x, rate * (x - o.v)
     k.Sxx, k.Sxy, k.Syy = k.Wxx, k.Wxy, k.Wyy
     if m.axes > 2:
         eliminate(k, k.z.d)
 
 
+def damping(m, w, i):
+    """Torque of the dampers on a joint, at rates of all [N.m]."""
+    e, x = m.engine, m.damper[i] * w[i]
+    if m.closed:
+        for j in range(m.joints):
+            x += e.D[i * m.joints + j] * w[j]
+    return x
+
+
 def factor_inertia(m, h):
     """Cholesky factor of the inertia, with the damping of the joints over a time h."""
     e, n = m.engine, m.joints
     for i in range(n):
-        at = m.dof[i] * e.freedoms
         for j in range(i + 1):
-            x = e.M[at + m.dof[j]]
+            x = e.I[i * n + j]
             if i == j:
                 x += h * m.damper[i]
+            if m.closed:
+                x += h * e.D[i * n + j]
             for l in range(j):
                 x -= e.lower[i * n + l] * e.lower[j * n + l]
             e.lower[i * n + j] = math.sqrt(x) if i == j else x / e.lower[j * n + j]
@@ -178,9 +218,8 @@ def put_mobility(m, k):
     """Mobility of the handle, by the factor of the inertia."""
     e, n = m.engine, m.joints
     for i in range(m.axes):
-        at = m.row[i] * e.freedoms
         for j in range(n):
-            e.Y[i * n + j] = e.J[at + m.dof[j]]
+            e.Y[i * n + j] = e.A[i * n + j]
         solve(e.lower, e.Y, i * n, n)
     k.Wxx, k.Wxy, k.Wyy = mobility(m, 0, 0), mobility(m, 0, 1), mobility(m, 1, 1)
     if m.axes > 2:
@@ -189,9 +228,9 @@ def put_mobility(m, k):
 
 def mobility(m, i, j):
     """Acceleration of the handle along one axis per force along another [1/kg]."""
-    e, x = m.engine, 0.0
-    for l in range(m.joints):
-        x += e.J[m.row[i] * e.freedoms + m.dof[l]] * e.Y[j * m.joints + l]
+    e, n, x = m.engine, m.joints, 0.0
+    for l in range(n):
+        x += e.A[i * n + l] * e.Y[j * n + l]
     return x
 
 
@@ -235,18 +274,18 @@ def sensed_handle(m, s, k):
 def prepare_sensor(m, s, k):
     """The arm at a sample, before it accelerates: its mobility, and `rest` without any force."""
     e, n = m.engine, m.joints
-    put_rates(m, s, k, s.e.w, s.e.w, 0.0)
+    put_rates(m, k, s.e.w, s.e.w, 0.0)
     for i in range(n):
-        torque = s.e.tau[i] + s.e.slip[i] - e.forces[m.dof[i]] + m.pull[i]
-        e.free[i] = torque - m.spring[i] * s.q[i] - m.damper[i] * s.e.w[i]
+        torque = s.e.tau[i] + s.e.slip[i] - e.B[i] + m.pull[i] - m.spring[i] * s.q[i]
+        e.free[i] = torque - damping(m, s.e.w, i)
     factor_inertia(m, 0.0)
     solve(e.lower, e.free, 0, n)
     put_mobility(m, k)
     for i in range(m.axes):
-        o, at = k.axis[i], m.row[i] * e.freedoms
+        o = k.axis[i]
         o.n, o.rest = 1.0, 0.0
         for j in range(n):
-            o.rest += e.J[at + m.dof[j]] * e.free[j]
+            o.rest += e.A[i * n + j] * e.free[j]
         o.a = o.rest
     if m.axes > 2:
         z = k.z
@@ -268,20 +307,24 @@ def force_along_z(m, k, fx, fy, ax, ay):
 
 
 def step(m, s, k, h):
-    """Lets the engine move the arm to the rates of a kick."""
+    """Moves the arm to the rates of a kick: the engine does, but for a closed chain."""
+    s.sensed, n = 0, m.joints
+    if m.closed:
+        for j in range(n):
+            s.q[j], s.w[j], s.g[j] = s.q[j] + h * k.w[j], k.w[j], k.g[j]
+        return
     e = m.engine
     for i in range(e.freedoms):
         e.w[i], e.applied[i] = 0.0, e.forces[i]
-    for j in range(m.joints):
+    for j in range(n):
         d, a = m.dof[j], (k.w[j] - s.w[j]) / h
         e.w[d] = s.w[j]
         for i in range(e.freedoms):
             e.applied[i] += e.M[i * e.freedoms + d] * a
     e.timestep[0] = h
     e.move(e.model, e.data)
-    for j in range(m.joints):
+    for j in range(n):
         s.q[j], s.w[j], s.g[j] = e.q[m.dof[j]], e.w[m.dof[j]], k.g[j]
-    s.sensed = 0
 
 
 # ---- a row ---------------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 cimport cython
 from .records cimport Kick, Machine, Model, Work
 from . cimport hand
+from . cimport joints
 
 @cython.locals(power=cython.double)
 cdef void add_work(Model m, Work of, Work to, Kick k, double *w, Machine machine) noexcept nogil

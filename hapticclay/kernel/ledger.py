@@ -1,6 +1,6 @@
 """The ledger of energy: what a kick adds to it."""
 
-from . import hand
+from . import hand, joints
 
 
 def add_work(m, of, to, k, w, machine):
@@ -31,7 +31,7 @@ def more_taken(m, k, w, hand_taken, joints_taken):
         z = k.z
         hand_taken += k.H * hand.damping_force(m, k, 2) * 0.5 * (z.v + z.u)
     for i in range(m.joints):
-        force = m.damper[i] * (k.L * w[i] + k.R * k.w[i])
+        force = k.L * joints.damping(m, w, i) + k.R * joints.damping(m, k.w, i)
         joints_taken += 0.5 * k.H * force * (w[i] + k.w[i])
     return hand_taken, joints_taken
 

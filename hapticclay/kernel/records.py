@@ -74,8 +74,18 @@ class Engine:
     scratch: thing  # data of poses that are tried
     scratch_q: floats
     scratch_handle: floats
-    scratch_J: floats
     scratch_forces: floats
+    scratch_A: floats  # at measured angles: Jacobian of the handle, torques that hold the arm
+    scratch_B: floats
+    I: floats  # by the joints: inertia, Jacobian of the handle, bias; of a closed chain, dampers
+    A: floats
+    B: floats
+    D: floats
+    C: floats  # centripetal acceleration of the handle of a closed chain
+    pose: floats  # positions and rates given to the functions of a closed chain
+    at_pose: own_control
+    at_rates: own_control
+    at_scratch: own_control
     none: floats  # no array
     site: whole  # the handle's index as a site or body, and that of its body
     body: whole
@@ -143,6 +153,7 @@ class Model:
     joints: whole
     axes: whole  # of the handle
     general: whole  # the arm is on the engine's terms, not in closed form
+    closed: whole  # constraints of its chain are projected out, by functions in Python
     dof: wholes  # degree of freedom of each joint
     row: whole[3]  # axis of the world of each axis
     at: real[3]  # place of p = 0 [m]
