@@ -71,6 +71,14 @@ class JointPD:
         return len(self.Kp)
 
     @property
+    def words(self) -> str:
+        """The law in a few words."""
+        rates = {"difference": "by difference", "filter": f"filtered at {self.cutoff} rad/s"}
+        rate = rates.get(self.velocity, "exact")
+        fed = " with friction fed forward" * (self.friction is not None)
+        return f"PD of {len(self)} joints in the {self.runs}, rates {rate}{fed}"
+
+    @property
     def slopes(self) -> tuple[float, ...]:
         """Slope of the friction fed forward at rest, Fc k + Fv, of each joint [N.m.s/rad]."""
         return tuple(Fc * k + Fv for Fc, k, Fv in self._frictions)

@@ -62,7 +62,11 @@ def load(arm: Any) -> Loaded:
     pose = _pose(model, arm.pose, joints)
     names = tuple(model.joint(j).name for j in joints)
     dofs = [int(model.jnt_dofadr[j]) for j in joints]
-    fields: dict[str, Any] = {"joints": names, "site": None if site is None else _name(model, site)}
+    fields: dict[str, Any] = {
+        "file": _plain(arm.file),
+        "joints": names,
+        "site": None if site is None else _name(model, site),
+    }
     for field, of in IN_MODEL.items():
         values = getattr(model, of)
         values[dofs] = _per_joint(model, field, getattr(arm, field), joints, values[dofs])
@@ -104,6 +108,11 @@ def compiled(file: Any) -> tuple[Any, str]:
         if not np.isfinite(getattr(model, array)).all():
             raise _bad_file(file, f"{array} is not finite")
     return model, spec.modelname
+
+
+def _plain(file: Any) -> Any:
+    """A path as text, which files can hold."""
+    return os.fspath(file) if isinstance(file, os.PathLike) else file
 
 
 def _path(file: Any) -> Path:

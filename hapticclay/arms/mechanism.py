@@ -198,9 +198,7 @@ class Mechanism:
         body = int(self._model.site_bodyid[number]) if kind == "site" else number
         self._mujoco.mj_jacDot(self._model, data, turned, None, self.handle_place(), body)
         torques = data.qfrc_bias - data.qfrc_spring - data.qfrc_gravcomp + whole @ drift
-        return Moving(
-            torques @ self._follow(), -(turned @ rates + self._jacobian() @ drift)
-        )
+        return Moving(torques @ self._follow(), -(turned @ rates + self._jacobian() @ drift))
 
     def weights(self) -> np.ndarray:
         """Torques that hold the arm against its weight where `at` put it [N.m], shape (n,)."""

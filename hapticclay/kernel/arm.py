@@ -77,6 +77,7 @@ def step_engine(m, s, k, h, even):
     if m.clay:
         ctrl[2], ctrl[3] = b0, b1
     applied[0], applied[1], timestep[0] = push1, push2, h
+    w[0], w[1] = s.w[0], s.w[1]  # after a hit: the velocity after half a kick
     e.step(e.model, e.data)
     s.q[0], s.q[1], s.w[0], s.w[1] = q[0], q[1], w[0], w[1]
 

@@ -4,7 +4,19 @@ import math
 
 from ..formulas import arm as arm_law
 from ..formulas import regions
-from . import arm, borders, groove, hardware, joints, memory, methods, sampled, viscous, watch, yielding
+from . import (
+    arm,
+    borders,
+    groove,
+    hardware,
+    joints,
+    memory,
+    methods,
+    sampled,
+    viscous,
+    watch,
+    yielding,
+)
 
 
 def begin(m, s, px, py, vx, vy):

@@ -1,4 +1,4 @@
-"""An arm whose chain is closed by constraints: terms of its joints, with the constraints projected out.
+"""An arm whose chain is closed by constraints, which are projected out of the terms of its joints.
 
 The engine's own constraints are soft; here they hold exactly. Python computes the terms, some
 0.3 ms a step, and the kernel calls it by address.
@@ -28,10 +28,17 @@ class ClosedChain:
         self.chain = Mechanism(copy.copy(of.model), of.dofs, of.site, of.pose)
         self.rows = ["xyz".index(c) for c in arm.axes]
         self.pose, self.rates = places["pose"][:n], places["pose"][n:]
-        self.inertia, self.dampers = places["I"].reshape(n, n), places["D"].reshape(n, n)
+        self.inertia, self.dampers = (
+            places["joint_M"].reshape(n, n),
+            places["joint_D"].reshape(n, n),
+        )
         self.own_dampers = np.diag(arm.damping)
-        self.J, self.bias, self.C = places["A"].reshape(3, n), places["B"], places["C"]
-        self.scratch_J, self.held = places["scratch_A"].reshape(3, n), places["scratch_B"]
+        self.J, self.bias, self.C = (
+            places["joint_J"].reshape(3, n),
+            places["joint_bias"],
+            places["joint_c"],
+        )
+        self.scratch_J, self.held = places["scratch_J"].reshape(3, n), places["scratch_bias"]
         self.handle, self.scratch_handle = np.zeros(3), np.zeros(3)
         self.springs = [np.array(x) for x in of.springs]
 

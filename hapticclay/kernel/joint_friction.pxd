@@ -1,6 +1,6 @@
 cimport cython
 from .records cimport Kick, Model
-from ..formulas cimport cmath as math
+from . cimport joints
 
 cdef long MOST
 cdef double CLOSE
@@ -10,6 +10,8 @@ cdef void find(Model m, Kick k) noexcept nogil
 cdef void put_matrix(Model m, Kick k) noexcept nogil
 @cython.locals(torque=cython.double)
 cdef double pushed(Model m, Kick k, long j) noexcept nogil
-@cython.locals(a=cython.double)
+@cython.locals(slides=cython.bint)
 cdef void rates(Model m, Kick k) noexcept nogil
+@cython.locals(impulse=cython.double)
+cdef double held(Model m, Kick k, long i) noexcept nogil
 cdef long wrong(Model m, Kick k) noexcept nogil

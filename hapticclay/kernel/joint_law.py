@@ -56,21 +56,21 @@ def see_pose(m, s):
     e.kinematics(e.model, e.scratch)
     e.com_pos(e.model, e.scratch)
     e.jacobian(e.model, e.scratch, e.J, e.none, e.site)
-    joints.gather(m, e.J, e.scratch_A)
+    joints.gather(m, e.J, e.scratch_J)
     if m.feeds_gravity:
         e.com_vel(e.model, e.scratch)
         e.bias(e.model, e.scratch, 0, e.scratch_forces)
         for i in range(n):
-            e.scratch_B[i] = e.scratch_forces[m.dof[i]]
+            e.scratch_bias[i] = e.scratch_forces[m.dof[i]]
 
 
 def feed_gravity(m, k):
     """Adds the torques that hold arm and hand against gravity."""
     e, n = m.engine, m.joints
     for i in range(n):
-        k.tau[i] += e.scratch_B[i]
+        k.tau[i] += e.scratch_bias[i]
         for j in range(m.axes):
-            k.tau[i] -= e.scratch_A[j * n + i] * m.weight[j]
+            k.tau[i] -= e.scratch_J[j * n + i] * m.weight[j]
 
 
 def render(m, s, k):
@@ -82,13 +82,13 @@ def render(m, s, k):
             o = k.axis[i]
             o.v = 0.0
             for j in range(n):
-                o.v += e.scratch_A[i * n + j] * s.rates[j]
+                o.v += e.scratch_J[i * n + j] * s.rates[j]
     else:
         arm.handle_at(m, k, s.angles[0], s.angles[1], s.rates[0], s.rates[0] + s.rates[1])
     fx, fy = laws.force_for_controller(m, s, k)
     if m.general:
         for i in range(n):
-            k.tau[i] -= e.scratch_A[i] * fx + e.scratch_A[n + i] * fy
+            k.tau[i] -= e.scratch_J[i] * fx + e.scratch_J[n + i] * fy
     else:
         a1, a2 = arm_law.joint_torques(fx, fy, k.u)
         k.tau[0], k.tau[1] = k.tau[0] - a1, k.tau[1] - a2

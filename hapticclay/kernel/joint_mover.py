@@ -12,7 +12,12 @@ from ..scene.scenario import Scenario
 from . import joint_scene
 from .mover import Mover, address, addresses_of
 
-CALLS = {"factor": "mj_factorM", "full": "mj_fullM", "move": "mj_step2", "jacobian_rate": "mj_jacDot"}
+CALLS = {
+    "factor": "mj_factorM",
+    "full": "mj_fullM",
+    "move": "mj_step2",
+    "jacobian_rate": "mj_jacDot",
+}
 CALLED = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
 JACOBIANS = {"site": "mj_jacSite", "body": "mj_jacBody"}
 

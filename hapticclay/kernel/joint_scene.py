@@ -69,8 +69,8 @@ def scratch(n: int, freedoms: int) -> dict[str, np.ndarray]:
     assert n <= records.JOINTS
     sizes = {
         "M": freedoms * freedoms, "J": 3 * freedoms, "Jdot": 3 * freedoms,
-        "scratch_forces": freedoms, "scratch_A": 3 * n, "scratch_B": n, "I": n * n, "A": 3 * n,
-        "B": n, "D": n * n, "C": 3, "pose": 2 * n, "lower": n * n, "Y": 3 * n, "free": n,
-        "moment": n, "matrix": 2 * n * n + 2 * n,
+        "scratch_forces": freedoms, "scratch_J": 3 * n, "scratch_bias": n, "joint_M": n * n,
+        "joint_J": 3 * n, "joint_bias": n, "joint_D": n * n, "joint_c": 3, "pose": 2 * n,
+        "lower": n * n, "Y": 3 * n, "free": n, "moment": n, "matrix": 2 * n * n + 2 * n,
     }  # fmt: skip
     return {name: np.zeros(size) for name, size in sizes.items()}

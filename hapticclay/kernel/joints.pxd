@@ -18,18 +18,25 @@ cdef void from_event(Model m, State s, Kick k) noexcept nogil
 cdef void at_event(Model m, Kick k) noexcept nogil
 cdef void move_under(Model m, State s, Kick k) noexcept nogil
 @cython.locals(x=cython.double)
+cdef void put_momentum(Model m, State s, Kick k) noexcept nogil
+@cython.locals(load=cython.double)
+cdef bint is_touched(Model m, Kick k) noexcept nogil
+cdef void drive_alone(Model m, Kick k) noexcept nogil
+@cython.locals(x=cython.double)
 cdef void drive(Model m, State s, Kick k) noexcept nogil
 @cython.locals(x=cython.double)
 cdef double damping(Model m, double *w, long i) noexcept nogil
-@cython.locals(x=cython.double)
 cdef void factor_inertia(Model m, double h) noexcept nogil
-cdef void solve(double *lower, double *x, long at, long n) noexcept nogil
+@cython.locals(x=cython.double)
+cdef void factor(double *A, long at, long n) noexcept nogil
+cdef void solve(double *L, long of, double *x, long at, long n) noexcept nogil
 cdef void put_mobility(Model m, Kick k) noexcept nogil
 @cython.locals(x=cython.double)
 cdef double mobility(Model m, long i, long j) noexcept nogil
 cdef void eliminate(Kick k, double d) noexcept nogil
 @cython.locals(x=cython.double)
 cdef void answer(Model m, Kick k) noexcept nogil
+cdef void put_rates_after(Model m, Kick k) noexcept nogil
 cdef void sensed_handle(Model m, State s, Kick k) noexcept nogil
 cdef void prepare_sensor(Model m, State s, Kick k) noexcept nogil
 cdef double force_along_z(Model m, Kick k, double fx, double fy, double ax, double ay) noexcept nogil

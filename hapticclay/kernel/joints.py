@@ -1,8 +1,8 @@
 """An arm of any joints on the engine's terms: its inertia and bias, and how a kick moves it.
 
-The handle moves along the two axes of the clay's plane, x and y here, and perhaps along a third, z.
-Nothing but the hand acts along z, so that it is eliminated: in the plane all laws of the clay see an
-arm of another mobility (docs/equations.md).
+The handle moves along the two axes of the clay's plane, here x and y, and perhaps along a third, z.
+Nothing but the hand acts along z, which is eliminated: in the plane all laws of the clay see an arm
+of another mobility (docs/equations.md).
 """
 
 import math
@@ -15,6 +15,7 @@ def sense(m, s):
     if s.sensed:
         return
     s.sensed, e, n = 1, m.engine, m.joints
+    e.factored = -1.0
     if m.closed:
         for i in range(n):
             e.pose[i] = s.q[i]
@@ -31,8 +32,8 @@ def sense(m, s):
     for i in range(n):
         at = m.dof[i] * e.freedoms
         for j in range(n):
-            e.I[i * n + j] = e.M[at + m.dof[j]]
-    gather(m, e.J, e.A)
+            e.joint_M[i * n + j] = e.M[at + m.dof[j]]
+    gather(m, e.J, e.joint_J)
 
 
 def gather(m, J, A):
@@ -50,14 +51,14 @@ def put_rates(m, k, rates, g, h):
             e.pose[n + i] = rates[i] + h * g[i]
         e.at_rates(e.pose)
         for i in range(m.axes):
-            k.axis[i].c = e.C[i]
+            k.axis[i].c = e.joint_c[i]
         return
     for i in range(n):
         e.w[m.dof[i]] = rates[i] + h * g[i]
     e.com_vel(e.model, e.data)
     e.bias(e.model, e.data, 0, e.forces)
     for i in range(n):
-        e.B[i] = e.forces[m.dof[i]]
+        e.joint_bias[i] = e.forces[m.dof[i]]
     if not m.hand:
         return
     e.jacobian_rate(e.model, e.data, e.Jdot, e.none, e.handle, e.body)
@@ -81,7 +82,7 @@ def handle_velocity(m, k, rates):
         o = k.axis[i]
         o.v = 0.0
         for j in range(n):
-            o.v += e.A[i * n + j] * rates[j]
+            o.v += e.joint_J[i * n + j] * rates[j]
 
 
 def handle_at(m, s, k):
@@ -119,14 +120,14 @@ def before_kick(m, s, k):
 
 
 def from_event(m, s, k):
-    """As `before_kick`, at an event, whose change of the torques gives the acceleration after it."""
+    """As `before_kick`, at an event: the change of the torques gives the acceleration after it."""
     e, change = m.engine, 0.0
     for i in range(m.joints):
         e.free[i] = s.next.tau[i] - s.e.tau[i]
         change += abs(e.free[i])
     if change > 0.0:
         factor_inertia(m, 0.0)
-        solve(e.lower, e.free, 0, m.joints)
+        solve(e.lower, 0, e.free, 0, m.joints)
     for i in range(m.joints):
         e.free[i] += s.e.g[i]
     put_rates(m, k, k.o, e.free, 0.5 * k.H)
@@ -148,34 +149,72 @@ def move_under(m, s, k):
     kick.load(m, s, k)
     for i in range(m.axes):
         k.axis[i].f += m.weight[i]
-    drive(m, s, k)
+    put_momentum(m, s, k)
+    factor_inertia(m, k.H * k.R)
+    if m.acts or is_touched(m, k):
+        put_mobility(m, k)
+        drive(m, s, k)
+    else:
+        drive_alone(m, k)
+
+
+def put_momentum(m, s, k):
+    """Momentum after a kick without friction, and without force at the handle, by joints."""
+    e, n = m.engine, m.joints
+    for i in range(n):
+        x = k.H * (
+            k.tau[i] - e.joint_bias[i] + m.pull[i] - m.spring[i] * s.q[i] - k.L * damping(m, k.o, i)
+        )
+        for j in range(n):
+            x += e.joint_M[i * n + j] * k.o[j]
+        e.moment[i] = x
+
+
+def is_touched(m, k):
+    """Whether the handle has a load that is not that of clay."""
+    load = 0.0
+    for i in range(m.axes):
+        load += abs(k.axis[i].f) + k.axis[i].d
+    return load > 0.0
+
+
+def drive_alone(m, k):
+    """Motion where nothing acts on the handle."""
+    e, n = m.engine, m.joints
+    for i in range(m.axes):
+        o = k.axis[i]
+        o.net = o.fe = 0.0
     if m.friction:
         joint_friction.find(m, k)
-        drive(m, s, k)
-    kick.move(m, s, k)
+    for i in range(n):
+        e.free[i] = e.moment[i] + k.H * k.slip[i]
+    solve(e.lower, 0, e.free, 0, n)
+    put_rates_after(m, k)
+    for i in range(m.axes):
+        o = k.axis[i]
+        o.u = 0.0
+        for j in range(n):
+            o.u += e.joint_J[i * n + j] * k.w[j]
 
 
 def drive(m, s, k):
-    """Rates after a kick without force at the handle, the mobility, and the law of the plane."""
+    """Motion where something acts on the handle: by the law of the plane."""
     e, n = m.engine, m.joints
+    if m.friction:
+        joint_friction.find(m, k)
     for i in range(n):
-        torque = k.tau[i] + k.slip[i] - e.B[i] + m.pull[i] - m.spring[i] * s.q[i]
-        x = k.H * (torque - k.L * damping(m, k.o, i))
-        for j in range(n):
-            x += e.I[i * n + j] * k.o[j]
-        e.moment[i] = e.free[i] = x
-    factor_inertia(m, k.H * k.R)
-    solve(e.lower, e.free, 0, n)
-    put_mobility(m, k)
+        e.free[i] = e.moment[i] + k.H * k.slip[i]
+    solve(e.lower, 0, e.free, 0, n)
     rate = 1.0 / k.H
     for i in range(m.axes):
         o, x = k.axis[i], 0.0
         for j in range(n):
-            x += e.A[i * n + j] * e.free[j]
+            x += e.joint_J[i * n + j] * e.free[j]
         o.n, o.a, o.rest = rate, rate * x, rate * (x - o.v)
     k.Sxx, k.Sxy, k.Syy = k.Wxx, k.Wxy, k.Wyy
     if m.axes > 2:
         eliminate(k, k.z.d)
+    kick.move(m, s, k)
 
 
 def damping(m, w, i):
@@ -183,35 +222,46 @@ def damping(m, w, i):
     e, x = m.engine, m.damper[i] * w[i]
     if m.closed:
         for j in range(m.joints):
-            x += e.D[i * m.joints + j] * w[j]
+            x += e.joint_D[i * m.joints + j] * w[j]
     return x
 
 
 def factor_inertia(m, h):
     """Cholesky factor of the inertia, with the damping of the joints over a time h."""
     e, n = m.engine, m.joints
+    if e.factored == h:
+        return
+    e.factored = h
     for i in range(n):
         for j in range(i + 1):
-            x = e.I[i * n + j]
-            if i == j:
-                x += h * m.damper[i]
+            e.lower[i * n + j] = e.joint_M[i * n + j]
             if m.closed:
-                x += h * e.D[i * n + j]
-            for l in range(j):
-                x -= e.lower[i * n + l] * e.lower[j * n + l]
-            e.lower[i * n + j] = math.sqrt(x) if i == j else x / e.lower[j * n + j]
+                e.lower[i * n + j] += h * e.joint_D[i * n + j]
+        e.lower[i * n + i] += h * m.damper[i]
+    factor(e.lower, 0, n)
 
 
-def solve(lower, x, at, n):
-    """Solves L L' y = x in place, x from index `at` on."""
+def factor(A, at, n):
+    """Replaces the lower half of a matrix by its Cholesky factor, with reciprocal diagonal."""
+    for i in range(n):
+        for j in range(i + 1):
+            p, q = at + i * n, at + j * n
+            x = A[p + j]
+            for r in range(j):
+                x -= A[p + r] * A[q + r]
+            A[p + j] = 1.0 / math.sqrt(x) if i == j else x * A[q + j]
+
+
+def solve(L, of, x, at, n):
+    """Solves L L' y = x in place: L from index `of` on, as `factor` left it, x from `at` on."""
     for i in range(n):
         for j in range(i):
-            x[at + i] -= lower[i * n + j] * x[at + j]
-        x[at + i] /= lower[i * n + i]
+            x[at + i] -= L[of + i * n + j] * x[at + j]
+        x[at + i] *= L[of + i * n + i]
     for i in range(n - 1, -1, -1):
         for j in range(i + 1, n):
-            x[at + i] -= lower[j * n + i] * x[at + j]
-        x[at + i] /= lower[i * n + i]
+            x[at + i] -= L[of + j * n + i] * x[at + j]
+        x[at + i] *= L[of + i * n + i]
 
 
 def put_mobility(m, k):
@@ -219,8 +269,8 @@ def put_mobility(m, k):
     e, n = m.engine, m.joints
     for i in range(m.axes):
         for j in range(n):
-            e.Y[i * n + j] = e.A[i * n + j]
-        solve(e.lower, e.Y, i * n, n)
+            e.Y[i * n + j] = e.joint_J[i * n + j]
+        solve(e.lower, 0, e.Y, i * n, n)
     k.Wxx, k.Wxy, k.Wyy = mobility(m, 0, 0), mobility(m, 0, 1), mobility(m, 1, 1)
     if m.axes > 2:
         k.Wxz, k.Wyz, k.Wzz = mobility(m, 0, 2), mobility(m, 1, 2), mobility(m, 2, 2)
@@ -229,8 +279,8 @@ def put_mobility(m, k):
 def mobility(m, i, j):
     """Acceleration of the handle along one axis per force along another [1/kg]."""
     e, n, x = m.engine, m.joints, 0.0
-    for l in range(n):
-        x += e.A[i * n + l] * e.Y[j * n + l]
+    for r in range(n):
+        x += e.joint_J[i * n + r] * e.Y[j * n + r]
     return x
 
 
@@ -257,7 +307,17 @@ def answer(m, k):
         x = 0.0
         for i in range(m.axes):
             x += e.Y[i * n + j] * k.axis[i].net
-        k.w[j] = e.free[j] + k.H * x
+        e.free[j] += k.H * x
+    put_rates_after(m, k)
+
+
+def put_rates_after(m, k):
+    """Joint rates and accelerations of a kick; a joint that friction holds rests."""
+    e = m.engine
+    for j in range(m.joints):
+        k.w[j] = e.free[j]
+        if m.friction and m.slip[j] > 0.0 and e.pivots[j] == 0:
+            k.w[j] = 0.0
         k.g[j] = (k.w[j] - k.o[j]) / k.H
 
 
@@ -276,16 +336,16 @@ def prepare_sensor(m, s, k):
     e, n = m.engine, m.joints
     put_rates(m, k, s.e.w, s.e.w, 0.0)
     for i in range(n):
-        torque = s.e.tau[i] + s.e.slip[i] - e.B[i] + m.pull[i] - m.spring[i] * s.q[i]
+        torque = s.e.tau[i] + s.e.slip[i] - e.joint_bias[i] + m.pull[i] - m.spring[i] * s.q[i]
         e.free[i] = torque - damping(m, s.e.w, i)
     factor_inertia(m, 0.0)
-    solve(e.lower, e.free, 0, n)
+    solve(e.lower, 0, e.free, 0, n)
     put_mobility(m, k)
     for i in range(m.axes):
         o = k.axis[i]
         o.n, o.rest = 1.0, 0.0
         for j in range(n):
-            o.rest += e.A[i * n + j] * e.free[j]
+            o.rest += e.joint_J[i * n + j] * e.free[j]
         o.a = o.rest
     if m.axes > 2:
         z = k.z
@@ -324,7 +384,7 @@ def step(m, s, k, h):
     e.timestep[0] = h
     e.move(e.model, e.data)
     for j in range(n):
-        s.q[j], s.w[j], s.g[j] = e.q[m.dof[j]], e.w[m.dof[j]], k.g[j]
+        s.q[j], s.w[j], s.g[j] = e.q[m.dof[j]], k.w[j], k.g[j]
 
 
 # ---- a row ---------------------------------------------------------------------------------------

@@ -7,7 +7,20 @@ many steps as it needs, and the run takes the last.
 import math
 
 from ..formulas import regions
-from . import arm, borders, ends, hits, joints, laws, march, memory, methods, sampled, springs, viscous
+from . import (
+    arm,
+    borders,
+    ends,
+    hits,
+    joints,
+    laws,
+    march,
+    memory,
+    methods,
+    sampled,
+    springs,
+    viscous,
+)
 
 OPEN, FINISHED, TIME_LIMIT, NOT_FINITE, UNRESOLVED = range(5)  # status of a run
 # to a region within one sample: a handle that slides along a border then completes the step
@@ -190,9 +203,6 @@ def step_to_event(m, s):
     elif not methods.is_sound(m, s):
         s.code = NOT_FINITE
     else:
-        if not m.general:
-            w = m.engine.w
-            w[0], w[1] = s.w[0], s.w[1]  # after a hit: the velocity after half a kick
         take(m, s, after, target)
         if axis >= 0:
             cross(m, s, axis, up)

@@ -75,13 +75,13 @@ class Engine:
     scratch_q: floats
     scratch_handle: floats
     scratch_forces: floats
-    scratch_A: floats  # at measured angles: Jacobian of the handle, torques that hold the arm
-    scratch_B: floats
-    I: floats  # by the joints: inertia, Jacobian of the handle, bias; of a closed chain, dampers
-    A: floats
-    B: floats
-    D: floats
-    C: floats  # centripetal acceleration of the handle of a closed chain
+    scratch_J: floats  # at measured angles: Jacobian of the handle, torques that hold the arm
+    scratch_bias: floats
+    joint_M: floats  # by the joints: inertia, Jacobian of the handle, bias torques
+    joint_J: floats
+    joint_bias: floats
+    joint_D: floats  # of a closed chain: dampers of its followers, centripetal acceleration
+    joint_c: floats
     pose: floats  # positions and rates given to the functions of a closed chain
     at_pose: own_control
     at_rates: own_control
@@ -91,10 +91,11 @@ class Engine:
     body: whole
     freedoms: whole
     # scratch of a kick
+    factored: real  # time over which dampers stand in that factor
     lower: floats  # Cholesky factor of the inertia of a kick, by rows
     Y: floats  # rates of the joints per force of the handle, by joint and axis
-    free: floats  # rates after a kick without that force
-    moment: floats  # H times the torques, and the momentum before
+    free: floats  # rates after a kick, at first without that force
+    moment: floats  # momentum after a kick without friction and that force
     matrix: floats  # scratch of the solution with friction
     pivots: wholes
 

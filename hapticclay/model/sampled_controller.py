@@ -33,11 +33,11 @@ class Controller:
     """A controller that replaces compensator and servo in a sampled loop.
 
     The function is called once a control sample as law(t, q, qd, fh, state, params) and returns
-    (torques, state): t [s]; q [rad] and qd [rad/s], measured at shoulder and elbow, or at each joint
-    of an arm from a file; fh [N], measured force of the hand on the handle along its axes; state
-    and params, tuples of floats. The torques [N.m], one for each joint, are held for a sample, within the torque limits and after converter and
-    delay of the hardware. The next call receives the state. The law must render the clay itself,
-    unless the scenario's `render` is "physical".
+    (torques, state): t [s]; q [rad] and qd [rad/s], measured at shoulder and elbow, or at each
+    joint of an arm from a file; fh [N], measured force of the hand along the axes of the handle;
+    state and params, tuples of floats. The torques of the joints [N.m] are held for a sample,
+    within the torque limits and after converter and delay of the hardware. The next call receives
+    the state. The law must render the clay itself, unless the scenario's `render` is "physical".
 
     Python runs it, in compiled runs too. Values that change from call to call belong in the state,
     or a run cannot return to an earlier sample.
@@ -70,6 +70,11 @@ class Controller:
         """A function compares equal to its name, because files store the name."""
         name = self.law if isinstance(self.law, str) else function_name(self.law)
         return name or self.law, self.state, self.params
+
+    @property
+    def words(self) -> str:
+        """The function by name."""
+        return str(getattr(self.law, "__name__", self.law))
 
     def function(self) -> Law:
         """The function; a name is imported now, which executes its module.
@@ -127,7 +132,7 @@ class LawCaller:
             self._put_torques((math.nan,) * self._joints)
 
     def _answer(self) -> None:
-        n, (middle, end) = self._joints, self._ends
+        n, (middle, _) = self._joints, self._ends
         t, *measured = self.buffer[: self._torque].tolist()
         q, qd, fh = measured[:n], measured[n : 2 * n], measured[2 * n :]
         state = tuple(self.buffer[self.start : middle].tolist())

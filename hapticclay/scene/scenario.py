@@ -21,7 +21,7 @@ from ..model import samples, shapes  # noqa: F401  # so that files and options k
 from ..model.arm import PAPER, Arm
 from ..model.clay import Clay
 from ..model.compensator import PRINTED, Compensator
-from ..model.constants import GAIN, ORIGIN, PATH_LENGTH, TORQUE_LIMIT, TS, each_axis
+from ..model.constants import AXES, GAIN, ORIGIN, PATH_LENGTH, TORQUE_LIMIT, TS, each_axis
 from ..model.controller import SERVO, Servo
 from ..model.hardware import Hardware
 from ..model.operator import Operator, mobility_with
@@ -52,7 +52,8 @@ Integrator = Literal["fast", "accurate"]
 Control = Literal["continuous", "sampled"]
 Render = Literal["held", "physical"]
 
-CONTINUOUS: Any = "".join(("contin", "uous"))  # this very text is a control that was not given
+FORCE = (1.0, 0.0)  # [N] of this object, as of the next, it is known that it was not given
+CONTINUOUS: Any = "".join(("contin", "uous"))
 SCENARIO_SCHEMA, SCENARIO_SCHEMA_0_2 = "hapticclay-scenario-2", "hapticclay-scenario-1"
 EXPERIMENTS: dict[str, Any] = {}  # classes of `experiments`, by their name in files
 
@@ -69,7 +70,8 @@ class Scenario:
         clay: the virtual clay; None for free space.
         gain: compensator gain K on each axis, 0 to 1e6 [1/kg] for the printed compensator, whose
             virtual mass is 1/K; 0 turns the compensator off.
-        force: constant part of the operator's muscle force uh on each axis [N].
+        force: constant part of the operator's muscle force uh on each axis [N]; none for an arm
+            from a file where it is not given.
         operator: impedance Th of the operator's arm, of both axes or a pair (x, y); None for a
             pure force (Th = 0).
         inertia_shaping: whether the servo shapes the handle's inertia, so that Sh holds at every
@@ -108,7 +110,7 @@ class Scenario:
     name: str = "free"
     clay: Clay | None = None
     gain: Annotated[tuple[float, float], Bound(0.0, 1e6, "1/kg")] = GAIN
-    force: Force = (1.0, 0.0)
+    force: Force = FORCE
     operator: Operator | None | tuple[Operator | None, Operator | None] = None
     inertia_shaping: bool = False
     dt: StepLength = TS
@@ -140,7 +142,7 @@ class Scenario:
         check_fields(self)
         check_scene(self)
         if isinstance(self.controller, JointPD):
-            checked_law(self.controller, getattr(self.arm, "names", JOINTS))
+            checked_law(self.controller, self.joints)
         if self.Ts is not None:
             if self.control != "sampled":
                 raise ParameterError("Ts", self.Ts, "must be None unless control is 'sampled'")
@@ -251,6 +253,16 @@ class Scenario:
         return mobility_with(self.free_mobility, mass)
 
     @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes of the handle, in the order of arrays."""
+        return AXES if isinstance(self.arm, Arm) else tuple(self.arm.axes)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints of the arm."""
+        return JOINTS if isinstance(self.arm, Arm) else self.arm.names
+
+    @property
     def is_closed_form(self) -> bool:
         """Whether the arm is the two-link arm in closed form, and not one from a file."""
         return isinstance(self.arm, Arm)
@@ -355,7 +367,12 @@ class Scenario:
 
 def _suit_arm(s: Scenario) -> None:
     """Sets what was not given to what an arm from a file can have."""
-    for name, default, value in (("control", CONTINUOUS, "sampled"), ("length", PATH_LENGTH, None)):
+    suited = {
+        "control": (CONTINUOUS, "sampled"),
+        "length": (PATH_LENGTH, None),
+        "force": (FORCE, (0.0, 0.0)),
+    }
+    for name, (default, value) in suited.items():
         if getattr(s, name) is default:
             object.__setattr__(s, name, value)
 
@@ -393,7 +410,9 @@ def _check_arm(s: Scenario) -> None:
             bound = f"must be None {with_arm}"
             raise ParameterError(f"hardware.{name}", getattr(io, name), bound)
     if isinstance(law, JointPD) and io is not None and io.velocity != "exact":
-        raise ParameterError("hardware.velocity", io.velocity, "must be 'exact': the law has its own")
+        raise ParameterError(
+            "hardware.velocity", io.velocity, "must be 'exact': the law has its own"
+        )
     _check_arm_in_clay(s)
 
 

@@ -1,4 +1,4 @@
-"""Energy of an arm from a file: of its motion, weight and springs, and of the hand at its handle."""
+"""Energy of an arm from a file: of motion, weight and springs, and of the hand at its handle."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ def stored(scenario: Scenario, m: Any, s: Any) -> tuple[float, float]:
     axes = ["xyz".index(c) for c in arm.axes]
     p = arm.handle(q)[axes] - np.array(m.at[: m.axes])
     v = arm.jacobian(q)[axes] @ w
-    masses, springs = (np.array([getattr(a, x) for a in m.axis[: m.axes]]) for x in ("mass", "spring"))
+    masses, springs = (
+        np.array([getattr(a, x) for a in m.axis[: m.axes]]) for x in ("mass", "spring")
+    )
     weight = np.array(m.weight[: m.axes])
     return arms, float(0.5 * (masses @ v**2 + springs @ p**2) - weight @ p)

@@ -469,7 +469,11 @@ class Run:
     def is_diverging(self) -> bool:
         """Whether the monitor would find the run unstable by now."""
         watch, n = copy.deepcopy(self.watch), self.filled
-        _, found = watch.look(self._for_monitor(self.buffers.rows[:n], self.extra(n)), self.judged) if n else (0, None)
+        _, found = (
+            watch.look(self._for_monitor(self.buffers.rows[:n], self.extra(n)), self.judged)
+            if n
+            else (0, None)
+        )
         return found is not None or watch.onset is not None
 
     # ---- the record

@@ -14,7 +14,7 @@ import numpy as np
 from ..arguments import checked
 from ..errors import ParameterError, integer, number, numbers_of, pair
 from ..kernel.engine import warnings_caught
-from ..model.hardware import JOINTS
+from ..kernel.row import SHOWN
 from ..model.operator import Operator
 from ..model.sampled_controller import Controller
 from ..scene.plausible import warn_implausible
@@ -113,7 +113,7 @@ class Simulation:
         kept = self._kept() | {"keep_for_monitor": True}
         self._run = Run(scenario, 1, self._maker, self._workspace, **kept)
         self._given, self._wall = scenario, 0.0
-        self._torque: tuple[float, float] | None = None
+        self._torque: tuple[float, ...] | None = None
         self._forget()
 
     def _kept(self) -> dict[str, bool]:
@@ -273,7 +273,9 @@ class Simulation:
                 if force != run.scenario.force:
                     run.change_force(force)
             if torque is not None:
-                self._drive(numbers_of("torque", torque, JOINTS, -MOST, MOST, unit="N.m"))
+                self._drive(
+                    numbers_of("torque", torque, run.scenario.joints, -MOST, MOST, unit="N.m")
+                )
             self._state, begin = None, time.perf_counter()
             goal = run.i + n
             with warnings_caught():
@@ -365,14 +367,15 @@ class Simulation:
             if run.scenario.control != "sampled":
                 bound = "must be 'sampled' where torques are given"
                 raise ParameterError("control", run.scenario.control, bound)
-            if run.i or run.scenario.controller:
+            own = run.scenario.is_closed_form and run.scenario.controller
+            if run.i or own:
                 bound = "must be given from the first step on, and not beside a controller"
                 raise ParameterError("torque", torque, bound)
             self._take_over(torque)
-        self._torque = torque[0], torque[1]
+        self._torque = torque
 
     def _take_over(self, torque: tuple[float, ...]) -> None:
-        self._torque = torque[0], torque[1]
+        self._torque = torque
         self._run.take_over(Controller(lambda *measured: (self._torque, ())))
 
 

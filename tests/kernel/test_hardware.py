@@ -278,10 +278,7 @@ def test_window_divides_the_noise_of_an_encoder():
     for m in (1, 4, 16):
         q = [formula.encode(w * k * Ts, counts) for k in range(4000)]
         v = np.array(
-            [
-                formula.velocity_difference(k - m, q[k - m], k, q[k], Ts)
-                for k in range(m, 4000)
-            ]
+            [formula.velocity_difference(k - m, q[k - m], k, q[k], Ts) for k in range(m, 4000)]
         )
         step = math.tau / counts / (m * Ts)
         np.testing.assert_allclose(v / step, np.round(v / step), atol=1e-6)
@@ -312,9 +309,9 @@ def test_difference_lags_half_its_window_in_a_run():
         run = Run(replace(s, hardware=hc.Hardware(velocity="difference", velocity_window=m)), 1)
         shown = []
         for _ in range(run.row.m.last):
-            run.advance(run.filled + 1)  # one step; the kick to its sample ended with e.w[0], e.w[1]
+            run.advance(run.filled + 1)  # one step; the kick to its sample ended with e.w
             s_ = run.row.s
-            shown.append(((s_.e.w1, s_.e.w2), (s_.now.x.w, s_.now.y.w)))
+            shown.append((s_.e.w[:2], s_.now.w[:2]))
         true, seen = np.array([x[0] for x in shown]), np.array([x[1] for x in shown])
         late = np.array([np.mean(true[max(k - m, 0) : k + 1], axis=0) for k in range(len(true))])
         # trapezoid against the integral: second differences of the rate

@@ -243,7 +243,7 @@ def first_kick(run, friction, Fy, tau, w):
     for z in s.axis:
         z.Fy, z.Kn, z.n = z.old_Fy, z.old_Kn, z.old_n = Fy, 0.0, 1.0
     s.w[0], s.w[1] = w
-    s.now.x.tau, s.now.y.tau = tau
+    s.now.tau[:2] = tau
     sampled.across(m, s, k, m.dt)
     return k
 
