@@ -7,7 +7,8 @@ from . cimport kick
 
 cdef void sense(Model m, State s) noexcept nogil
 cdef void gather(Model m, double *J, double *A) noexcept nogil
-cdef void put_rates(Model m, Kick k, double *rates, double *g, double h) noexcept nogil
+cdef void turn(Model m, Kick k, double *rates, double *g, double h) noexcept nogil
+cdef void put_centripetal(Model m, Kick k) noexcept nogil
 cdef void place(Model m, Kick k, double *of) noexcept nogil
 cdef void handle_velocity(Model m, Kick k, double *rates) noexcept nogil
 cdef void handle_at(Model m, State s, Kick k) noexcept nogil

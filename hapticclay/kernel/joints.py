@@ -43,8 +43,11 @@ def gather(m, J, A):
             A[i * m.joints + j] = J[m.row[i] * m.engine.freedoms + m.dof[j]]
 
 
-def put_rates(m, k, rates, g, h):
-    """Bias torques and the handle's centripetal acceleration, at rates some time h later."""
+def turn(m, k, rates, g, h):
+    """Centripetal acceleration of the handle at rates, and bias torques at those some time h later.
+
+    As in the closed form of sampled control, a hand with a mass is so first-order in the step.
+    """
     e, n = m.engine, m.joints
     if m.closed:
         for i in range(n):
@@ -53,19 +56,28 @@ def put_rates(m, k, rates, g, h):
         for i in range(m.axes):
             k.axis[i].c = e.joint_c[i]
         return
+    for i in range(m.axes):
+        k.axis[i].c = 0.0
+    if m.x.mass > 0.0:
+        for i in range(n):
+            e.w[m.dof[i]] = rates[i]
+        e.com_vel(e.model, e.data)
+        put_centripetal(m, k)
     for i in range(n):
         e.w[m.dof[i]] = rates[i] + h * g[i]
     e.com_vel(e.model, e.data)
     e.bias(e.model, e.data, 0, e.forces)
     for i in range(n):
         e.joint_bias[i] = e.forces[m.dof[i]]
-    if not m.hand:
-        return
+
+
+def put_centripetal(m, k):
+    """Centripetal acceleration of the handle at the engine's rates."""
+    e = m.engine
     e.jacobian_rate(e.model, e.data, e.Jdot, e.none, e.handle, e.body)
     for i in range(m.axes):
         o, at = k.axis[i], m.row[i] * e.freedoms
-        o.c = 0.0
-        for j in range(n):
+        for j in range(m.joints):
             o.c -= e.Jdot[at + m.dof[j]] * e.w[m.dof[j]]
 
 
@@ -116,7 +128,7 @@ def before_kick(m, s, k):
     for i in range(m.joints):
         k.o[i] = s.w[i]
     handle_at(m, s, k)
-    put_rates(m, k, s.w, s.g, 0.5 * k.H)
+    turn(m, k, s.w, s.g, 0.5 * k.H)
 
 
 def from_event(m, s, k):
@@ -130,7 +142,7 @@ def from_event(m, s, k):
         solve(e.lower, 0, e.free, 0, m.joints)
     for i in range(m.joints):
         e.free[i] += s.e.g[i]
-    put_rates(m, k, k.o, e.free, 0.5 * k.H)
+    turn(m, k, k.o, e.free, 0.5 * k.H)
     for i in range(m.axes):
         o, z = k.axis[i], s.e.axis[i]
         o.p, o.v, o.owed0, o.stuck0, o.anchor0 = z.p, z.v, z.owed, z.stuck, z.anchor
@@ -334,7 +346,7 @@ def sensed_handle(m, s, k):
 def prepare_sensor(m, s, k):
     """The arm at a sample, before it accelerates: its mobility, and `rest` without any force."""
     e, n = m.engine, m.joints
-    put_rates(m, k, s.e.w, s.e.w, 0.0)
+    turn(m, k, s.e.w, s.e.w, 0.0)
     for i in range(n):
         torque = s.e.tau[i] + s.e.slip[i] - e.joint_bias[i] + m.pull[i] - m.spring[i] * s.q[i]
         e.free[i] = torque - damping(m, s.e.w, i)

@@ -80,7 +80,7 @@ TRAITS = (
             "passivity controller": Refusal("hardware.passivity", _NO_LOOP),
             "virtual coupling": Refusal("hardware.coupling", _NO_LOOP),
             "joint friction": Refusal(
-                "hardware.friction", "must be 0 with an arm from a file, which has MjcfArm(friction)"
+                "hardware.friction", "must be 0 with an arm from a file: MjcfArm(friction)"
             ),
             "force noise": _IDEAL,
             "force filter": _IDEAL,
