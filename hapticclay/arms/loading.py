@@ -253,6 +253,9 @@ def _per_joint(
     low, high, *units = BOUNDS[field]
     out = [float(x) for x in old]
     for i, x in pairs.items():
+        if field == "torque_limit" and x == math.inf:
+            out[i] = math.inf
+            continue
         unit = units[int(model.jnt_type[joints[i]]) == SLIDE]
         out[i] = number(f"{field}[{names[i]}]", x, low, high, unit=unit)
     return out

@@ -7,6 +7,7 @@ Constraints are projected out exactly, where the engine's own are soft.
 from __future__ import annotations
 
 import copy
+import threading
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -69,13 +70,20 @@ class Mechanism:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-        self._data = mujoco.MjData(model)
+        self._own = threading.local()  # data of each thread
         self.dofs = list(dofs)
         self._place(pose)
         rows = self._constraints()[0]
         moved = [i for i in range(model.nv) if np.any(rows[:, i])] if len(rows) else []
         self.following = [i for i in moved if i not in self.dofs]
         self.pose = self._closed(pose)
+
+    @property
+    def _data(self) -> Any:
+        """The engine's data, of this thread alone."""
+        if not hasattr(self._own, "data"):
+            self._own.data = self._mujoco.MjData(self._model)
+        return self._own.data
 
     # ---- one pose
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -67,6 +68,12 @@ class MjcfArm:
         for name, value in loaded.fields.items():
             object.__setattr__(self, name, value)
         object.__setattr__(self, "_loaded", loaded)
+
+    def __reduce__(self) -> Any:
+        fields = {x.name: getattr(self, x.name) for x in dataclasses.fields(self)}
+        if not isinstance(self.file, str):  # a spec, whose defaults and assets its XML has
+            fields["file"] = self.file.to_xml()
+        return _arm_of, (fields, isinstance(self.file, str))
 
     def __repr__(self) -> str:
         return f"<MjcfArm {self.name}: {', '.join(self.names)}>"
@@ -188,3 +195,12 @@ class MjcfArm:
             bound = f"must be {len(self.names)} finite numbers ({', '.join(self.names)})"
             raise ParameterError("q", place.tolist(), bound)
         return place
+
+
+def _arm_of(fields: dict[str, Any], is_file: bool) -> MjcfArm:
+    """An arm again, from its fields and the XML of its spec."""
+    if not is_file:
+        from ..physics import mujoco
+
+        fields["file"] = mujoco.MjSpec.from_string(fields["file"])
+    return MjcfArm(**fields)

@@ -404,7 +404,7 @@ def step(m, s, k, h):
 
 def width(m):
     """Numbers of the part of a row that such an arm adds: q, q', tau; p, v and force of hand z."""
-    return 3 * m.joints + 3
+    return 3 * m.joints + (3 if m.axes > 2 else 0)
 
 
 def write(m, s, k, share):

@@ -111,7 +111,7 @@ class Pattern:
         """Puts delays of the torques into models; the ring that all use, one after the other."""
         whole, share = np.array([scene.delay_in_samples(x, self.row.m.Ts) for x in delays]).T
         out["delay"], out["queue_rows"] = delays, whole + scene.QUEUE
-        ring = np.zeros(int(hardware.QUEUED * (whole.max() + scene.QUEUE)))
+        ring = np.zeros(int((hardware.QUEUED + 2) * (whole.max() + scene.QUEUE)))
         out["queue"] = ring.ctypes.data
         if not self.row.m.guard:
             return ring

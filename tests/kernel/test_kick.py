@@ -79,7 +79,7 @@ def kick_by_laws(run, before, after):
     H, L, R = (0.5 * (before + after), before / (before + after), after / (before + after))
     formed = run.row.m.formed
     hands, links = [th or NO_HAND for th in s.operators], s.arm.links
-    q, w1, w2, g1, g2 = (state.q1, state.q2), state.w1, state.w2, state.g1, state.g2
+    q, w1, w2, g1, g2 = state.q[:2], *state.w[:2], *state.g[:2]
     u = arm.jacobian(*q, links)
     p = Links(*links[:4]).forward(q) - s.origin
     v = arm.handle_velocity(w1, w1 + w2, u)
@@ -162,7 +162,7 @@ def test_the_kick_is_what_its_laws_say(name, x, before, after):
             axis.rate = 0.0
             axis.z[: orders[i]] = [0.1 * a for a in x[10 + 4 * i :][: orders[i]]]
     before, after = before * s.dt, after * s.dt
-    state.before, state.w1, state.w2 = before, *x[:2]
+    state.before, state.w[:2] = before, x[:2]
     u, f, tau, rates, shown, states = kick_by_laws(run, before, after)
     k = state.k
     kick.by_servo(m, state, k, after)
