@@ -32,8 +32,8 @@ class JointPD:
         friction: friction that the host feeds forward at each joint, (Fc, k, Fv) of the torque
             Fc tanh(k w) + Fv w [N.m, s/rad, N.m.s/rad]; None for none.
         gravity: whether the host feeds gravity forward; None for as the arm says.
-        reference: joint positions to which the law pulls [rad or m], in runs; None for the arm's
-            pose.
+        reference: joint positions to which the law pulls [rad], in runs, -1e3 to 1e3; [m] of
+            joints that slide; None for the arm's pose, or the angles at the start.
         velocity_bits: bits of the converter of the rates, 2 to 32; None for none.
         velocity_range: that converter spans -range to range [rad/s], > 0.
     """

@@ -111,7 +111,8 @@ class Part(Node):
             old = UNSET if old is UNSET else None
             return nodes_of(kind)[terms].write(getattr(value, terms), old, path, units)
         data = _fields_as_data(value, old, path, units)
-        usual = self._usual(classes) is kind and type(old) not in classes.values()
+        before = type(old) if type(old) in classes.values() else kind
+        usual = self._usual(classes) is kind is before
         if len(classes) == 1 or (usual and old is not UNSET) or KIND in nodes_of(kind):
             return data
         return {KIND: kind.__name__.lower(), **data}

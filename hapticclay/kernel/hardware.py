@@ -38,6 +38,11 @@ def measured(m, s, i, f):
         z, to = s.now.axis[i].filter, s.next.axis[i].filter
         to[0], to[1] = law.filter_step(m.filter, z[0], z[1], f)
         f = z[0]
+    return converted(m, f)
+
+
+def converted(m, f):
+    """An axis of the force after the converter [N]."""
     return law.quantize(f, m.adc_bits, m.adc_range)
 
 

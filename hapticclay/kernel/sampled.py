@@ -168,6 +168,8 @@ def sample(m, s):
         ux, uy = signals.push_now(m, s)
         fx, fy = on_sensor(m, s, seen, ux, uy)
         fx, fy = hardware.measured(m, s, 0, fx), hardware.measured(m, s, 1, fy)
+        if m.axes > 2:
+            s.fz = hardware.converted(m, s.fz)
     dx, dy = signals.command_over_sample(m, s)
     if not hardware.is_lost(m, s.now.k):
         s.responded = 1

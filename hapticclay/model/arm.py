@@ -74,9 +74,9 @@ TRAITS = (
         "arm from a file", "part", lambda s: not isinstance(s.arm, Arm), NO,
         {
             "fast": _SAMPLED,
-            "accurate": _SAMPLED,
+            "accurate": Refusal("integrator", "must be 'fast' where control is 'sampled'"),
             "inertia shaping": Refusal("inertia_shaping", _NO_LOOP),
-            "stays cut": Refusal("clay", "must not stay cut with an arm from a file"),
+            "groove": Refusal("clay", "must not stay cut with an arm from a file"),
             "passivity controller": Refusal("hardware.passivity", _NO_LOOP),
             "virtual coupling": Refusal("hardware.coupling", _NO_LOOP),
             "joint friction": Refusal(

@@ -183,21 +183,28 @@ class LawCaller:
             raise self.error
 
 
-_ALONE = Refusal(
-    "hardware", "must be without passivity controller and coupling with your own controller"
-)
-_SAMPLED = Refusal("control", "must be 'sampled' with your own controller")
+_REPLACES = {
+    "fast": Refusal("control", "must be 'sampled' with your own controller or a law of the joints"),
+    "inertia shaping": Refusal(
+        "inertia_shaping", "must be False with a controller, which replaces the servo"
+    ),
+    "passivity controller": Refusal(
+        "hardware", "must be without passivity controller and coupling with your own controller"
+    ),
+}
+_REPLACES["accurate"] = _REPLACES["fast"]
+_REPLACES["virtual coupling"] = _REPLACES["passivity controller"]
 TRAITS = (
     Trait(
-        "own controller", "part", lambda s: s.controller is not None, NO,
-        {
-            "fast": _SAMPLED,
-            "accurate": _SAMPLED,
-            "inertia shaping": Refusal(
-                "inertia_shaping", "must be False with a controller, which replaces the servo"
+        "own controller", "part", lambda s: isinstance(s.controller, Controller), NO, _REPLACES
+    ),
+    Trait(
+        "joint law", "part",
+        lambda s: s.controller is not None and not isinstance(s.controller, Controller), NO,
+        _REPLACES | {
+            "velocity by difference": Refusal(
+                "hardware.velocity", "must be 'exact' with a law of the joints, which has its own"
             ),
-            "passivity controller": _ALONE,
-            "virtual coupling": _ALONE,
         },
     ),
 )  # fmt: skip

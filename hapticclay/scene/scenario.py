@@ -405,14 +405,9 @@ def _check_arm(s: Scenario) -> None:
     if io is not None and io.dac_bits and not all(map(math.isfinite, limits)):
         bound = "must be finite where a converter gives the torques, whose range it is"
         raise ParameterError("arm.torque_limit", limits, bound)
-    for name in ("adc_bits", "dac_range"):
-        if io is not None and getattr(io, name) is not None:
-            bound = f"must be None {with_arm}"
-            raise ParameterError(f"hardware.{name}", getattr(io, name), bound)
-    if isinstance(law, JointPD) and io is not None and io.velocity != "exact":
-        raise ParameterError(
-            "hardware.velocity", io.velocity, "must be 'exact': the law has its own"
-        )
+    if io is not None and io.dac_range is not None:
+        bound = f"must be None {with_arm}: its torque limits are the range"
+        raise ParameterError("hardware.dac_range", io.dac_range, bound)
     _check_arm_in_clay(s)
 
 
