@@ -39,7 +39,11 @@ def good_values(folder):
     smooth = {"x": (0.0, 0.1), "y": (0.0, 0.1), "values": ((1.0, 1.0), (1.0, 1.0))}
     arm = hc.MjcfArm(ARM)
     of_joints = {"arm": arm, "law": hc.JointPD((100.0, 50.0), (1.0, 0.5))}
+    device = hc.Device()
+    pair = {"pair": hc.Pair(device, device, hc.JointPD((100.0,), (5.0,)))}
     by_function = {
+        "pair_limits": pair, "pair_map": {**pair, "gains": 3, "delays": 3}, "compare_links": pair,
+        "Pair": {"leader": device, "follower": device, "law": hc.JointPD((1.0,), (1.0,))},
         "joint_limits": of_joints, "over_poses": of_joints,
         "wall_limit": {"arm": arm, "B": 1.0, "operator": hc.Operator()},
         "MjcfArm": {"file": ARM}, "JointPD": {"Kp": (1.0,), "Kd": (1.0,)},
