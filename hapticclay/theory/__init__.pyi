@@ -12,6 +12,8 @@ from .design import Design as Design
 from .design import compare as compare
 from .design import design_gain as design_gain
 from .design import transparency_error as transparency_error
+from .fed_friction import FrictionCycle as FrictionCycle
+from .fed_friction import friction_cycle as friction_cycle
 from .gain_limits import gain_limit as gain_limit
 from .gain_limits import stiffness_limit as stiffness_limit
 from .hand_boxes import Box as Box

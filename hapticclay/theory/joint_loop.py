@@ -63,7 +63,8 @@ class JointLoop:
         Shapes (2n, 2n), (2n, n), (2n, n).
         """
         share = self.late[1]
-        whole, late = self._transition(self.Ts), self._transition((1.0 - share) * self.Ts)
+        whole = self._transition(self.Ts)
+        late = self._transition((1.0 - share) * self.Ts) if share else whole
         return whole[0], late[1], whole[1] - late[1]
 
     def _transition(self, t: float) -> tuple[np.ndarray, np.ndarray]:
@@ -173,8 +174,31 @@ class JointLoop:
         given = now + before / z if share > 0.0 else now
         x = np.linalg.solve(z * np.eye(2 * n) - step, given * z**-whole)
         q, w = x[:, :n], x[:, n:]
-        keep, gain = self.rate_filter
-        return q, w if self.velocity == "exact" else gain * (1.0 - 1.0 / z) / (1.0 - keep / z) * q
+        return q, w if self.velocity == "exact" else self.measured(theta)[:, None, None] * q
+
+    def opened(self, theta: np.ndarray) -> np.ndarray:
+        """The open loop, from a held torque around to the host's, shape (m, n, n)."""
+        q, v = self.open_responses(theta)
+        return -(self.position @ q + self.rate @ v)
+
+    def between_responses(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Position and measured rate per torque of a sine between samples, in the closed loop.
+
+        Both (m, n, n); theta of shape (m,) is the turn of the sine in a sample, > 0 and <= pi.
+        """
+        s = 1j * theta[:, None, None] / self.Ts
+        q = np.linalg.inv(self.inertia * s**2 + self.damping * s + self.stiffness)
+        v = self.measured(theta)[:, None, None] * q
+        back, rate = self.responses(theta)
+        fed = self.position @ q + self.rate @ v
+        return q - back @ fed, v - rate @ fed
+
+    def measured(self, theta: np.ndarray) -> np.ndarray:
+        """Measured rate per position of a sine at the samples, shape (m,)."""
+        if self.velocity == "exact":
+            return 1j * theta / self.Ts
+        (keep, gain), back = self.rate_filter, np.exp(-1j * theta)
+        return gain * (1.0 - back) / (1.0 - keep * back)
 
     def at_rest(self) -> np.ndarray:
         """Position per constant torque added to the host's [rad/(N.m)], shape (n, n)."""
@@ -188,7 +212,13 @@ class JointLoop:
 
     def feeding(self, position: np.ndarray, rate: np.ndarray) -> JointLoop:
         """The loop with more feedback in the held torque, shapes (n, n)."""
-        return replace(self, position=self.position + position, rate=self.rate + rate)
+        found = replace(self, position=self.position + position, rate=self.rate + rate)
+        return found.held_as(self)
+
+    def held_as(self, other: JointLoop) -> JointLoop:
+        """The loop itself, with what another one of the same joints, Ts and delay has computed."""
+        self.__dict__["hold"] = other.hold
+        return self
 
 
 def timing_words(Ts: float, delay: float) -> str:
