@@ -55,6 +55,7 @@ class WallLimit(Result):
 
     drawn_by = "hapticclay.views.joint_plots:wall_plot"
     written_as = "wall"
+    printed = {"wall": ("axis", "largest K [N/m]", "least K [N/m]", "buzz [Hz]", "mass [kg]")}
 
     def remarks(self) -> Sequence[str]:
         """What the verdict rests on."""

@@ -1,6 +1,7 @@
 """Arms from files: their mechanics against other derivations, and what is refused."""
 
 import math
+import re
 from pathlib import Path
 
 import mujoco
@@ -113,6 +114,15 @@ def test_a_pose_that_does_not_close_the_chain_is_told():
     text = (CARDS / "five_bar.xml").read_text().replace("1.31643921903851 2.18", "1.0 2.18")
     notes = hc.MjcfArm(mujoco.MjSpec.from_string(text)).notes
     assert "does not close the chain: right_elbow was moved by 0.316" in " ".join(notes)
+
+
+def test_connected_points_are_told():
+    """Drawn at its zero position, with all bars along x, a chain of other bars is made."""
+    assert "(0.075, 0, 0) of right_tip is (0.075, 0, 0) of left_tip [m]" in card("five_bar").notes
+    drawn = (CARDS / "five_bar.xml").read_text()
+    flat = re.sub(r' (ref|euler)="[^"]*"', "", drawn)
+    notes = hc.MjcfArm(mujoco.MjSpec.from_string(flat)).notes
+    assert "(0.075, 0, 0) of right_tip is (0.1, 0, 0) of left_tip [m]" in notes
 
 
 def test_values_by_name_and_by_place():
