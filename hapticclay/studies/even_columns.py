@@ -144,7 +144,7 @@ def _in_order(rows: Columns) -> tuple[Columns, list[str]]:
                 "two logs in one file?"
             )
             raise ParameterError(f"t[{row}]", float(stamps.t[row]), bound)
-        notes.append(f"{len(back)} rows came out of order and are sorted by their stamps")
+        notes.append(f"rows that came out of order are sorted by their stamps: {len(back)}")
         order = np.argsort(stamps.t, kind="stable")
         rows = {key: x[order] for key, x in rows.items()}
     same = np.ones(len(rows["t"]), dtype=bool)
@@ -152,7 +152,7 @@ def _in_order(rows: Columns) -> tuple[Columns, list[str]]:
     for x in rows.values():
         same[1:] &= np.diff(x) == 0.0
     if same.any():
-        notes.append(f"{np.count_nonzero(same)} rows repeat the row before and are left out")
+        notes.append(f"rows that repeat the row before are left out: {np.count_nonzero(same)}")
         rows = {key: x[~same] for key, x in rows.items()}
     return rows, notes
 
@@ -234,7 +234,8 @@ def _longest_part(rows: Columns, stamps: Stamps) -> tuple[Columns, list[str]]:
     t = stamps.t
     missing = int(np.sum(lengths[gaps]))
     share = missing / (missing + len(t))
-    told = f"{missing} rows are missing in {len(gaps)} gaps, at t = {times(t[gaps])} s"
+    where = f"{len(gaps)} gap{'s' * (len(gaps) > 1)}, at t = {times(t[gaps])} s"
+    told = f"{missing} rows are missing in {where}"
     if np.max(lengths) <= BRIDGED and share <= LOST:
         return rows, [f"{told}: bridged by cubics"]
     ends = gaps[lengths[gaps] > (BRIDGED if share <= LOST else 1.0)]
@@ -288,7 +289,7 @@ def _one_each(rows: Columns) -> tuple[Columns, list[str]]:
         return rows, []
     place = np.cumsum(apart) - 1
     count = np.bincount(place)
-    note = f"{np.count_nonzero(~apart)} rows less than a quarter of a step behind another: averaged"
+    note = f"rows within a quarter of a step of another are averaged: {np.count_nonzero(~apart)}"
     return {key: np.bincount(place, x) / count for key, x in rows.items()}, [note]
 
 

@@ -96,11 +96,11 @@ def test_rows_that_repeat_or_came_out_of_order():
     x, y = motion(T)
     rows = {"t": T[order], "input": x[order], "output": y[order]}
     found = even_columns(rows)
-    assert "12 rows repeat" in found.notes[0] and len(found.columns["t"]) == N
+    assert "are left out: 12" in found.notes[0] and len(found.columns["t"]) == N
     order = np.arange(N)
     order[[400, 401, 900, 901]] = [401, 400, 901, 900]
     found = even_columns({"t": T[order], "input": x[order], "output": y[order]})
-    assert "2 rows came out of order" in found.notes[0]
+    assert "sorted by their stamps: 2" in found.notes[0]
     np.testing.assert_array_equal(found.columns["output"], y)
     with pytest.raises(hc.ParameterError, match="two logs in one file"):
         even_columns({"t": np.concatenate((T[:1000], T[:1000])), "input": x, "output": y})
