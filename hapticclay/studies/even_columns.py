@@ -33,7 +33,7 @@ LOST = 0.05  # ... if no larger share of all rows is missing
 TICK = 0.02  # of the duration: stamps of a coarser clock are no times of rows
 TURNS = (math.tau, 360.0)  # at which angles begin again [rad, deg]
 WRAP = 0.1  # of a turn: jumps at a wrap differ from the turn by less ...
-INSIDE, SLACK = 0.5, 1e-3  # ... all steps that go on are smaller, and like those around
+INSIDE, SLACK = 0.5, 1e-3  # ... all steps that go on are smaller, and like those around to this
 Between = Literal["spline", "linear", "hold"]
 Columns = dict[str, np.ndarray]
 
@@ -99,10 +99,14 @@ def _along(x: np.ndarray, jumps: np.ndarray) -> np.ndarray:
 
 
 def _go_on(steps: np.ndarray, at: np.ndarray, turn: float) -> bool:
-    """Whether steps are small, and those at some places no larger than those around."""
-    size, wide = np.abs(steps), np.pad(np.where(at, 0.0, np.abs(steps)), 3, mode="edge")
-    around = np.max([wide[i : i + len(steps)] for i in range(7)], axis=0)
-    return bool(size.max() <= INSIDE * turn and np.all(size[at] <= 1.5 * around[at] + SLACK * turn))
+    """Whether steps are small, and those at some places like those around."""
+    wide = np.pad(np.where(at, np.nan, steps), 3, constant_values=np.nan)
+    around = np.stack([wide[i : i + len(steps)] for i in range(7)])[:, at]
+    if np.abs(steps).max() > INSIDE * turn or np.isnan(around).all(axis=0).any():
+        return False
+    low, high = np.nanmin(around, axis=0), np.nanmax(around, axis=0)
+    room = 0.5 * (high - low) + 0.1 * np.maximum(np.abs(low), np.abs(high)) + SLACK * turn
+    return bool(np.all((steps[at] >= low - room) & (steps[at] <= high + room)))
 
 
 def _powers(span: float) -> list[float]:

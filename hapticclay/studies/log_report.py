@@ -145,7 +145,7 @@ def _beside(log: Log, stamps: Stamps, other: str) -> str:
     """How another clock runs beside that of the stamps."""
     x = log.table.loose_numbers(log.place(other)) * log.size(log.place(other))[0]
     good = np.isfinite(x)
-    if np.count_nonzero(good) < LEAST or np.ptp(x[good]) == 0.0:
+    if np.count_nonzero(good) < LEAST or not np.ptp(x[good]) * np.ptp(stamps.t[good]) > 0.0:
         return f"{other} is no clock"
     rate, start = np.polyfit(stamps.t[good], x[good], 1)
     rest = x[good] - start - rate * stamps.t[good]

@@ -133,6 +133,7 @@ def test_encoders_that_begin_again(turn):
         np.sin(3.0 * T),
         0.0 * T,
         0.25 * (np.arange(N) % 28),  # 0 to 6.75, a saw
+        250.0 * (np.arange(N) % 5),
         np.where(np.arange(N) % 400 < 200, 0.0, 6.2832),  # a switch
         np.where(np.arange(N) == 700, 0.0, 5.0 + 0.01 * np.sin(T)),  # a lost packet
         180.0 * np.sin(T),
