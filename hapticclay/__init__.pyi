@@ -7,6 +7,7 @@ from . import theory as theory
 from . import walls as walls
 from .arms.joint_law import JointPD as JointPD
 from .arms.mjcf_arm import MjcfArm as MjcfArm
+from .columns.log import Log as Log
 from .errors import Bound as Bound
 from .errors import ParameterError as ParameterError
 from .errors import Warning as Warning

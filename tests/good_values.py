@@ -75,6 +75,8 @@ def good_values(folder):
         "Trials": {"base": wall, "vary": {"K": hc.studies.Distribution("uniform", 1.0, 9.0)}},
         "run_staircase": {"staircase": hc.studies.Staircase(), "observer": hc.studies.Observer()},
         "staircase_mean": {"staircase": hc.studies.Staircase(), "observer": hc.studies.Observer()},
+        "Log": {"path": ARM, "table": hc.Log.read(_log(folder)).table},
+        "log_report": {"log": hc.Log.read(_log(folder))},
         "lab": {"name": "jnd"},
         "simulate_columns": {"base": cut, "columns": {"gain.x": np.ones(3)}},
         "run_columns": {"base": cut, "columns": {"gain.x": np.ones(3)}},
@@ -85,6 +87,12 @@ def good_values(folder):
         "Measurement": {"t": t, "input": np.sin(t), "output": np.cos(t)},
     }  # fmt: skip
     return by_name, by_function
+
+
+def _log(folder):
+    path = folder / "log.csv"
+    path.write_text("t,x\n0,1\n1,2\n")
+    return path
 
 
 def required(name, made, good):

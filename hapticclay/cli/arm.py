@@ -44,6 +44,8 @@ class ArmCommand:
         joints: Joints of the arm, in the order of the gains; by default those before the handle.
         pose: Joint positions, a number for each joint or NAME=POSITION [rad or m].
         armature: Reflected inertia of the rotors, a number for each joint or NAME=INERTIA [kg.m^2].
+        damping: Viscous damping of the joints, likewise [N.m.s/rad].
+        friction: Coulomb friction of the joints, likewise [N.m].
         gravity: Whether the controller holds the arm against gravity.
         counts: Encoder counts a turn behind the friction that the gains feed forward.
         wall: Axis of the world along which a wall at the handle pushes.
@@ -69,6 +71,8 @@ class ArmCommand:
     joints: tuple[str, ...] = ()
     pose: tuple[str, ...] = ()
     armature: tuple[str, ...] = ()
+    damping: tuple[str, ...] = ()
+    friction: tuple[str, ...] = ()
     gravity: Literal["compensated", "acts"] = "compensated"
     counts: Annotated[int | None, Bound(1, 10**9)] = None
     wall: Literal["x", "y", "z"] | None = None
@@ -129,6 +133,8 @@ class ArmCommand:
             joints=self.joints or None,
             pose=_per_joint("pose", self.pose),
             armature=_per_joint("armature", self.armature),
+            damping=_per_joint("damping", self.damping),
+            friction=_per_joint("friction", self.friction),
             gravity=self.gravity,
         )
 

@@ -26,7 +26,7 @@ class CompareCommand:
     Attributes:
         source: Two to five scenario files, or files of walls.
         axis: Axis of the arm, by default x.
-        recording: CSV file of a recorded force or motion under which scenarios run, as in
+        recording: Log of a recorded force or motion under which scenarios run, as in
             hapticclay replay; a figure shows them beside it.
         columns: Names in that file, as in t=time x=pos fx=force.
         drive: What of the recording drives the arm.

@@ -20,7 +20,7 @@ class PairCommand:
     measured one.
 
     Attributes:
-        data: Log of one axis: a CSV file, or a scope of Simulink in a MATLAB file, with time [s],
+        data: Log of one axis in any format that is read, or a scope of Simulink, with time [s],
             both positions [rad], torques of both motors and the force on the follower [N.m].
         columns: Names in the file, as in leader=q1 follower=q2 leader_torque=-u1 force=f; a minus
             is for a column that holds the negative.

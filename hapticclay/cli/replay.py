@@ -22,7 +22,7 @@ class ReplayCommand:
     Attributes:
         scenario: The experiment, or a scenario file; its hand, start and duration are those of the
             recording.
-        recording: CSV file of time [s], positions x and y [m], and force of the hand on the handle,
+        recording: Log of time [s], positions x and y [m], and force of the hand on the handle,
             fx and fy [N], as far as there are any; units may stand in the heads, as x [mm].
         columns: Names in the file, as in t=time x=pos fx=force.
         drive: What drives the arm.
@@ -41,7 +41,7 @@ class ReplayCommand:
         from ..studies.replay import COLUMNS, Recording, replay
 
         if self.recording is None:
-            raise ParameterError("recording", None, "must be given: a CSV file")
+            raise ParameterError("recording", None, "must be given: a log")
         columns = column_names(self.columns, COLUMNS, EXAMPLE)
         recording = Recording.load(self.recording, columns)
         out = self.out or console.default_folder("replay", recording)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..columns import Sheet, unreadable
+from ..columns.log import open_log
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
 from ..files import MOST_TABLE, read_bytes
@@ -92,7 +92,7 @@ class PairLog:
     @classmethod
     @checked
     def load(cls, path: str | Path, columns: Mapping[str, str] | None = None) -> PairLog:
-        """Reads a log: a CSV file, or a scope of Simulink in a MATLAB file (version 5 to 7).
+        """Reads a log: text, a binary format, or a scope of Simulink in a MATLAB file.
 
         A column is found by its name: leader or master, follower or slave, tau_rm and tau_rs for
         the torques, F_e for the force, and `COLUMNS`. A minus ahead of a name means that the column
@@ -110,9 +110,10 @@ class PairLog:
             choice("columns", key, tuple(COLUMNS))
         file = Path(path)
         try:
-            table = _scope(file) if file.suffix.lower() == ".mat" else _sheet(file, columns or {})
+            table = (file.suffix.lower() == ".mat" and _scope(file)) or _sheet(file, columns or {})
         except OSError as error:
-            raise unreadable("path", file, error) from None
+            bound = f"must be a readable file ({error.strerror})"
+            raise ParameterError("path", str(path), bound) from None
         return cls(**_chosen(file, table, columns or {}), name=file.stem)
 
 
@@ -160,35 +161,32 @@ def _plain(name: str) -> str:
 
 def _sheet(file: Path, columns: Mapping[str, str]) -> dict[str, np.ndarray]:
     """The columns of a CSV file that a log has, by name without its unit."""
-    sheet = Sheet.read("path", file)
+    log = open_log("path", file)
     wanted = {_plain(w): key for key, words in SPELLINGS.items() for w in words}
     wanted |= {_plain(w): key for key, w in columns.items()}
-    places, units = {}, {}
-    for i, head in enumerate(sheet.head):
-        name = re.sub(r"\s*[\[(][^\[\]()]*[\])]", "", head)
-        if _plain(name) in wanted:
-            places[name], units[name] = i, UNITS[wanted[_plain(name)]]
-    return sheet.numbers(places, units)
+    found = {}
+    for i, head in enumerate(log.table.heads):
+        if _plain(head.name) in wanted:
+            size, _ = log.size(i, UNITS[wanted[_plain(head.name)]])
+            found[head.name] = size * log.table.numbers(i)
+    return found
 
 
 def _scope(file: Path) -> dict[str, np.ndarray]:
-    """The columns of a scope of Simulink, a structure with time, by the names in its labels."""
+    """The columns of a scope of Simulink by the names in its labels; none for other files."""
     from scipy.io import loadmat
 
     read_bytes(file, MOST_TABLE)  # refuses what is too large
-    bound = "must hold a scope of Simulink: a structure with time and signals"
     try:
         with warnings.catch_warnings(action="ignore"):  # of names that stand twice
             data = loadmat(file, simplify_cells=True)
     except OSError:
         raise
-    except Exception as error:  # noqa: BLE001  # whatever SciPy raises on a file that is none
-        raise ParameterError("path", str(file), f"{bound} ({type(error).__name__})") from None
+    except Exception:  # noqa: BLE001  # whatever SciPy raises on another file
+        return {}
     scopes = [x for x in data.values() if isinstance(x, dict) and {"time", "signals"} <= x.keys()]
     tables = [_signals(x) for x in scopes if np.size(x["time"]) >= LEAST_ROWS]
-    if not tables:
-        raise ParameterError("path", str(file), f"{bound}, {LEAST_ROWS} samples or more")
-    return max(tables, key=len)  # a file may hold smaller ones, such as a reference
+    return max(tables, key=len, default={})  # a file may hold smaller ones, such as a reference
 
 
 def _signals(scope: Mapping[str, Any]) -> dict[str, np.ndarray]:

@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..arguments import checked, named
-from ..columns import Sheet, unreadable
+from ..columns.log import Log, open_log
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
 from ..model.constants import AXES
@@ -77,7 +77,7 @@ class Recording:
     @classmethod
     @checked
     def load(cls, path: str | Path, columns: Mapping[str, str] | None = None) -> Recording:
-        """Reads a CSV file, whose first line names its columns; units stand there, as "x [mm]".
+        """Reads a log, text or binary; units stand in the heads, as "x [mm]".
 
         Args:
             path: the file.
@@ -91,23 +91,26 @@ class Recording:
         for key in dict(columns or {}):
             choice("columns", key, tuple(COLUMNS))
         try:
-            sheet = Sheet.read("path", Path(path))
+            log = open_log("path", path)
         except OSError as error:
-            raise unreadable("path", Path(path), error) from None
-        names = {key: key for key in COLUMNS} | dict(columns or {})
-        bare = [head.split("[")[0].split("(")[0].strip() for head in sheet.head]
-        places = {}
-        for key, name in names.items():
-            if name in sheet.head or name in bare:
-                places[key] = sheet.head.index(name) if name in sheet.head else bare.index(name)
-            elif key == "t" or key in (columns or {}):
-                choice(f"columns.{key}", name, tuple(bare))
-        cells = sheet.numbers(places, UNITS)
+            bound = f"must be a readable file ({error.strerror})"
+            raise ParameterError("path", str(path), bound) from None
+        given = dict(columns or {})
+        names = {k: given.get(k, k) for k in COLUMNS if k in given or k == "t" or _has(log, k)}
+        cells = {key: log.values(name, UNITS[key]) for key, name in names.items()}
         p, f = (_pair(cells, x, y) for x, y in (AXES, ("fx", "fy")))
         if p is None and f is None:
-            bound = f"must have a motion or a force: name its columns, as x=NAME of {bare}"
+            bound = f"must have a motion or a force: name its columns, as x=NAME of {log.names}"
             raise ParameterError("columns", str(path), bound)
         return cls(cells["t"], p, f, Path(path).stem)
+
+
+def _has(log: Log, name: str) -> bool:
+    try:
+        log.place(name)
+    except ParameterError:
+        return False
+    return True
 
 
 def _pair(cells: Mapping[str, np.ndarray], x: str, y: str) -> np.ndarray | None:

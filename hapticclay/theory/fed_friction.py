@@ -200,7 +200,8 @@ def friction_cycle(
     joints = [Joint(loop, j, arm.friction[j], fed[j]) for j in range(loop.n)]
     found = [cycle for joint in joints for cycle in joint.cycles()]
     columns = list(zip(*found, strict=True)) or [()] * len(_Cycle._fields)
-    gravity = study.assumed()[:-1]
+    bare = [name for name, x in zip(arm.names, joints, strict=True) if x.fed.Fc and not x.coulomb]
+    told = f"no Coulomb friction at {', '.join(bare)}: all that is fed forward is excess"
     return FrictionCycle(
         arm.names,
         loop.Ts,
@@ -218,7 +219,7 @@ def friction_cycle(
         *(np.array(column, float) for column in columns[6:]),
         np.array([joint.speeds for joint in joints]),
         np.array([joint.growth for joint in joints]),
-        (*gravity, OTHERS, LEFT_OUT),
+        (*study.assumed()[:-1], *([told] if bare else []), OTHERS, LEFT_OUT),
     )
 
 

@@ -166,6 +166,11 @@ class JointLoop:
         q, w = x[:, :n], x[:, n:]
         return q, w if self.velocity == "exact" else self.measured(theta)[:, None, None] * q
 
+    def opened(self, theta: np.ndarray) -> np.ndarray:
+        """The open loop, from a held torque around to the host's, shape (m, n, n)."""
+        q, v = self.open_responses(theta)
+        return -(self.position @ q + self.rate @ v)
+
     def between_responses(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Position and measured rate per torque of a sine between samples, in the closed loop.
 
@@ -197,7 +202,13 @@ class JointLoop:
 
     def feeding(self, position: np.ndarray, rate: np.ndarray) -> JointLoop:
         """The loop with more feedback in the held torque, shapes (n, n)."""
-        return replace(self, position=self.position + position, rate=self.rate + rate)
+        found = replace(self, position=self.position + position, rate=self.rate + rate)
+        return found.held_as(self)
+
+    def held_as(self, other: JointLoop) -> JointLoop:
+        """The loop itself, with what another one of the same joints, Ts and delay has computed."""
+        self.__dict__["_hold"] = other._hold
+        return self
 
 
 def timing_words(Ts: float, delay: float) -> str:

@@ -19,6 +19,7 @@ from .style import figure_size, figure_style, points, stroke
 
 DECADES = 1.0  # that an axis shows beyond the gains, where one has no limit
 ELEVATION, AZIMUTH = 22.0, -58.0  # [deg] of the view of a workspace
+SPREAD = 1e-3  # share by which a histogram exceeds its values, which may all be one
 PER_JOINT = 0.32  # [inch] of height
 
 
@@ -103,7 +104,10 @@ def poses_plot(found: OverPoses) -> Figure:
         axis.set_major_locator(MaxNLocator(4))
     figure.colorbar(marks, ax=space, shrink=0.6, pad=0.16, label="largest factor of all Kp")
     share = figure.add_subplot(right)
-    share.hist(found.scale[np.isfinite(found.scale)], bins=24, color=BLUE, alpha=0.6)
+    finite = found.scale[np.isfinite(found.scale)]
+    if len(finite):
+        ends = finite.min() * (1.0 - SPREAD), finite.max() * (1.0 + SPREAD)
+        share.hist(finite, bins=24, range=ends, color=BLUE, alpha=0.6)
     share.axvline(1.0, color=VERMILION, lw=stroke(1.2))
     share.set(xlabel="largest factor of all Kp", ylabel="poses")
     set_title(share, f"{len(found.q)} poses", "the worst is circled")

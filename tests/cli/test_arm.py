@@ -24,6 +24,19 @@ def test_limits_wall_and_poses(tmp_path, capsys):
     assert found["tables"]["joints"]["joint"] == ["shoulder", "elbow"]
 
 
+def test_an_arm_without_a_name_whose_poses_are_all_alike(tmp_path, capsys, monkeypatch):
+    """One joint carries the same everywhere; the folder has the name of the file."""
+    monkeypatch.chdir(tmp_path)
+    joint = '<joint name="pan" axis="0 0 1" armature="0.01"/>'
+    mass = '<inertial pos="0.1 0 0" mass="1" diaginertia="1e-3 1e-3 1e-3"/>'
+    body = f"<body>{joint}{mass}</body>"
+    Path("mine.xml").write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    gains = ["--Kp", "10", "--Kd", "1", "--delay", "1ms"]
+    assert main(["arm", "mine.xml", *gains, "--poses", "4", "--damping", "0.1"]) == 0
+    assert "worst pose: pan=" in capsys.readouterr().out
+    assert Path("out/arm/mine/poses.png").exists()
+
+
 def test_friction_fed_forward(tmp_path, capsys):
     gains = tmp_path / "gains.toml"
     rows = "[[4, 50, 0.1], [1.5, 50, 0.1]]"

@@ -1,6 +1,7 @@
 """Limit cycles under friction fed forward: against runs by matrix exponentials and the engine's."""
 
 import math
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -168,6 +169,13 @@ def test_without_stiffness_it_drifts():
     w = found.rate[0]
     assert 0.2 * math.tanh(20.0 * w) == pytest.approx(0.052 + 1.05 * w, rel=1e-6)
     assert "drifts" in found.headline()
+
+
+def test_an_arm_without_friction_is_told():
+    arm = replace(pan_arm(), friction=[0.0])
+    told = "no Coulomb friction at pan: all that is fed forward is excess"
+    assert told in hc.theory.friction_cycle(arm, pan_law(), TS).assumed
+    assert told not in hc.theory.friction_cycle(pan_arm(), pan_law(), TS).assumed
 
 
 def test_what_is_refused():
