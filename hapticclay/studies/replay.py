@@ -70,7 +70,7 @@ class Recording:
         for name in ("p", "f"):
             value = getattr(self, name)
             if value is not None:
-                samples = Samples(self.t, value)  # which checks both
+                samples = Samples(self.t, value)  # type: ignore[arg-type]  # which checks both
                 object.__setattr__(self, name, array_of(name, samples.values))
                 object.__setattr__(self, "t", array_of("t", samples.t))
 
