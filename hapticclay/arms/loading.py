@@ -20,6 +20,7 @@ BOUNDS = {  # least and largest value, units at a hinge and at a slide
     "armature": (0.0, 1e3, "kg.m^2", "kg"),
     "damping": (0.0, 1e6, "N.m.s/rad", "N.s/m"),
     "friction": (0.0, 1e6, "N.m", "N"),
+    "torque_limit": (0.0, 1e6, "N.m", "N"),
 }
 OPEN = 1e-3  # [rad or m] by which a pose may miss a closed chain
 UNNAMED = "MuJoCo Model"  # MuJoCo's name of a model without one
@@ -63,11 +64,18 @@ def load(arm: Any) -> Loaded:
     pose = _pose(model, arm.pose, joints)
     names = tuple(model.joint(j).name for j in joints)
     dofs = [int(model.jnt_dofadr[j]) for j in joints]
-    fields: dict[str, Any] = {"joints": names, "site": None if site is None else _name(model, site)}
+    fields: dict[str, Any] = {
+        "file": _plain(arm.file),
+        "joints": names,
+        "site": None if site is None else _name(model, site),
+    }
     for field, of in IN_MODEL.items():
         values = getattr(model, of)
         values[dofs] = _per_joint(model, field, getattr(arm, field), joints, values[dofs])
         fields[field] = tuple(values[dofs].tolist())
+    limits = _file_limits(model, joints)
+    given = _per_joint(model, "torque_limit", arm.torque_limit, joints, limits)
+    fields["torque_limit"] = tuple(given)
     mechanism = Mechanism(model, dofs, site, pose)
     _check_mechanism(mechanism, names)
     fields["pose"] = {model.joint(j).name: float(q) for j, q in enumerate(mechanism.pose)}
@@ -103,6 +111,11 @@ def compiled(file: Any) -> tuple[Any, str]:
             raise _bad_file(file, f"{array} is not finite")
     named = spec.modelname != UNNAMED or path is None
     return model, spec.modelname if named else path.stem
+
+
+def _plain(file: Any) -> Any:
+    """A path as text, which files can hold."""
+    return os.fspath(file) if isinstance(file, os.PathLike) else file
 
 
 def _path(file: Any) -> Path:
@@ -243,6 +256,9 @@ def _per_joint(
     low, high, *units = BOUNDS[field]
     out = [float(x) for x in old]
     for i, x in pairs.items():
+        if field == "torque_limit" and x == math.inf:
+            out[i] = math.inf
+            continue
         unit = units[int(model.jnt_type[joints[i]]) == SLIDE]
         out[i] = number(f"{field}[{names[i]}]", x, low, high, unit=unit)
     return out
@@ -271,6 +287,12 @@ def _pose(model: Any, given: Any, joints: list[int]) -> np.ndarray:
     which = range(model.njnt) if isinstance(given, Mapping) else joints
     start[which] = _per_joint(model, "pose", given, which, start[which])
     return start
+
+
+def _file_limits(model: Any, joints: list[int]) -> np.ndarray:
+    """Largest torque of each joint that the file allows, infinite for none."""
+    least = np.abs(model.jnt_actfrcrange[joints]).min(axis=1)
+    return np.where(model.jnt_actfrclimited[joints] > 0, least, math.inf)
 
 
 def _ranges(model: Any, joints: list[int]) -> np.ndarray:

@@ -47,7 +47,7 @@ def test_signals_page_runs(tmp_path):
     assert "at " in out
 
 
-PRINTING = "materials.md", "fit.md", "logs.md", "pair_log.md", "replay.md"
+PRINTING = "materials.md", "fit.md", "logs.md", "pair_log.md", "pair.md", "replay.md"
 
 
 @pytest.mark.parametrize("page", PRINTING)
