@@ -274,9 +274,9 @@ def page(rows: list[dict[str, Any]], missing: int) -> str:
             ],
         ),
         "Median and range over the logs of a letter; set is what the authors state. The force "
-        "scale is the leader's torque over the follower's force, set to 1. The intervals of P in a "
-        "log, some 0.02 %, are those of noise: they leave out how the software forms its difference "
-        "and its filter, which moves P by the tenths of a percent in the table.",
+        "scale is the leader's torque over the follower's force, set to 1. The intervals of P in "
+        "a log, some 0.02 %, are those of noise: they leave out how the software forms its "
+        "difference and its filter, which moves P by the tenths of a percent in the table.",
         "### Free motion",
         common.table(
             free(rows),
