@@ -94,7 +94,7 @@ class Part(Node):
         data, kind = dict(value), self._usual(classes)
         if type(old) in classes.values():
             kind = type(old)
-        kind = _class_with(data, kind, classes)
+        kind = _class_with(data, kind, [x for x in self.kinds if x in classes.values()])
         if KIND in data and not any(KIND in nodes_of(k) for k in classes.values()):
             kind = classes[choice(join_names(path, KIND), data.pop(KIND), tuple(classes))]
         if kind is None:
@@ -135,12 +135,12 @@ class Part(Node):
                 yield field._replace(about=about)
 
 
-def _class_with(data: Mapping[str, Any], kind: Any, classes: Mapping[str, type]) -> Any:
-    """The class that plain data without a kind is of: another, if that alone has its names."""
+def _class_with(data: Mapping[str, Any], kind: Any, named: Sequence[type]) -> Any:
+    """The class that plain data without a kind is of: another named one, if that alone fits."""
     names = set(data)
     if kind is None or KIND in names or names <= {*nodes_of(kind)}:
         return kind
-    fits = [x for x in classes.values() if names <= {*nodes_of(x)}]
+    fits = [x for x in named if names <= {*nodes_of(x)}]
     return fits[0] if len(fits) == 1 else kind
 
 
