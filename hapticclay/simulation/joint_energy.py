@@ -12,14 +12,14 @@ from ..scene.scenario import Scenario
 def stored(scenario: Scenario, m: Any, s: Any) -> tuple[float, float]:
     """Energy of the arm, and of mass and spring of the operator's arm, after the last kick [J].
 
-    That of weight and springs counts from the start, where it is 0.
+    That of the arm at rest at its start is 0.
     """
     arm: Any = scenario.arm
     n = m.joints
     w = np.array(s.w[:n])
     q = np.array(s.q[:n]) - s.before * w  # where the kick was
-    start = np.array(m.start[:n])
     spring, pull = np.array(m.drive_spring[:n]), np.array(m.drive_pull[:n])
+    start = np.array(m.start[:n])
     arms = arm.mechanism.energy(q, w) - arm.mechanism.energy(start, 0.0 * w)
     arms += float(0.5 * spring @ (q**2 - start**2) - pull @ (q - start))
     axes = ["xyz".index(c) for c in arm.axes]

@@ -1,4 +1,4 @@
-"""Runs of arms from files: beside the closed form, SciPy, a QP solver, dense matrices, their law."""
+"""Runs of arms from files beside the closed form, SciPy, a QP solver, dense matrices, their law."""
 
 import math
 from dataclasses import replace
