@@ -62,7 +62,7 @@ LIMITATIONS = (
     "Run times are those of one machine, named below, with other programs on it: compare numbers "
     "within a table, not with those of another machine. Run times leave out imports, and the "
     "compilation of SciPy's right-hand sides.",
-    "All jobs but the gain limits of arms are the planar arm of the paper in clay. Contact geometry "
+    "All jobs but the gain limits of arms are of the planar arm in clay. Contact geometry "
     "or a larger model was not measured.",
     "The programs for the other packages are ours, written from the same equations "
     "(`benchmarks/peers`). Their authors might tune them better; a corrected program is welcome.",
