@@ -45,8 +45,8 @@ class PairCommand:
         cells: Gains and delays of the map.
         feel: Also say what the hand feels along this axis of the world, and with which hands and
             objects the pair is stable.
-        data: Log of one axis, in place of a file of the pair: a CSV file, or a scope of Simulink in
-            a MATLAB file, with time [s], both positions [rad], torques of both motors and the force
+        data: Log of one axis, in place of a file of the pair, in any format that is read, or a
+            scope of Simulink: time [s], both positions [rad], torques of both motors and the force
             on the follower [N.m].
         columns: Names in the log, as in leader=q1 follower=q2 leader_torque=-u1 force=f; a minus
             is for a column that holds the negative.
