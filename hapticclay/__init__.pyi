@@ -48,6 +48,9 @@ from .scene.experiments import constant_cut as constant_cut
 from .scene.experiments import free as free
 from .scene.experiments import stability_test as stability_test
 from .scene.experiments import variable_cut as variable_cut
+from .scene.link import Link as Link
+from .scene.pair import Contact as Contact
+from .scene.pair import Pair as Pair
 from .scene.scenario import Scenario as Scenario
 from .scene.virtual_wall import Device as Device
 from .scene.virtual_wall import VirtualWall as VirtualWall
