@@ -443,6 +443,11 @@ class Run:
         made = self.buffers.rows[max(self.filled - n, 0) : self.filled]
         return np.sort(np.abs(made[:, 8:10]), axis=0)[-k] if len(made) >= k else np.zeros(2)
 
+    def strained(self, n: int, limits: Sequence[float]) -> list[int]:
+        """How many of the last n rows not judged have |tau| of each motor at its limit or above."""
+        made = self.buffers.rows[max(self.filled - n, 0) : self.filled, 8:10]
+        return np.count_nonzero(~(np.abs(made) < limits), axis=0).tolist()
+
     def is_diverging(self) -> bool:
         """Whether the monitor would find the run unstable by now."""
         watch, n = copy.deepcopy(self.watch), self.filled
