@@ -445,8 +445,7 @@ class Run:
 
     def strained(self, n: int, limits: Sequence[float]) -> list[int]:
         """How many of the last n rows not judged have |tau| of each motor at its limit or above."""
-        made = self.buffers.rows[max(self.filled - n, 0) : self.filled, 8:10]
-        return np.count_nonzero(~(np.abs(made) < limits), axis=0).tolist()
+        return self.row.strained(n, limits)
 
     def is_diverging(self) -> bool:
         """Whether the monitor would find the run unstable by now."""

@@ -39,6 +39,7 @@ class VectoredRuns:
         self.shown, self.is_shown = np.zeros((n, SHOWN)), np.zeros(n, bool)
         self.times, self.rooms = np.zeros(n), np.zeros(n, np.int64)
         self.prepares = np.zeros(n, bool)  # which cannot advance together
+        self.takes_gain = np.zeros(n, bool)  # whose gains are nothing but two numbers of the model
         self.movers = [mover.Movers() for _ in range(workers)]
         self.pool: ThreadPoolExecutor | None = None
         native = engine == "native"
@@ -74,6 +75,7 @@ class VectoredRuns:
             self.kept[k] = [x.of(s) for x in self.movers]
             self.engines[:, k] = [x.row.ctypes.data for x in self.kept[k]]
         self.prepares[k], self.is_shown[k] = run.prepares, False
+        self.takes_gain[k] = scene.takes_gain(run.row.m)
 
     def _sync(self, k: int) -> Run:
         """The run, whose scenario has the present force and gain."""
@@ -115,14 +117,14 @@ class VectoredRuns:
         other = (gain != self.gain[which]).any(axis=1) & ~self.over[which]
         which, gain = which[other], gain[other]
         self.gain[which], self.changed[which] = gain, True
-        for k, K in zip(which.tolist(), gain.tolist(), strict=True):
-            row = self.runs[k].row
-            if scene.takes_gain(row.m):
-                row.m.axis[0].K, row.m.axis[1].K = K
-            else:
-                self._sync(k)
-                row.m.drops_events = 1
         self.is_shown[which] = False
+        plain = self.takes_gain[which]
+        if len(self.models):
+            self.models["axis"]["K"][which[plain]] = gain[plain]
+            which = which[~plain]
+        for k in which.tolist():
+            self._sync(k)
+            self.runs[k].row.m.drops_events = 1
 
     # ---- steps
 
@@ -196,17 +198,19 @@ class VectoredRuns:
         self.is_shown[which] = shows
         self.times[which] = np.where(self.over[which], self.times[which], states["t"][which])
 
+    def _at(self, which: np.ndarray) -> tuple[int, int, int, int]:
+        """Rows as compiled code takes them."""
+        return self.models.ctypes.data, self.states.ctypes.data, which.ctypes.data, len(which)
+
     def _advance(self, thread: int, which: np.ndarray) -> None:
-        at = self.models.ctypes.data, self.states.ctypes.data, which.ctypes.data, len(which)
-        machine().advance(*at, self.rooms.ctypes.data, self.monitored)
+        machine().advance(*self._at(which), self.rooms.ctypes.data, self.monitored)
 
     def _show(self, thread: int, which: np.ndarray) -> None:
         self._advance(thread, which)
         self._peek(thread, which)
 
     def _peek(self, thread: int, which: np.ndarray) -> None:
-        at = self.models.ctypes.data, self.states.ctypes.data, which.ctypes.data, len(which)
-        machine().peek(*at, self.spares[thread].ctypes.data, self.shown.ctypes.data)
+        machine().peek(*self._at(which), self.spares[thread].ctypes.data, self.shown.ctypes.data)
 
     def _call(self, work: Callable[[int, np.ndarray], None], which: np.ndarray) -> None:
         """Does work for rows, a part of them in each thread; raises once all is done."""
@@ -271,7 +275,11 @@ class VectoredRuns:
 
     def strained(self, n: int, limits: Sequence[float]) -> np.ndarray:
         """As `Run.strained`, shape (runs, 2)."""
-        return np.array([run.strained(n, limits) for run in self.runs])
+        if not len(self.models):
+            return np.array([run.strained(n, limits) for run in self.runs])
+        which, found = np.arange(len(self.runs)), np.zeros((len(self.runs), 2), np.int64)
+        machine().strained(*self._at(which), n, *limits, found.ctypes.data)
+        return found
 
     def look(self) -> np.ndarray:
         """Whether the motion of each run is unstable by now, evaluated again after LOOK."""
