@@ -87,6 +87,8 @@ class Part(Node):
             terms = ((k, terms_field(k)) for k in classes.values())
             kind, name = next(((k, name) for k, name in terms if name), (None, ""))
             return value if kind is None else make_part(kind, {name: value}, {}, path)
+        if isinstance(value, Mapping) and Mapping in self.kinds:
+            return dict(value)
         if not isinstance(value, Mapping) or not classes:
             return super()._read(value, path, old)
         data, kind = dict(value), self._usual(classes)
@@ -99,6 +101,8 @@ class Part(Node):
         return make_part(kind, data, values_of(old) if type(old) is kind else {}, path)
 
     def write(self, value: Any, old: Any, path: str, units: dict[str, str]) -> Any:
+        if isinstance(value, Mapping):
+            return {k: super(Part, self).write(x, old, path, units) for k, x in value.items()}
         if not dataclasses.is_dataclass(value):
             return super().write(value, old, path, units)
         kind, classes, terms = type(value), self.classes(), terms_field(type(value))
@@ -107,7 +111,8 @@ class Part(Node):
             old = UNSET if old is UNSET else None
             return nodes_of(kind)[terms].write(getattr(value, terms), old, path, units)
         data = _fields_as_data(value, old, path, units)
-        usual = self._usual(classes) is kind and type(old) not in classes.values()
+        before = type(old) if type(old) in classes.values() else kind
+        usual = self._usual(classes) is kind is before
         if len(classes) == 1 or (usual and old is not UNSET) or KIND in nodes_of(kind):
             return data
         return {KIND: kind.__name__.lower(), **data}

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..model import regions
-from ..model.sampled_controller import BUFFER, Controller
+from ..model.sampled_controller import Controller
 from ..scene.scenario import Scenario
-from . import arm, begin, layout, march, native, path, records, rows, scene, watch
+from . import arm, begin, joints, layout, march, native, path, records, rows, scene, watch
 from .mover import Mover
 
 CHUNK = 4096  # rows between two looks at a run (progress, Ctrl-C, outcome); fits the cache
@@ -35,6 +35,7 @@ class Buffers:
         self.rows = np.empty((CHUNK + 1, rows.ROW))
         self.crossings = np.empty((CROSSINGS, 4))
         self.stops, self.rendered = np.empty((1, 3)), np.empty((1, 3))
+        self.extra = np.empty((1, 0))
 
     def make_room(self, m: Any) -> None:
         """Makes room for what a scene records in addition to its rows."""
@@ -42,11 +43,13 @@ class Buffers:
             self.stops = np.empty((STOPS, 3))
         if m.records_clay_force and len(self.rendered) <= CHUNK:
             self.rendered = np.empty((CHUNK + 1, 3))
+        if m.general and self.extra.shape != (CHUNK + 1, joints.width(m)):
+            self.extra = np.empty((CHUNK + 1, joints.width(m)))
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
         """By the names of their fields."""
-        names = "rows", "crossings", "stops", "rendered"
+        names = "rows", "crossings", "stops", "rendered", "extra"
         return {name: getattr(self, name) for name in names}
 
 
@@ -152,7 +155,8 @@ class Row:
         """Puts the state to the start of a run."""
         if self.caller is not None:
             state = self.caller.controller.state
-            self.arrays["buffer"][BUFFER : BUFFER + len(state)] = state
+            start = self.caller.start
+            self.arrays["buffer"][start : start + len(state)] = state
         for law in self.laws:
             law.z[:] = law.start
         self.put_start(*map(float, (*scenario.start, *scenario.velocity)))
@@ -167,12 +171,19 @@ class Row:
         self._step(path.advance, self.m, self.s, room)
 
     def peek(self) -> np.ndarray:
-        """The row that the next step would write, and the force of the clay, shape (18,)."""
+        """The row that the next step would write, and the force of the clay, shape (18,).
+
+        Then comes what an arm from a file adds to rows.
+        """
         m, n = self.m, self.s.row
         arm.put(m, self.s)
         self._step(path.peek, m, self.s, self.spare)
         rendered = self.buffers.rendered[n, :2] if m.records_clay_force else (0.0, 0.0)
-        return np.concatenate((self.buffers.rows[n], rendered))
+        return np.concatenate((self.buffers.rows[n], rendered, self.extra_at(n)))
+
+    def extra_at(self, n: int) -> np.ndarray:
+        """What an arm from a file adds to a row."""
+        return self.buffers.extra[n] if self.m.general else self.buffers.extra[0, :0]
 
     def _step(self, make: Any, *arguments: Any) -> None:
         """Makes steps, where the step of an exactly straight arm raises."""
@@ -285,8 +296,9 @@ class NativeRow(Row):
         self.machine.advance(*self.call, self.rooms_at, False)
 
     def peek(self) -> np.ndarray:
+        n = self.s.row
         self.machine.peek(*self.call, *self.shown_at)
-        return self.shown.copy()
+        return np.append(self.shown, self.extra_at(n)) if self.m.general else self.shown.copy()
 
     def strained(self, n: int, limits: Sequence[float]) -> list[int]:
         self.machine.strained(*self.call, n, *limits, self.counts_at)

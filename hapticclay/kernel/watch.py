@@ -47,7 +47,7 @@ def is_quiet(m, w, at):
     """Whether a row can have nothing to report."""
     row, seen = m.rows, w.seen
     vx, vy = abs(row[at + 4]), abs(row[at + 5])
-    bound = abs(row[at + 8]) >= m.limit1 or abs(row[at + 9]) >= m.limit2
+    bound = abs(row[at + 8]) >= m.limit[0] or abs(row[at + 9]) >= m.limit[1]
     if not (vx <= SPEED and vy <= SPEED and abs(math.sin(row[at + 1])) >= FOLD):
         return False
     if vx > STILL or vy > STILL:

@@ -141,7 +141,7 @@ class VectoredRuns:
             if muscle is not None and not muscle.varies:
                 steady[j] += muscle(0.0)
         if len(self.models):
-            self.models["axis"]["push"][which] = steady
+            self.models["axis"]["push"][which, :2] = steady
             self.models["push_since"][which], self.models["axis"]["push_rate"][which] = 0.0, 0.0
         else:
             for k, f in zip(which.tolist(), steady.tolist(), strict=True):

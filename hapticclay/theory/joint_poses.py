@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -77,6 +78,11 @@ class OverPoses(Result):
         name, share = max(self.shares.items(), key=lambda x: x[1])
         low, high = np.nanmin(self.scale), np.nanmax(self.scale)
         return f"{at}: all Kp up to {low:.4g} to {high:.4g} times; {name} first at {share:.0%}"
+
+    def remarks(self) -> Sequence[str]:
+        """The verdict, the worst pose, and what it rests on."""
+        pose = " ".join(f"{name}={q:.4g}" for name, q in self.worst_pose.items())
+        return [self.headline(), f"worst pose: {pose}", *self.assumed]
 
     def tables(self) -> Tables:
         """Every pose, and how often each joint buzzes first."""

@@ -9,15 +9,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ..theory.fed_friction import FrictionCycle
 from ..theory.joint_gains import JointLimits
 from ..theory.joint_poses import OverPoses
 from ..theory.joint_walls import WallLimit
 from .palette import BLACK, BLUE, VERMILION
-from .panels import label_axes, set_title, single
+from .panels import curve_look, hollow, label_axes, level, set_title, single
 from .style import figure_size, figure_style, points, stroke
 
 DECADES = 1.0  # that an axis shows beyond the gains, where one has no limit
 ELEVATION, AZIMUTH = 22.0, -58.0  # [deg] of the view of a workspace
+SPREAD = 1e-3  # share by which a histogram exceeds its values, which may all be one
 PER_JOINT = 0.32  # [inch] of height
 
 
@@ -65,6 +67,29 @@ def wall_plot(found: WallLimit) -> Figure:
     return figure
 
 
+@figure_style()
+def friction_plot(found: FrictionCycle) -> Figure:
+    """Plots how motion of each joint grows or decays over its largest rate; cycles are dots."""
+    figure, ax = single(3.2)
+    growth = found.line_growth
+    known = growth[np.isfinite(growth)]
+    most = known.max(initial=0.0) or np.abs(known).max(initial=1.0)
+    for j, name in enumerate(found.names):
+        if np.isfinite(growth[j]).any():
+            ax.plot(found.line_rate[j], growth[j], **curve_look(j), label=name)
+    rates = 2.0 * math.pi * found.first_frequency * found.first_amplitude
+    for kind, rate in zip(found.kind, rates, strict=True):
+        face = {"mfc": BLACK} if kind == "limit cycle" else {}
+        ax.plot(rate, 0.0, **(hollow(BLACK, size=5.0) | face))
+    level(ax)
+    ax.set(xscale="log", ylim=(-1.5 * most, 1.2 * most))
+    label_axes(ax, "largest rate of the joint [rad/s]", "growth [1/s]")
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend()
+    set_title(ax, "motion under friction fed forward", "full dots: limit cycles; open: thresholds")
+    return figure
+
+
 @figure_style(axes_grid=False)
 def poses_plot(found: OverPoses) -> Figure:
     """Plots the largest factor of all gains where the handle is, the worst pose marked."""
@@ -79,7 +104,10 @@ def poses_plot(found: OverPoses) -> Figure:
         axis.set_major_locator(MaxNLocator(4))
     figure.colorbar(marks, ax=space, shrink=0.6, pad=0.16, label="largest factor of all Kp")
     share = figure.add_subplot(right)
-    share.hist(found.scale[np.isfinite(found.scale)], bins=24, color=BLUE, alpha=0.6)
+    finite = found.scale[np.isfinite(found.scale)]
+    if len(finite):
+        ends = finite.min() * (1.0 - SPREAD), finite.max() * (1.0 + SPREAD)
+        share.hist(finite, bins=24, range=ends, color=BLUE, alpha=0.6)
     share.axvline(1.0, color=VERMILION, lw=stroke(1.2))
     share.set(xlabel="largest factor of all Kp", ylabel="poses")
     set_title(share, f"{len(found.q)} poses", "the worst is circled")

@@ -691,11 +691,14 @@ def test_the_fields_of_a_scenario_are_all_there():
             continue
         x = scenario
         for name in field.name.split("."):
+            if isinstance(x, hc.Arm) and name not in hc.Arm.__dataclass_fields__:
+                break  # of an arm from a file
             if isinstance(x, tuple):
                 x = x[int(name)] if name.isdecimal() else x[("x", "y").index(name)]
             else:
                 x = getattr(x, name)
-        assert x == field.default or np.all(x == field.default)
+        else:
+            assert x == field.default or np.all(x == field.default)
 
 
 def test_an_array_of_tables_is_a_sum(tmp_path):
