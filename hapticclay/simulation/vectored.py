@@ -120,7 +120,7 @@ class VectoredRuns:
         self.is_shown[which] = False
         plain = self.takes_gain[which]
         if len(self.models):
-            self.models["axis"]["K"][which[plain]] = gain[plain]
+            self.models["axis"]["K"][which[plain], :2] = gain[plain]
             which = which[~plain]
         for k in which.tolist():
             self._sync(k)
