@@ -86,6 +86,8 @@ def good_values(folder):
         "run_columns": {"base": cut, "columns": {"gain.x": np.ones(3)}},
         "PairLog": {"t": t, "leader": np.sin(t), "follower": np.cos(t), "follower_torque": t},
         "identify_pair": {"log": pair},
+        "Recording": {"t": (0.0, 0.01), "p": np.zeros((2, 2))},
+        "replay": {"recording": hc.studies.Recording((0.0, 0.01), f=np.ones((2, 2)))},
         "Measurement": {"t": t, "input": np.sin(t), "output": np.cos(t)},
     }  # fmt: skip
     return by_name, by_function

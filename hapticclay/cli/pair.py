@@ -43,8 +43,8 @@ class PairCommand:
         map: Also map stability over this: delay and a common factor of all gains Kp.
         compare: Also compare the kinds of link.
         cells: Gains and delays of the map.
-        data: Log of one axis, in place of a file of the pair: a CSV file, or a scope of Simulink in
-            a MATLAB file, with time [s], both positions [rad], torques of both motors and the force
+        data: Log of one axis, in place of a file of the pair, in any format that is read, or a
+            scope of Simulink: time [s], both positions [rad], torques of both motors and the force
             on the follower [N.m].
         columns: Names in the log, as in leader=q1 follower=q2 leader_torque=-u1 force=f; a minus
             is for a column that holds the negative.
