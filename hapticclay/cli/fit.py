@@ -106,4 +106,4 @@ class FitCommand:
             raise ParameterError(f"columns.{own[key]}", value, error.bound + hint) from None
         if line := found_line(given, {own[key]: name for key, name in names.items()}):
             print(line)
-        return measured(log, names)
+        return measured(log, names, "linear")

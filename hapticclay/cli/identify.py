@@ -116,7 +116,8 @@ class IdentifyCommand:
         log = self.log.log(file, "csv" if self.csv else "file")
         names = named_columns(log, given, input="command" if what == "G" else "force")
         axis = "x" if self.axis == "both" else self.axis
-        result = identify_data(measured(log, names), what, axis, band=self.band, held=self.held)
+        data = measured(log, names, "hold" if self.held else "spline")
+        result = identify_data(data, what, axis, band=self.band, held=self.held)
         if line := found_line(given, names):
             print(line)
         console.deliver(IdentifiedBlocks((result,), paper=self.paper), self.out, self.figures)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 FORCES = {"kg": "kgf", "lb": "lbf", "lbs": "lbf", "oz": "ozf", "g": "gf"}  # by the mass meant
 MASS, FORCE = (0, 1, 0, 0, 0), (1, 1, -2, 0, 0)
+AS_UNIT = re.compile(r"[,/]\s*\w+$")  # "pos / in", where "pos_in" may be an input
 LONGEST_WORD = 3  # of a unit that is an abbreviation
 
 
@@ -289,7 +291,8 @@ class _Unit:
         wanted, last = powers_of(self.accepted), [x for _, x in self.head.last_words()]
         for text in last:
             unit = parse_unit(text)
-            if unit is not None and unit[1] in wanted and text != "in":
+            sure = text != "in" or AS_UNIT.search(self.head.text)
+            if unit is not None and unit[1] in wanted and sure:
                 return float(unit[0]), unit[1]
         for text in last[-1:] if wanted else ():
             abbreviated = 1 < len(text) <= LONGEST_WORD and parse_unit(text) is not None

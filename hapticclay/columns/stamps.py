@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 EVEN = 0.05  # largest deviation of a step from the usual one, as a share, that counts as even
-GAP = 1.5  # usual steps that a gap is longer than
+GAP, FAR = 1.5, 5.0  # a gap is longer than so many usual steps, and deviations of the steps
+NORMAL = 1.4826  # standard deviation of normal noise over its median absolute value
 DIGITS = range(12)  # decimal places of stamps that are rounded
 
 
@@ -52,13 +53,20 @@ class Stamps:
     @property
     def jitter(self) -> float:
         """Standard deviation of the steps, without gaps [s]."""
-        usual = self.steps[np.abs(self.steps) <= GAP * self.step]
+        usual = self.steps[np.abs(self.steps) <= self.longest]
         return float(np.std(usual)) if len(usual) else 0.0
 
     @cached_property
     def gaps(self) -> np.ndarray:
         """Numbers of the rows before a gap, (m,)."""
-        return np.flatnonzero(self.steps > GAP * self.step)
+        return np.flatnonzero(self.steps > self.longest)
+
+    @cached_property
+    def longest(self) -> float:
+        """The longest step that is no gap [s]."""
+        ahead = self.steps[self.steps > 0.0]
+        usual = NORMAL * float(np.median(np.abs(ahead - self.step))) if len(ahead) else 0.0
+        return max(GAP * self.step, self.step + FAR * usual)
 
     @cached_property
     def repeats(self) -> np.ndarray:
@@ -70,9 +78,14 @@ class Stamps:
         """Numbers of the rows whose stamp is before that of the row before, (m,)."""
         return np.flatnonzero(self.steps < 0.0) + 1
 
-    @property
+    @cached_property
     def rounding(self) -> float:
-        """Decimal place to which all stamps are rounded [s]; 0 for none."""
+        """Tick of a clock whose stamps repeat, or decimal place of all stamps [s]; 0 for none."""
+        ahead = self.steps[self.steps > 0.0]
+        if len(self.repeats) and len(ahead):
+            ticks = ahead / ahead.min()
+            if np.all(np.abs(ticks - np.round(ticks)) < 0.02 * ticks):
+                return float(ahead.min())
         for digits in DIGITS:
             scaled = self.t * 10.0**digits
             if np.all(np.abs(scaled - np.round(scaled)) < 1e-4):

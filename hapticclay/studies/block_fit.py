@@ -16,6 +16,7 @@ import numpy as np
 from .flow_models import student_quantile
 
 BLOCKS = 20  # of a record
+WORST = 1e7  # condition of scaled columns beyond which no interval is told
 
 
 class Unknown(NamedTuple):
@@ -73,12 +74,14 @@ def block_fit(
 
 
 def _half_widths(J: np.ndarray, rest: np.ndarray, level: float) -> np.ndarray:
-    """Half widths of intervals, in the units of the columns of J."""
+    """Half widths of intervals, in the units of the columns of J; nan where these depend."""
     n, k = J.shape
-    inverse = np.linalg.pinv(J.T @ J)
+    sizes = np.linalg.norm(J, axis=0)
+    if not np.all(sizes > 0.0) or np.linalg.cond(J / sizes) > WORST:
+        return np.full(k, math.nan)
+    A = J / sizes
+    inverse = np.linalg.inv(A.T @ A)
     parts = np.array_split(np.arange(n), BLOCKS)
-    scores = np.array([J[i].T @ rest[i] for i in parts])
+    scores = np.array([A[i].T @ rest[i] for i in parts])
     cov = inverse @ (scores.T @ scores) @ inverse * BLOCKS / (BLOCKS - k)
-    fixed = np.linalg.matrix_rank(J) == k
-    half = student_quantile(level, BLOCKS - k) * np.sqrt(np.maximum(np.diag(cov), 0.0))
-    return half if fixed else np.full(k, math.nan)
+    return student_quantile(level, BLOCKS - k) * np.sqrt(np.diag(cov)) / sizes

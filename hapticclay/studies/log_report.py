@@ -17,10 +17,12 @@ from ..display import table_of
 from ..errors import ParameterError
 from ..results import Result
 from ..units import parse_unit, si_unit
+from .even_columns import unwrapped
 from .outliers import runs_of, times
 
 FEW = 3  # places that a remark names
 STUCK = 0.02  # share of the rows, in a run at the largest or smallest value, that is suspicious
+TREATED = "identify and fit say what they do about it (docs/logs.md)"
 LEAST = 20  # rows in which columns are judged
 
 
@@ -91,10 +93,15 @@ def log_report(log: Log) -> LogReport:
         log: the log.
     """
     found = candidates(log, "time")
-    time = found[0] if len(found) == 1 else ""
+    time = found[0] if found else ""
     stamps, warnings = None, []
     if time:
         stamps, warnings = _stamps(log, time)
+    if stamps is not None:
+        warnings += [_beside(log, stamps, other) for other in found[1:]]
+    if stamps is not None and stamps.even < 1.0:
+        share = 100.0 * (1.0 - stamps.even)
+        warnings.append(f"{share:.3g} % of the steps are off by more than 5 %: {TREATED}")
     rows = []
     for place, head in enumerate(log.table.heads):
         size, unit, faults = _unit(log, place)
@@ -123,6 +130,20 @@ def _stamps(log: Log, time: str) -> tuple[Stamps | None, list[str]]:
     if stamps.step > 0.0 and not 1.0 <= stamps.rate <= 1e5:
         out.append(f"a rate of {stamps.rate:.3g} Hz: is the time in seconds?")
     return stamps, out
+
+
+def _beside(log: Log, stamps: Stamps, other: str) -> str:
+    """How another clock runs beside that of the stamps."""
+    x = log.table.loose_numbers(log.place(other)) * log.size(log.place(other))[0]
+    good = np.isfinite(x)
+    if np.count_nonzero(good) < LEAST or np.ptp(x[good]) == 0.0:
+        return f"{other} is no clock"
+    rate, start = np.polyfit(stamps.t[good], x[good], 1)
+    rest = x[good] - start - rate * stamps.t[good]
+    return (
+        f"a second clock, {other}: it runs {1e6 * (rate - 1.0):+.0f} ppm fast beside the first, "
+        f"with a deviation of {np.std(rest):.2g} s; the first is used"
+    )
 
 
 def _unit(log: Log, place: int) -> tuple[float, str, list[str]]:
@@ -155,6 +176,8 @@ def _remarks(x: np.ndarray) -> list[str]:
     stuck = sum(b - a for end in ends for a, b in runs_of(end) if b - a > FEW)
     if stuck > STUCK * len(x) and len(np.unique(x[good])) > LEAST:
         out.append("limited?")
+    if len(at := unwrapped(x[good])[2]):
+        return [*out, f"begins again {len(at)} times: an encoder that wraps"]
     steps = np.abs(np.diff(x[good]))
     if np.count_nonzero(steps > 0.5 * span) in range(1, max(len(x) // 50, 2)):
         out.append(f"{np.count_nonzero(steps > 0.5 * span)} jumps of more than half the range")

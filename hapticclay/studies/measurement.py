@@ -19,6 +19,7 @@ from ..columns.finding import find
 from ..columns.log import Log, open_log
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
+from .even_columns import Between, even_columns, unwrapped, wrap_note
 
 COLUMNS = {  # columns of a file and their contents
     "t": "time [s]",
@@ -48,6 +49,7 @@ class Measurement:
         reference: excitation of the experiment, independent of all noise, in any unit, (n,); None
             uses the input, for Th the position.
         name: name in titles and files.
+        notes: what was done to the rows of a log, one sentence each.
 
     Raises:
         ParameterError: a column is not such an array, is constant or too short; a value is not
@@ -62,6 +64,7 @@ class Measurement:
     output: np.ndarray
     reference: np.ndarray | None = None
     name: str = "data"
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self):
         for column in COLUMNS:
@@ -87,12 +90,14 @@ class Measurement:
         columns: Mapping[str, str] | None = None,
         units: Mapping[str, str] | None = None,
         counts: Mapping[str, Any] | None = None,
+        held: bool = False,
     ) -> Measurement:
         """Reads a log: text, or a binary format of docs/logs.md.
 
         Values are SI, unless the name of a column holds another unit, as in "time [ms]" or "t_ms",
-        a row of units stands below the names, or `units` states one: they are then converted. A
-        last row after a shorter step is skipped, because a run ends between two samples.
+        a row of units stands below the names, or `units` states one: they are then converted. Rows
+        at uneven times are resampled, with a note (docs/logs.md); a last row after a shorter step
+        is skipped, because a run ends between two samples.
 
         Args:
             path: the file.
@@ -101,6 +106,8 @@ class Measurement:
             units: unit of a column by name, in place of what the file says, as {"x": "mm"}.
             counts: of an encoder's column by name: counts a turn, or the size of a count, as
                 "0.01 mm".
+            held: whether a computer holds the input from row to row; it matters where the rows are
+                not even.
 
         Raises:
             ParameterError: the file cannot be read or holds no table; a column is missing, or
@@ -110,18 +117,50 @@ class Measurement:
         for key in columns or {}:
             choice("columns", key, tuple(COLUMNS))
         log = open_log("path", path, units, counts)
-        return measured(log, named_columns(log, columns or {}))
+        return measured(log, named_columns(log, columns or {}), "hold" if held else "spline")
+
+    @classmethod
+    @checked
+    def resampled(
+        cls,
+        t: Any,
+        input: Any,
+        output: Any,
+        reference: Any = None,
+        name: str = "data",
+        held: bool = False,
+    ) -> Measurement:
+        """Makes a measurement from columns whose steps are not even, as `load` does.
+
+        Args:
+            t: time [s], (n,).
+            input: as the attribute, at these times.
+            output: as the attribute, at these times.
+            reference: as the attribute, at these times.
+            name: as the attribute.
+            held: whether a computer holds the input from row to row.
+
+        Raises:
+            ParameterError: time goes back, or as `Measurement`.
+        """
+        given = {"t": t, "input": input, "output": output, "reference": reference}
+        given = {key: x for key, x in given.items() if x is not None}
+        columns = {key: _column(key, x, t) for key, x in given.items()}
+        made = even_columns(columns, "hold" if held else "spline")
+        return cls(**made.columns, name=name, notes=made.notes)
 
 
-def measured(log: Log, names: Mapping[str, str]) -> Measurement:
-    """The measurement in some columns of a log."""
-    cells = {}
+def measured(log: Log, names: Mapping[str, str], between: Between = "spline") -> Measurement:
+    """The measurement in some columns of a log, `between` whose rows the input is as said."""
+    cells, notes = {}, []
     for key, name in names.items():
         cells[key] = log.values(name, UNITS[key]) if key in UNITS else log.raw(name)
-    steps = np.diff(cells["t"])
-    if len(steps) > 1 and 0.0 < steps[-1] < (1.0 - JITTER) * float(np.median(steps)):
-        cells = {key: x[:-1] for key, x in cells.items()}
-    return Measurement(**cells, name=log.path.name)
+    raw, turn, at = unwrapped(log.raw(names["output"]))
+    if len(at):
+        cells["output"] = raw * log.size(log.place(names["output"]), UNITS["output"])[0]
+        notes.append(wrap_note(turn, at, cells["t"]))
+    made = even_columns(cells, between)
+    return Measurement(**made.columns, name=log.path.name, notes=(*notes, *made.notes))
 
 
 def named_columns(log: Log, given: Mapping[str, str], **meanings: str) -> dict[str, str]:

@@ -92,7 +92,7 @@ class PairLog:
     @classmethod
     @checked
     def load(cls, path: str | Path, columns: Mapping[str, str] | None = None) -> PairLog:
-        """Reads a log: a CSV file, or a scope of Simulink in a MATLAB file (version 5 to 7).
+        """Reads a log: text, a binary format, or a scope of Simulink in a MATLAB file.
 
         A column is found by its name: leader or master, follower or slave, tau_rm and tau_rs for
         the torques, F_e for the force, and `COLUMNS`. A minus ahead of a name means that the column
@@ -110,7 +110,7 @@ class PairLog:
             choice("columns", key, tuple(COLUMNS))
         file = Path(path)
         try:
-            table = _scope(file) if file.suffix.lower() == ".mat" else _sheet(file, columns or {})
+            table = (file.suffix.lower() == ".mat" and _scope(file)) or _sheet(file, columns or {})
         except OSError as error:
             bound = f"must be a readable file ({error.strerror})"
             raise ParameterError("path", str(path), bound) from None
@@ -173,23 +173,20 @@ def _sheet(file: Path, columns: Mapping[str, str]) -> dict[str, np.ndarray]:
 
 
 def _scope(file: Path) -> dict[str, np.ndarray]:
-    """The columns of a scope of Simulink, a structure with time, by the names in its labels."""
+    """The columns of a scope of Simulink by the names in its labels; none for other files."""
     from scipy.io import loadmat
 
     read_bytes(file, MOST_TABLE)  # refuses what is too large
-    bound = "must hold a scope of Simulink: a structure with time and signals"
     try:
         with warnings.catch_warnings(action="ignore"):  # of names that stand twice
             data = loadmat(file, simplify_cells=True)
     except OSError:
         raise
-    except Exception as error:  # noqa: BLE001  # whatever SciPy raises on a file that is none
-        raise ParameterError("path", str(file), f"{bound} ({type(error).__name__})") from None
+    except Exception:  # noqa: BLE001  # whatever SciPy raises on another file
+        return {}
     scopes = [x for x in data.values() if isinstance(x, dict) and {"time", "signals"} <= x.keys()]
     tables = [_signals(x) for x in scopes if np.size(x["time"]) >= LEAST_ROWS]
-    if not tables:
-        raise ParameterError("path", str(file), f"{bound}, {LEAST_ROWS} samples or more")
-    return max(tables, key=len)  # a file may hold smaller ones, such as a reference
+    return max(tables, key=len, default={})  # a file may hold smaller ones, such as a reference
 
 
 def _signals(scope: Mapping[str, Any]) -> dict[str, np.ndarray]:

@@ -11,7 +11,7 @@ pytest.importorskip("pinocchio")
 @pytest.mark.parametrize("name", ["planar_2r", "five_bar", "haptic_3", "leader_7"])
 def test_inertia_and_jacobian(name):
     """Closed chains within 1e-10 rad; all else is rounding."""
-    from benchmarks.arm_mechanics import largest_gaps
+    from benchmarks.peers.arm_mechanics import largest_gaps
 
     M, J = largest_gaps(CARDS / f"{name}.xml")
     assert M < 1e-10 and J < 1e-10

@@ -48,12 +48,20 @@ def test_the_commands_that_it_prints_run(tmp_path, capsys, monkeypatch):
         (T, np.where(np.arange(400) == 70, np.nan, T), "1 missing"),
         (T, np.full(400, 3.0), "constant"),
         (T, np.clip(np.sin(9.0 * T), -0.5, 0.5), "limited?"),
-        (T, (30.0 * T) % 6.28, "jumps of more than half the range"),
+        (T, (30.0 * T) % 6.2832, "begins again 3 times: an encoder that wraps"),
+        (T, 1.0 * (T > 0.4), "1 jumps of more than half the range"),
+        (T + 1e-4 * (-1.0) ** np.arange(400), T, "% of the steps are off by more than 5 %"),
     ],
 )
 def test_what_is_suspicious_is_said(t, x, said, tmp_path):
     log = hc.Log.read(written(tmp_path / "a.csv", "t,x", t, x))
     assert said in hc.studies.log_report(log).text()
+
+
+def test_a_second_clock_is_compared(tmp_path):
+    file = written(tmp_path / "a.csv", "t,timestamp [ms],x", T, 1e3 * 1.0002 * T + 5.0, T)
+    text = hc.studies.log_report(hc.Log.read(file)).text()
+    assert "a second clock, timestamp [ms]: it runs +200 ppm fast" in text
 
 
 def test_units_are_shown_as_they_were_read(tmp_path):

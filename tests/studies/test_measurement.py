@@ -469,7 +469,7 @@ FILE = ["identify", "--csv", "a.csv"]
         ("t,input,output\n" + ROWS + "0.2,nan,1\n", FILE, ["line 202", "'input'", "'nan'"]),
         ("t,input,output\n" + ROWS + "0.2,1\n", FILE, ["line 202", "3 cells, has 2"]),
         ('t,input,output\n0,1,"2\n' + ROWS, FILE, ["line 2", "'output'"]),
-        ("t,input,output\n" + ROWS + "0.3,1,2\n", FILE, ["t[200]", "5 %"]),
+        ("t,input,output\n" + ROWS + "0.1,1,2\n", FILE, ["t[200]", "goes back by 0.099 s"]),
         ("t,input,output\n" + ROWS, FILE, ["band", "too short"]),
         (
             "t,input,out [deg]\n" + ROWS,

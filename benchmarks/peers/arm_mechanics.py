@@ -1,6 +1,6 @@
 """Inertia and Jacobian of arms from files beside Pinocchio, which reads the same MJCF.
 
-    python -m benchmarks.arm_mechanics [FILE ...]
+    python -m benchmarks.peers.arm_mechanics [FILE ...]
 
 By default the arms of mjcf/arms. Closed chains are closed and projected here, in Pinocchio's terms.
 """
@@ -14,15 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 import hapticclay as hc
 
-try:
-    import pinocchio as pin
-except ImportError:  # of the extra bench; `main` needs it, whoever only looks does not
-    pin: Any = None
-
-CARDS = Path(__file__).parents[1] / "mjcf" / "arms"
+CARDS = Path(__file__).parents[2] / "mjcf" / "arms"
 POSES = 20
 AROUND = 0.3  # [rad] of the arm's pose
 NEWTON = 8  # steps that close a chain
