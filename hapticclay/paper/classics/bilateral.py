@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
 
+from ...model.controller import matrix_exponential
 from ...model.operator import Operator
 from ...scene.pair import Contact
 from ...scene.virtual_wall import Device
@@ -100,7 +100,7 @@ class Bilateral:
         whole = np.zeros((7, 7))  # state, 1, cos, sin
         whole[:4, :4], whole[:4, 4], whole[:4, 5] = A, push.steady * B, push.swing * B
         whole[5, 6], whole[6, 5] = -push.omega, push.omega
-        step = scipy.linalg.expm(whole * (times[1] - times[0]))
+        step = matrix_exponential(whole * (times[1] - times[0]))
         z = np.concatenate([np.zeros(4) if start is None else start, [1.0, 1.0, 0.0]])
         rows = []
         for _ in times:

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 
+from ...model.controller import matrix_exponential
 from ...model.operator import NO_HAND
 from ...scene.pair import Contact, Pair
 
@@ -33,7 +33,7 @@ class HeldArm:
         self.m, self.b, self.k = mass + load[0], damper + load[1], load[2]
         whole = np.array([[0, 1, 0], [-self.k, -self.b, 1], [0, 0, 0]], float)
         whole[1] /= self.m
-        step = scipy.linalg.expm(whole * Ts)
+        step = matrix_exponential(whole * Ts)
         (self.xx, self.xv, self.xf), (self.vx, self.vv, self.vf) = step[:2].tolist()
         self.x = self.v = self.felt = 0.0
 
