@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.io import savemat
 
 import hapticclay as hc
+from benchmarks import recordings
 from hapticclay.cli.app import main
 from hapticclay.studies.coulomb_axis import Axis
 
@@ -211,17 +212,19 @@ def test_a_column_that_is_missing_is_named(tmp_path):
 
 @pytest.mark.skipif(not RIG.is_dir(), reason="no logs of the rig")
 @pytest.mark.parametrize(
-    "name, P, rms",
+    "name, letter, rms, as_set",
     [
-        ("question1e_free_motion", 15.0, 2.147e-3),
-        ("m2_question1a_free_motion", 8.0, 3.708e-3),
-        ("m2_question1e_free_motion", 15.0, 3.160e-3),
+        ("question1e_free_motion", "e", 2.147e-3, 2.066e-3),
+        ("m2_question1a_free_motion", "a", 3.708e-3, 3.789e-3),
+        ("m2_question1e_free_motion", "e", 3.160e-3, 3.033e-3),
     ],
 )
-def test_the_rig(name, P, rms):
-    """Gains within 0.7 %, errors as measured, simulated within 4 %."""
-    found = hc.studies.identify_pair(hc.studies.PairLog.load(RIG / f"{name}.mat"))
-    assert found["P"].value == pytest.approx(P, rel=7e-3)
+def test_the_rig(name, letter, rms, as_set):
+    """Gains within 0.7 %, errors as measured, simulated within 4 %, as set to the last digit."""
+    log = hc.studies.PairLog.load(RIG / f"{name}.mat")
+    assert recordings.set_rms(log, recordings.LETTERS[letter]) == pytest.approx(as_set, abs=1e-6)
+    found = hc.studies.identify_pair(log)
+    assert found["P"].value == pytest.approx(recordings.LETTERS[letter].P, rel=7e-3)
     assert found.rms == pytest.approx(rms, abs=5e-7)  # half of the last printed digit
     assert found.simulated_rms == pytest.approx(rms, rel=0.04)
     if found.architecture == "position-force":
