@@ -123,15 +123,19 @@ def part_schema(plan: Plan, number: int) -> Any:
 
     marks = {DIGEST: plan.digest().encode(), NUMBER: b"%d" % number}
     kinds = {float: pa.float64(), int: pa.int64(), bool: pa.bool_(), str: pa.string()}
-    fields = [
-        _with_note(pa.field(name, kinds[type(x)]), column_note(name, plan.notes))
-        for name, x in plan.blank_row().items()
-    ]
+    fields = []
+    for name, x in plan.blank_row().items():
+        field = pa.field(name, kinds.get(type(x)) or pa.array([x]).type)
+        fields.append(_with_note(field, column_note(name, plan.notes)))
     return pa.schema(fields, marks)
 
 
+def _with_note(field: Any, note: tuple[str, str]) -> Any:
+    return field.with_metadata(dict(zip(NOTE, note, strict=True)))
+
+
 def _table(rows: list[dict[str, Any]], schema: Any) -> Any:
-    """Rows as a pyarrow Table. Its own `from_pylist` imports pandas: as long as a thousand runs."""
+    """Rows as a pyarrow Table."""
     import pyarrow as pa
 
     columns = [_array([row[field.name] for row in rows], field.type) for field in schema]
@@ -139,22 +143,23 @@ def _table(rows: list[dict[str, Any]], schema: Any) -> Any:
 
 
 def _array(values: list[Any], kind: Any) -> Any:
-    """Values as a pyarrow Array of float64, int64, bool or string."""
+    """Values as a pyarrow Array.
+
+    Those of numbers and words are made of their bytes: `pyarrow.array` imports pandas, which takes
+    as long as a thousand runs.
+    """
     import pyarrow as pa
 
     if kind == pa.string():
         texts = [x.encode() for x in values]
-        ends = np.cumsum([0, *map(len, texts)], dtype=np.int32)
-        buffers = [ends, b"".join(texts)]
+        buffers = [np.cumsum([0, *map(len, texts)], dtype=np.int32), b"".join(texts)]
     elif kind == pa.bool_():
         buffers = [np.packbits(np.array(values, bool), bitorder="little")]
-    else:
+    elif kind in (pa.float64(), pa.int64()):
         buffers = [np.array(values, np.float64 if kind == pa.float64() else np.int64)]
+    else:
+        return pa.array(values, kind)
     return pa.Array.from_buffers(kind, len(values), [None, *map(pa.py_buffer, buffers)])
-
-
-def _with_note(field: Any, note: tuple[str, str]) -> Any:
-    return field.with_metadata(dict(zip(NOTE, note, strict=True)))
 
 
 def write_part(plan: Plan, number: int, rows: list[dict[str, Any]], file: Any) -> None:
