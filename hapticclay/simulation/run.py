@@ -612,6 +612,8 @@ class Run:
         }
         out |= {name: float(x) for name, (x, is_there) in parts.items() if is_there}
         out["residual"] -= out.get("friction", 0.0) + out.get("joint_dampers", 0.0)
+        if m.general:  # it starts at rest; its weight has no zero of energy
+            out["throughput"] = float(w.through)
         return out
 
 
