@@ -7,6 +7,7 @@ from . import theory as theory
 from . import walls as walls
 from .arms.joint_law import JointPD as JointPD
 from .arms.mjcf_arm import MjcfArm as MjcfArm
+from .columns.log import Log as Log
 from .errors import Bound as Bound
 from .errors import ParameterError as ParameterError
 from .errors import Warning as Warning
@@ -47,6 +48,9 @@ from .scene.experiments import constant_cut as constant_cut
 from .scene.experiments import free as free
 from .scene.experiments import stability_test as stability_test
 from .scene.experiments import variable_cut as variable_cut
+from .scene.link import Link as Link
+from .scene.pair import Contact as Contact
+from .scene.pair import Pair as Pair
 from .scene.scenario import Scenario as Scenario
 from .scene.virtual_wall import Device as Device
 from .scene.virtual_wall import VirtualWall as VirtualWall

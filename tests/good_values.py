@@ -18,6 +18,7 @@ def good_values(folder):
     loop = hc.theory.Loop(K=1.0, b=90.0)
     zigzag = hc.walls.zigzag(1e-4)
     swept = hc.studies.Sweep("constant", {"b": hc.studies.Range(1.0, 9.0, 2)})
+    pair = hc.studies.PairLog(t, np.sin(t), np.sin(t - 0.05), np.cos(t))
     files = [cut.save(folder / "a.toml"), hc.constant_cut(b=50.0).save(folder / "b.toml")]
     by_name = {
         "axis": "x", "K": 1.0, "b": 90.0, "wall": wall, "scenario": cut, "subject": wall,
@@ -39,7 +40,14 @@ def good_values(folder):
     smooth = {"x": (0.0, 0.1), "y": (0.0, 0.1), "values": ((1.0, 1.0), (1.0, 1.0))}
     arm = hc.MjcfArm(ARM)
     of_joints = {"arm": arm, "law": hc.JointPD((100.0, 50.0), (1.0, 0.5))}
+    rubbed = hc.JointPD((100.0, 50.0), (1.0, 0.5), friction=((1.0, 9.0, 0.1), (0.2, 9.0, 0.0)))
+    device = hc.Device()
+    pair = {"pair": hc.Pair(device, device, hc.JointPD((100.0,), (5.0,)))}
     by_function = {
+        "pair_limits": pair, "pair_map": {**pair, "gains": 3, "delays": 3}, "compare_links": pair,
+        "pair_transparency": pair, "pair_hands": {**pair, "hands": hc.theory.Box(), "samples": 2},
+        "Pair": {"leader": device, "follower": device, "law": hc.JointPD((1.0,), (1.0,))},
+        "friction_cycle": {"arm": arm, "law": rubbed},
         "joint_limits": of_joints, "over_poses": of_joints,
         "wall_limit": {"arm": arm, "B": 1.0, "operator": hc.Operator()},
         "MjcfArm": {"file": ARM}, "JointPD": {"Kp": (1.0,), "Kd": (1.0,)},
@@ -72,12 +80,24 @@ def good_values(folder):
         "Trials": {"base": wall, "vary": {"K": hc.studies.Distribution("uniform", 1.0, 9.0)}},
         "run_staircase": {"staircase": hc.studies.Staircase(), "observer": hc.studies.Observer()},
         "staircase_mean": {"staircase": hc.studies.Staircase(), "observer": hc.studies.Observer()},
+        "Log": {"path": ARM, "table": hc.Log.read(_log(folder)).table},
+        "log_report": {"log": hc.Log.read(_log(folder))},
         "lab": {"name": "jnd"},
         "simulate_columns": {"base": cut, "columns": {"gain.x": np.ones(3)}},
         "run_columns": {"base": cut, "columns": {"gain.x": np.ones(3)}},
+        "PairLog": {"t": t, "leader": np.sin(t), "follower": np.cos(t), "follower_torque": t},
+        "identify_pair": {"log": pair},
+        "Recording": {"t": (0.0, 0.01), "p": np.zeros((2, 2))},
+        "replay": {"recording": hc.studies.Recording((0.0, 0.01), f=np.ones((2, 2)))},
         "Measurement": {"t": t, "input": np.sin(t), "output": np.cos(t)},
     }  # fmt: skip
     return by_name, by_function
+
+
+def _log(folder):
+    path = folder / "log.csv"
+    path.write_text("t,x\n0,1\n1,2\n")
+    return path
 
 
 def required(name, made, good):

@@ -42,6 +42,33 @@ HEAD = ("t", "x", "y")
 GOOD = {
     "plain": table(NUMBERS, HEAD).encode(),
     "mark": table(NUMBERS, HEAD).encode("utf-8-sig"),
+    "Latin-1": table(np.column_stack((NUMBERS, LOGS)), (*HEAD, "Kraft \u00b5N")).encode("latin-1"),
+    "UTF-16": table(NUMBERS, HEAD).encode("utf-16"),
+    "UTF-16 without a mark": table(NUMBERS, HEAD).encode("utf-16-le"),
+    "UTF-16, high byte first": table(NUMBERS, HEAD).encode("utf-16-be"),
+    "UTF-32": table(NUMBERS, HEAD).encode("utf-32"),
+    "spaces": table(NUMBERS, HEAD, " ").encode(),
+    "many spaces": table(NUMBERS, HEAD, "   ").replace("\n", "\n ").encode(),
+    "strokes": table(NUMBERS, HEAD, "|").encode(),
+    "commas and spaces": table(NUMBERS, HEAD, ", ").encode(),
+    "spaces and commas": table(NUMBERS, HEAD, " ", comma=True).encode(),
+    "tabs and commas": table(NUMBERS, HEAD, "\t", comma=True).encode(),
+    "quoted commas": table(NUMBERS, HEAD, '","', comma=True)
+    .replace("\n", '"\n"')
+    .removesuffix('"')
+    .replace('t","x","y"', '"t","x","y"', 1)
+    .encode(),
+    "names in a comment": ("# " + table(NUMBERS, HEAD, " ")).encode(),
+    "names in a comment of MATLAB": ("% rig 2\n% " + table(NUMBERS, HEAD, "\t")).encode(),
+    "names of the comment": ("# t, x, y\n" + table(NUMBERS, HEAD, " ").partition("\n")[2]).encode(),
+    "units in a comment": ("# t [s], x [m], y [m]\n" + table(NUMBERS, HEAD)).encode(),
+    "title lines": ("Rig 3, test 5\n2024-05-01\n\n" + table(NUMBERS, HEAD)).encode(),
+    "lines of settings": ("rate;1000\ngain;2,5\n" + table(NUMBERS, HEAD, ";")).encode(),
+    "sep=": ("sep=;\n" + table(NUMBERS, HEAD, ";")).encode(),
+    "a last row cut off": (table(NUMBERS, HEAD) + "30.0,1").encode(),
+    "no end of the last line": table(NUMBERS, HEAD).rstrip("\n").encode(),
+    "minus of typesetters": table(NUMBERS, HEAD).replace("-", "\u2212").encode(),
+    "exponents of Fortran": table(NUMBERS, HEAD).replace(".25\n", ".25D+00\n").encode(),
     "semicolons": table(NUMBERS, HEAD, ";").encode(),
     "tabs": table(NUMBERS, HEAD, "\t").encode(),
     "decimal commas": table(NUMBERS, HEAD, ";", comma=True).encode(),
@@ -76,12 +103,9 @@ def changed(text, row=None, **more):
 
 
 BAD = {
-    "Latin-1": (changed("t,x,y,Kraft \u00b5N").decode().encode("latin-1"), "line 1 holds"),
-    "UTF-16": (table(NUMBERS, HEAD).encode("utf-16"), "UTF-8"),
-    "UTF-16 without a mark": (table(NUMBERS, HEAD).encode("utf-16-le"), "UTF-8"),
-    "bytes": (bytes(range(256)), "UTF-8"),
+    "bytes": (bytes(range(256)), "must be a table of text; line 1 holds the byte 0x00"),
     "nothing": (b"", "empty"),
-    "no names": (table(NUMBERS, HEAD).partition("\n")[2].encode(), "must name its columns"),
+    "no names": (table(NUMBERS, HEAD).partition("\n")[2].encode(), "name its columns"),
     "NaN": (changed("0.75,nan,0", 4), "line 5"),
     "NaN at first": (changed("nan,nan,nan", 1), "line 2"),
     "infinite": (changed("0.75,-inf,0", 4), "line 5"),
@@ -99,7 +123,7 @@ BAD = {
     "points and commas": (changed("0,75;1;2", 4, separator=";"), "not both"),
     "thousands": (changed("0.75;1.234,5;2", 4, separator=";"), "'1.234,5'"),
     "a name twice": (table(np.column_stack((NUMBERS, LOGS)), (*HEAD, "x")).encode(), "once"),
-    "an unknown unit below": (table(NUMBERS, HEAD, units="s,lbf,m").encode(), "lbf"),
+    "an unknown unit below": (table(NUMBERS, HEAD, units="s,furlong,m").encode(), "furlong"),
     "another quantity below": (table(NUMBERS, HEAD, units="s,deg,deg").encode(), "deg"),
 }
 
@@ -134,8 +158,10 @@ def test_units_in_names_are_converted(names, size, tmp_path):
     np.testing.assert_allclose(np.column_stack((x.t, x.values)), NUMBERS * size, rtol=4e-16)
 
 
-@pytest.mark.parametrize("unit", ["lbf", "deg", "in", "raw", "%", "N/mm", "kg", "s"])
-def test_units_that_are_not_applied_are_refused(unit, tmp_path):
+@pytest.mark.parametrize(
+    "unit", ["furlong", "deg", "raw", "counts", "V", "lb", "%", "N/mm", "kg", "s"]
+)
+def test_units_of_no_force_or_length_are_refused(unit, tmp_path):
     path = tmp_path / "log.csv"
     for name in (f"x [{unit}]", f"x ({unit})", f"x [{unit}] filtered"):
         path.write_text(table(NUMBERS, ("t", name, "y")))
@@ -165,7 +191,7 @@ def test_the_places_of_a_hand_are_converted(tmp_path):
         "t,a,b,c,home\n0,2,0,0,0\n",
         "t,a,b,c,home\n0,yes,0,0,0\n",
         "t,a,b,c\n0,1,0,0\n",
-        "t [min],a,b,c,home\n0,1,0,0,0\n",
+        "t [mm],a,b,c,home\n0,1,0,0,0\n",
     ],
 )
 def test_buttons_are_0_or_1(text, tmp_path):

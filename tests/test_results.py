@@ -25,6 +25,14 @@ def columns():
 
 
 @functools.cache
+def pair():
+    """A log of a pair without friction."""
+    t = 2e-3 * np.arange(1000.0)
+    leader = 0.1 * np.sin(9.0 * t)
+    follower = leader - 2e-3 * np.sin(20.0 * t)
+    return hc.studies.PairLog(t, leader, follower, 12.0 * (leader - follower))
+
+
 def result(name):
     loop = hc.studies.PushedLoop("x", b=0.0, operator=HAND, Ts=3.6e-4)
     trials = hc.studies.Trials(WALL, {"K": hc.studies.Distribution("uniform", 1.0, 9e3)}, runs=20)
@@ -40,6 +48,10 @@ def result(name):
             "x", "G", realisations=2, periods=1, lines=8, period=1.5, band=(0.6, 15.0)
         ),
         "Fitted": lambda: hc.studies.fit_flow(columns()),
+        "IdentifiedPair": lambda: hc.studies.identify_pair(pair()),
+        "Replayed": lambda: hc.studies.replay(
+            hc.Scenario(), hc.studies.Recording([0.0, 0.1], f=np.ones((2, 2)))
+        ),
         "Band": lambda: hc.studies.gain_band(
             hc.theory.Loop("x"), hc.studies.Hands.around(HAND, 0.5), [10.0, 90.0],
             hc.studies.Draw(5),
@@ -57,7 +69,7 @@ def result(name):
 
 NAMES = (
     "ZWidth", "Impedance", "MeasuredImpedance", "DeviceMBK", "ArmMBK", "Identified", "Fitted",
-    "Band", "Instability", "Design", "Lab", "StaircaseRun",
+    "IdentifiedPair", "Replayed", "Band", "Instability", "Design", "Lab", "StaircaseRun",
 )  # fmt: skip
 
 

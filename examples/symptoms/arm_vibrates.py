@@ -35,6 +35,15 @@ print(poses.headline())
 wall = hc.theory.wall_limit(arm, "z", 5.0, hc.Operator(), Ts=1e-3, delay=1e-3)
 print(wall.headline())
 
+# %%
+# Friction fed forward in excess makes a limit cycle; few encoder counts hide it:
+haptic = hc.MjcfArm("haptic_3")
+rubbed = hc.JointPD(
+    (1.0,) * 3, (0.01,) * 3, velocity="difference", friction=[(0.02, 50.0, 0.0)] * 3
+)
+for counts in (None, 4000):
+    print(hc.theory.friction_cycle(haptic, rubbed, 1e-3, 1e-3, counts=counts).headline())
+
 fig, ax = plt.subplots()
 ax.barh(limits.names, limits.Kp[:, 1], height=0.5, alpha=0.4, label="stable")
 ax.plot(law.Kp, limits.names, "ko", label="present")

@@ -20,7 +20,10 @@ PAIRS = (  # names of stiffness and damping
 OPENARM = ("LeaderArmParam", "FollowerArmParam")
 OPENARM_JOINTS = 7  # and a gripper
 OPENARM_SLOPE = 0.1  # its friction torque is Fc tanh(0.1 k w)
-OTHERS = ("velocity", "cutoff", "runs", "friction", "gravity")
+OTHERS = (
+    "velocity", "cutoff", "runs", "friction", "gravity", "reference", "velocity_bits",
+    "velocity_range",
+)  # fmt: skip
 
 
 def read_gains(path: str | os.PathLike[str]) -> dict[str, Any]:

@@ -32,6 +32,10 @@ class JointPD:
         friction: friction that the host feeds forward at each joint, (Fc, k, Fv) of the torque
             Fc tanh(k w) + Fv w [N.m, s/rad, N.m.s/rad]; None for none.
         gravity: whether the host feeds gravity forward; None for as the arm says.
+        reference: joint positions to which the law pulls [rad], in runs, -1e3 to 1e3; [m] of
+            joints that slide; None for the arm's pose, or the angles at the start.
+        velocity_bits: bits of the converter of the rates, 2 to 32; None for none.
+        velocity_range: that converter spans -range to range [rad/s], > 0.
     """
 
     Kp: Annotated[tuple[float, ...], Bound(0.0, MOST_GAIN, "N.m/rad")]
@@ -41,6 +45,9 @@ class JointPD:
     runs: Literal["host", "drive"] = "host"
     friction: Annotated[tuple[tuple[float, ...], ...] | None, Bound(0.0, 1e6)] = None
     gravity: bool | None = None
+    reference: Annotated[tuple[float, ...] | None, Bound(-1e3, 1e3, "rad")] = None
+    velocity_bits: Annotated[int | None, Bound(2, 32)] = None
+    velocity_range: Annotated[float | None, Bound(0.0, 1e6, "rad/s", above=True)] = None
 
     def __post_init__(self):
         n = len(self.Kp)
@@ -51,12 +58,25 @@ class JointPD:
         if len(self._frictions) != n or len(self._frictions[0]) != len(FRICTION):
             bound = f"must have ({', '.join(FRICTION)}) for each of {n} joints"
             raise ParameterError("friction", self.friction, bound)
+        if self.reference is not None and len(self.reference) != n:
+            raise ParameterError("reference", self.reference, f"must have {n} numbers, as Kp")
+        if (self.velocity_bits is None) is not (self.velocity_range is None):
+            what = "must be given with velocity_bits, and left out without"
+            raise ParameterError("velocity_range", self.velocity_range, what)
         if (self.velocity == "filter") is not (self.cutoff is not None):
             what = "must be given with" if self.cutoff is None else "must be left out without"
             raise ParameterError("cutoff", self.cutoff, f"{what} velocity 'filter'")
 
     def __len__(self) -> int:
         return len(self.Kp)
+
+    @property
+    def words(self) -> str:
+        """The law in a few words."""
+        rates = {"difference": "by difference", "filter": f"filtered at {self.cutoff} rad/s"}
+        rate = rates.get(self.velocity, "exact")
+        fed = " with friction fed forward" * (self.friction is not None)
+        return f"PD of {len(self)} joints in the {self.runs}, rates {rate}{fed}"
 
     @property
     def slopes(self) -> tuple[float, ...]:

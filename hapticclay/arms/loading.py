@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,7 +20,10 @@ BOUNDS = {  # least and largest value, units at a hinge and at a slide
     "armature": (0.0, 1e3, "kg.m^2", "kg"),
     "damping": (0.0, 1e6, "N.m.s/rad", "N.s/m"),
     "friction": (0.0, 1e6, "N.m", "N"),
+    "torque_limit": (0.0, 1e6, "N.m", "N"),
 }
+OPEN = 1e-3  # [rad or m] by which a pose may miss a closed chain
+UNNAMED = "MuJoCo Model"  # MuJoCo's name of a model without one
 SLIDE = 2  # MuJoCo's number of a joint that slides
 IN_MODEL = {  # fields of the model with a value per degree of freedom
     "armature": "dof_armature",
@@ -61,11 +64,18 @@ def load(arm: Any) -> Loaded:
     pose = _pose(model, arm.pose, joints)
     names = tuple(model.joint(j).name for j in joints)
     dofs = [int(model.jnt_dofadr[j]) for j in joints]
-    fields: dict[str, Any] = {"joints": names, "site": None if site is None else _name(model, site)}
+    fields: dict[str, Any] = {
+        "file": _plain(arm.file),
+        "joints": names,
+        "site": None if site is None else _name(model, site),
+    }
     for field, of in IN_MODEL.items():
         values = getattr(model, of)
         values[dofs] = _per_joint(model, field, getattr(arm, field), joints, values[dofs])
         fields[field] = tuple(values[dofs].tolist())
+    limits = _file_limits(model, joints)
+    given = _per_joint(model, "torque_limit", arm.torque_limit, joints, limits)
+    fields["torque_limit"] = tuple(given)
     mechanism = Mechanism(model, dofs, site, pose)
     _check_mechanism(mechanism, names)
     fields["pose"] = {model.joint(j).name: float(q) for j, q in enumerate(mechanism.pose)}
@@ -74,7 +84,7 @@ def load(arm: Any) -> Loaded:
         mechanism,
         fields,
         _ranges(model, joints),
-        tuple(_notes(model, arm, mechanism, joints)),
+        (*_notes(model, arm, mechanism, joints), *_moved(model, arm, mechanism, pose)),
     )
 
 
@@ -99,7 +109,13 @@ def compiled(file: Any) -> tuple[Any, str]:
     for array in ("body_mass", "body_inertia", "dof_armature", "dof_damping", "jnt_axis"):
         if not np.isfinite(getattr(model, array)).all():
             raise _bad_file(file, f"{array} is not finite")
-    return model, spec.modelname
+    named = spec.modelname != UNNAMED or path is None
+    return model, spec.modelname if named else path.stem
+
+
+def _plain(file: Any) -> Any:
+    """A path as text, which files can hold."""
+    return os.fspath(file) if isinstance(file, os.PathLike) else file
 
 
 def _path(file: Any) -> Path:
@@ -240,6 +256,9 @@ def _per_joint(
     low, high, *units = BOUNDS[field]
     out = [float(x) for x in old]
     for i, x in pairs.items():
+        if field == "torque_limit" and x == math.inf:
+            out[i] = math.inf
+            continue
         unit = units[int(model.jnt_type[joints[i]]) == SLIDE]
         out[i] = number(f"{field}[{names[i]}]", x, low, high, unit=unit)
     return out
@@ -270,6 +289,12 @@ def _pose(model: Any, given: Any, joints: list[int]) -> np.ndarray:
     return start
 
 
+def _file_limits(model: Any, joints: list[int]) -> np.ndarray:
+    """Largest torque of each joint that the file allows, infinite for none."""
+    least = np.abs(model.jnt_actfrcrange[joints]).min(axis=1)
+    return np.where(model.jnt_actfrclimited[joints] > 0, least, math.inf)
+
+
 def _ranges(model: Any, joints: list[int]) -> np.ndarray:
     free = np.array([-math.inf, math.inf])
     return np.array([model.jnt_range[j] if model.jnt_limited[j] else free for j in joints])
@@ -284,7 +309,10 @@ def _check_mechanism(mechanism: Mechanism, names: Sequence[str]) -> None:
         bound = "must be free to move each by itself: constraints of the file tie them"
         raise ParameterError("joints", list(names), bound)
     if free := mechanism.freedom():
-        bound = f"must move all that its constraints hold: {free} more joints are free"
+        bound = (
+            f"must be those that are driven, at a pose that is not singular: beside them {free} "
+            "more can move under the constraints of the file"
+        )
         raise ParameterError("joints", list(names), bound)
     inertia = mechanism.inertia(mechanism.pose[mechanism.dofs])
     if not np.linalg.eigvalsh(inertia).min() > LIGHTEST:
@@ -293,6 +321,32 @@ def _check_mechanism(mechanism: Mechanism, names: Sequence[str]) -> None:
             "must have an inertia: the links behind it have none along its axis, nor has a rotor"
         )
         raise ParameterError("joint", light, bound)
+
+
+def _anchors(model: Any) -> Iterator[str]:
+    """Where bodies are connected: MuJoCo takes the second point from the pose of the drawing."""
+    from ..physics import mujoco
+
+    for i in range(model.neq):
+        bodies = model.eq_objtype[i] == int(mujoco.mjtObj.mjOBJ_BODY)
+        if bodies and model.eq_type[i] == int(mujoco.mjtEq.mjEQ_CONNECT):
+            points = [_shown(x) for x in np.array(model.eq_data[i][:6]).reshape(2, 3)]
+            first, second = (model.body(x[i]).name for x in (model.eq_obj1id, model.eq_obj2id))
+            yield f"{points[0]} of {first} is {points[1]} of {second} [m]"
+
+
+def _shown(point: np.ndarray) -> str:
+    return "(" + ", ".join(f"{x:.4g}" for x in np.round(point, 9) + 0.0) + ")"
+
+
+def _moved(model: Any, arm: Any, mechanism: Mechanism, pose: np.ndarray) -> Iterator[str]:
+    """A sentence if the pose of the file does not close the arm's chain."""
+    if arm.pose is None and mechanism.following:
+        i = max(mechanism.following, key=lambda i: abs(mechanism.pose[i] - pose[i]))
+        gap = float(mechanism.pose[i] - pose[i])
+        if abs(gap) > OPEN:
+            name = model.joint(i).name
+            yield f"the pose of the file does not close the chain: {name} was moved by {gap:.3g}"
 
 
 def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> list[str]:
@@ -319,6 +373,7 @@ def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> lis
     if mechanism.following:
         tied = [model.joint(j).name for j in mechanism.following]
         notes.append(f"constraints, taken as rigid, move {', '.join(tied)}")
+        notes += _anchors(model)
     if model.nu:
         notes.append(f"{model.nu} actuators of the file take no part")
     if np.any(model.geom_contype | model.geom_conaffinity):

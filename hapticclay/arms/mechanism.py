@@ -6,6 +6,8 @@ Constraints are projected out exactly, where the engine's own are soft.
 
 from __future__ import annotations
 
+import copy
+import threading
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +17,8 @@ from ..errors import ParameterError
 STEP = 1e-5  # [rad or m] of differences of static torques: 1e-10 of them is rounding
 CLOSED = 1e-10  # [rad or m] a closed chain is closed within
 MOST_CLOSING = 50  # Newton steps that close a chain
+STILL = 1e-9  # [m] least motion of the handle per joint rate
+POSES_TRIED, NEARBY = 8, 0.3  # poses at which the handle's motion is asked, rms off [rad or m]
 DEPENDENT = 1e-9  # of the largest singular value: smaller ones belong to redundant constraints
 
 
@@ -38,6 +42,18 @@ class Linear(NamedTuple):
     jacobian: np.ndarray
 
 
+class Moving(NamedTuple):
+    """Terms of motion, n joints.
+
+    Attributes:
+        bias: torques of motion, weight and springs [N.m], shape (n,).
+        centripetal: less the acceleration of the handle while the joints turn evenly [m/s^2], (3,).
+    """
+
+    bias: np.ndarray
+    centripetal: np.ndarray
+
+
 class Mechanism:
     """A compiled model with a choice of driven joints.
 
@@ -54,13 +70,20 @@ class Mechanism:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-        self._data = mujoco.MjData(model)
+        self._own = threading.local()  # data of each thread
         self.dofs = list(dofs)
         self._place(pose)
         rows = self._constraints()[0]
         moved = [i for i in range(model.nv) if np.any(rows[:, i])] if len(rows) else []
         self.following = [i for i in moved if i not in self.dofs]
         self.pose = self._closed(pose)
+
+    @property
+    def _data(self) -> Any:
+        """The engine's data, of this thread alone."""
+        if not hasattr(self._own, "data"):
+            self._own.data = self._mujoco.MjData(self._model)
+        return self._own.data
 
     # ---- one pose
 
@@ -90,10 +113,138 @@ class Mechanism:
     def handle(self, q: np.ndarray) -> np.ndarray:
         """Position of the handle in the frame of the world [m], shape (3,)."""
         self._at(q)
+        return self.handle_place()
+
+    # ---- runs
+
+    def axes(self) -> list[int]:
+        """Axes of the world along which the handle can move, here or at poses nearby."""
+        rng = np.random.default_rng(0)
+        moves, q = np.zeros(3), self.pose[self.dofs]
+        for _ in range(POSES_TRIED):
+            try:
+                moves = np.maximum(moves, np.abs(self.at(q).jacobian).max(axis=1))
+            except ParameterError:  # a chain that cannot be closed there
+                pass
+            q = self.pose[self.dofs] + rng.normal(0.0, NEARBY, len(self.dofs))
+        return np.flatnonzero(moves > STILL).tolist()
+
+    def runnable(self) -> Any:
+        """A copy of the model in which nothing acts but inertia and weight.
+
+        Raises:
+            ParameterError: the weight of a part of the arm is compensated in the file.
+        """
+        model, bits = copy.copy(self._model), self._mujoco.mjtDisableBit
+        for name in ("CONSTRAINT", "SENSOR", "EULERDAMP"):
+            model.opt.disableflags |= getattr(bits, f"mjDSBL_{name}")
+        model.jnt_stiffness[:], model.dof_damping[:], model.body_gravcomp[:] = 0.0, 0.0, 0.0
+        if not self.weighs:
+            model.opt.gravity[:] = 0.0
+        return model
+
+    @property
+    def model(self) -> Any:
+        """The compiled model."""
+        return self._model
+
+    @property
+    def weighs(self) -> bool:
+        """Whether weights act.
+
+        Raises:
+            ParameterError: only in a part of the arm.
+        """
+        model, off = self._model, self._mujoco.mjtDisableBit.mjDSBL_GRAVITY
+        if model.opt.disableflags & off or not np.any(model.opt.gravity):
+            return False
+        shares = np.unique(model.body_gravcomp[1:][model.body_mass[1:] > 0.0])
+        if np.any(shares) and not np.array_equal(shares, [1.0]):
+            bound = "must be 0 or 1 in runs, the same for all bodies"
+            raise ParameterError("gravcomp", shares.tolist(), bound)
+        return not np.any(shares)
+
+    @property
+    def springs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stiffness of each joint's spring [N.m/rad], and where it rests [rad]."""
+        model, dofs = self._model, self.dofs
+        return np.array(model.jnt_stiffness[dofs]), np.array(model.qpos_spring[dofs])
+
+    @property
+    def site(self) -> tuple[str, int] | None:
+        """Kind, "site" or "body", and index of the handle."""
+        return self._site
+
+    @property
+    def position(self) -> np.ndarray:
+        """Positions of all joints of the model, as last put [rad or m]."""
+        return self._data.qpos.copy()
+
+    def put(self, position: np.ndarray) -> None:
+        """Puts all joints of the model to positions at which its constraints hold [rad or m]."""
+        self._place(position)
+
+    def at(self, q: np.ndarray) -> Linear:
+        """Places the arm, and returns its inertia, dampers and Jacobian there."""
+        self._at(q)
+        whole, follow = np.zeros((self._model.nv,) * 2), self._follow()
+        self._mujoco.mj_fullM(self._model, self._data, whole)
+        none = np.zeros((len(self.dofs),) * 2)
+        damping = follow.T @ (self._model.dof_damping[:, None] * follow)
+        jacobian = self._jacobian() @ follow
+        return Linear(follow.T @ whole @ follow, damping, none, none, none, jacobian)
+
+    def moving(self, w: np.ndarray) -> Moving:
+        """Terms of the arm's motion where `at` put it, at rates of its joints [rad/s]."""
+        data, rates = self._data, self._follow() @ w
+        drift = self._drift(rates) if self.following else np.zeros(self._model.nv)
+        data.qvel[:] = rates
+        self._mujoco.mj_fwdVelocity(self._model, data)
+        whole, turned = np.zeros((self._model.nv,) * 2), np.zeros((3, self._model.nv))
+        self._mujoco.mj_fullM(self._model, data, whole)
         kind, number = self._site or ("body", 0)
-        return np.array(getattr(self._data, "site_xpos" if kind == "site" else "xpos")[number])
+        body = int(self._model.site_bodyid[number]) if kind == "site" else number
+        self._mujoco.mj_jacDot(self._model, data, turned, None, self.handle_place(), body)
+        torques = data.qfrc_bias - data.qfrc_spring - data.qfrc_gravcomp + whole @ drift
+        return Moving(torques @ self._follow(), -(turned @ rates + self._jacobian() @ drift))
+
+    def weights(self) -> np.ndarray:
+        """Torques that hold the arm against its weight where `at` put it [N.m], shape (n,)."""
+        return (self._data.qfrc_bias - self._data.qfrc_gravcomp) @ self._follow()
+
+    def energy(self, q: np.ndarray, w: np.ndarray) -> float:
+        """Energy of motion, weight and springs at positions and rates of the joints [J]."""
+        self._at(q)
+        data = self._data
+        data.qvel[:] = self._follow() @ w
+        self._mujoco.mj_energyPos(self._model, data)
+        self._mujoco.mj_fwdVelocity(self._model, data)
+        self._mujoco.mj_energyVel(self._model, data)
+        lifted = 0.0
+        if not self.weighs:
+            lifted = -float(self._model.body_mass @ (data.xipos @ self._model.opt.gravity))
+            lifted *= not self._model.opt.disableflags & self._mujoco.mjtDisableBit.mjDSBL_GRAVITY
+        return float(data.energy.sum()) - lifted
+
+    def _drift(self, rates: np.ndarray) -> np.ndarray:
+        """Acceleration of the followers while the arm's joints turn evenly."""
+        here, rows = self.position, []
+        h = STEP / max(1.0, float(np.abs(rates).max()))
+        for sign in (1.0, -1.0):
+            self._place(here + sign * h * rates)
+            rows.append(self._constraints()[0])
+        self._place(here)
+        turned = (rows[0] - rows[1]) @ rates / (2.0 * h)
+        out = np.zeros(len(rates))
+        own = self._constraints()[0][:, self.following]
+        out[self.following] = -np.linalg.lstsq(own, turned, rcond=DEPENDENT)[0]
+        return out
 
     # ---- the engine's terms
+
+    def handle_place(self) -> np.ndarray:
+        kind, number = self._site or ("body", 0)
+        return np.array(getattr(self._data, "site_xpos" if kind == "site" else "xpos")[number])
 
     def _place(self, position: np.ndarray) -> None:
         self._data.qpos[:], self._data.qvel[:] = position, 0.0

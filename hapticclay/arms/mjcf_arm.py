@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -11,7 +13,7 @@ import numpy as np
 from ..arguments import named
 from ..errors import ParameterError, array_of, choice
 from .loading import load
-from .mechanism import Linear
+from .mechanism import Linear, Mechanism
 
 PerJoint = Mapping[str, float] | Sequence[float] | None
 
@@ -40,6 +42,11 @@ class MjcfArm:
         friction: Coulomb friction of the joints [N.m], 0 to 1e6, likewise.
         gravity: "compensated" if the controller holds the arm against gravity, by the torque for
             the measured joint positions; "acts" if nothing does.
+        torque_limit: largest torque of each joint's motor [N.m], > 0, likewise; None for that of
+            the file, or none.
+        plane: in runs, the axes of the world, such as "xy" or "zx", in which clay and forces lie
+            and which p, v and forces name x and y; None for the first two along which the handle
+            moves.
     """
 
     file: Any
@@ -50,13 +57,23 @@ class MjcfArm:
     damping: PerJoint = None
     friction: PerJoint = None
     gravity: Literal["compensated", "acts"] = "compensated"
+    torque_limit: PerJoint = None
+    plane: str | None = None
 
     def __post_init__(self):
         choice("gravity", self.gravity, ("compensated", "acts"))
+        if self.plane is not None:
+            choice("plane", self.plane, tuple(map("".join, itertools.permutations("xyz", 2))))
         loaded = load(self)
         for name, value in loaded.fields.items():
             object.__setattr__(self, name, value)
         object.__setattr__(self, "_loaded", loaded)
+
+    def __reduce__(self) -> Any:
+        fields = {x.name: getattr(self, x.name) for x in dataclasses.fields(self)}
+        if not isinstance(self.file, str):  # a spec, whose defaults and assets its XML has
+            fields["file"] = self.file.to_xml()
+        return _arm_of, (fields, isinstance(self.file, str))
 
     def __repr__(self) -> str:
         return f"<MjcfArm {self.name}: {', '.join(self.names)}>"
@@ -86,6 +103,23 @@ class MjcfArm:
         """Least and largest position of each joint [rad or m], infinite for none, shape (n, 2)."""
         return self._loaded.ranges.copy()  # type: ignore[attr-defined]
 
+    @property
+    def mechanism(self) -> Mechanism:
+        """The compiled model with the arm's joints."""
+        return self._loaded.mechanism  # type: ignore[attr-defined]
+
+    @property
+    def axes(self) -> str:
+        """Axes of the world that p, v and forces of runs have, in this order, as "xyz".
+
+        Raises:
+            ParameterError: the arm has no handle, or it does not move along the plane.
+        """
+        self.check_handle()
+        found = "".join("xyz"[i] for i in self.mechanism.axes())
+        plane = self.plane or (found + "".join(c for c in "xyz" if c not in found))[:2]
+        return plane + "".join(c for c in found if c not in plane)
+
     def linear(self, q: Sequence[float] | np.ndarray | None = None) -> Linear:
         """The arm linearised at a pose: all that its linear theory needs.
 
@@ -95,7 +129,7 @@ class MjcfArm:
         Raises:
             ParameterError: q is not n finite numbers, or its chains cannot be closed there.
         """
-        return self._loaded.mechanism.linear(self._place(q))  # type: ignore[attr-defined]
+        return self.mechanism.linear(self._place(q))
 
     def mass_matrix(self, q: Sequence[float] | np.ndarray | None = None) -> np.ndarray:
         """Inertia M(q) of the joints, rotors included [kg.m^2], shape (n, n).
@@ -106,7 +140,7 @@ class MjcfArm:
         Raises:
             ParameterError: as `linear`.
         """
-        return self._loaded.mechanism.inertia(self._place(q))  # type: ignore[attr-defined]
+        return self.mechanism.inertia(self._place(q))
 
     def gravity_stiffness(self, q: Sequence[float] | np.ndarray | None = None) -> np.ndarray:
         """Change of the gravity torques with the joint positions [N.m/rad], shape (n, n).
@@ -141,7 +175,7 @@ class MjcfArm:
             ParameterError: as `jacobian`.
         """
         self.check_handle()
-        return self._loaded.mechanism.handle(self._place(q))  # type: ignore[attr-defined]
+        return self.mechanism.handle(self._place(q))
 
     def check_handle(self) -> None:
         """Refuses an arm that has no handle.
@@ -161,3 +195,12 @@ class MjcfArm:
             bound = f"must be {len(self.names)} finite numbers ({', '.join(self.names)})"
             raise ParameterError("q", place.tolist(), bound)
         return place
+
+
+def _arm_of(fields: dict[str, Any], is_file: bool) -> MjcfArm:
+    """An arm again, from its fields and the XML of its spec."""
+    if not is_file:
+        from ..physics import mujoco
+
+        fields["file"] = mujoco.MjSpec.from_string(fields["file"])
+    return MjcfArm(**fields)

@@ -24,8 +24,9 @@ class ArmCommand:
     """Judge the joints of an arm from its MJCF or URDF file, under the gains of its controller.
 
     Prints the least and largest gain of each joint, all coupled, the frequency at which it buzzes,
-    the delay and rate left, and what to change first; with --wall the stiffest wall at the handle;
-    with --poses the same over the workspace. Exact for small motions about the pose: no runs.
+    the delay and rate left, and what to change first; if the gains feed friction forward, its limit
+    cycles; with --wall the stiffest wall at the handle; with --poses the same over the workspace.
+    Exact for small motions about the pose: no runs.
 
     Attributes:
         file: MJCF or URDF file of the arm, or the name of one of the package: planar_2r, five_bar,
@@ -43,7 +44,10 @@ class ArmCommand:
         joints: Joints of the arm, in the order of the gains; by default those before the handle.
         pose: Joint positions, a number for each joint or NAME=POSITION [rad or m].
         armature: Reflected inertia of the rotors, a number for each joint or NAME=INERTIA [kg.m^2].
+        damping: Viscous damping of the joints, likewise [N.m.s/rad].
+        friction: Coulomb friction of the joints, likewise [N.m].
         gravity: Whether the controller holds the arm against gravity.
+        counts: Encoder counts a turn behind the friction that the gains feed forward.
         wall: Axis of the world along which a wall at the handle pushes.
         B: Damping of that wall [N.s/m].
         hand: Mass, damper and spring of a hand at the handle [kg, N.s/m, N/m].
@@ -67,7 +71,10 @@ class ArmCommand:
     joints: tuple[str, ...] = ()
     pose: tuple[str, ...] = ()
     armature: tuple[str, ...] = ()
+    damping: tuple[str, ...] = ()
+    friction: tuple[str, ...] = ()
     gravity: Literal["compensated", "acts"] = "compensated"
+    counts: Annotated[int | None, Bound(1, 10**9)] = None
     wall: Literal["x", "y", "z"] | None = None
     B: Annotated[float, Bound(0.0, unit="N.s/m")] = 0.0
     hand: walls.Hand | None = None
@@ -80,6 +87,9 @@ class ArmCommand:
         Unused(("rate",), "is 1/Ts: give --Ts or --rate", ("Ts",)),
         Unused(("Kp", "Kd"), "is in the file of --gains: give one of the two", ("gains",)),
         Unused(("poses",), "needs gains: give --gains, or --Kp and --Kd", (), ("gains", "Kp")),
+        Unused(("seed",), "is of the draw of --poses", (), ("poses",)),
+        Unused(("B", "hand"), "is of the wall: give --wall", (), ("wall",)),
+        Unused(("counts",), "is of friction that a file of --gains feeds forward", (), ("gains",)),
     )
 
     def __call__(self) -> int:
@@ -92,13 +102,15 @@ class ArmCommand:
 
     def _answers(self, arm: MjcfArm) -> Any:
         """The limits of the gains, of a wall, and over poses: those that are asked for."""
-        from ..theory import joint_gains, joint_poses, joint_walls
+        from ..theory import fed_friction, joint_gains, joint_poses, joint_walls
 
         if self.gains or self.Kp:
             law = self._law()
-            yield joint_gains.joint_limits(arm, law, self._Ts, self.delay)
+            timing = self._Ts, self.delay
+            yield joint_gains.joint_limits(arm, law, *timing)
+            if law.friction or self.counts:
+                yield fed_friction.friction_cycle(arm, law, *timing, self.counts)
             if self.poses:
-                timing = self._Ts, self.delay
                 yield joint_poses.over_poses(arm, law, *timing, self.poses, self.seed)
         elif not self.wall:
             raise ParameterError("gains", None, "must be given, or --Kp and --Kd, or --wall")
@@ -121,6 +133,8 @@ class ArmCommand:
             joints=self.joints or None,
             pose=_per_joint("pose", self.pose),
             armature=_per_joint("armature", self.armature),
+            damping=_per_joint("damping", self.damping),
+            friction=_per_joint("friction", self.friction),
             gravity=self.gravity,
         )
 

@@ -6,7 +6,16 @@ import importlib
 import pkgutil
 from pathlib import Path
 
-SHARED = ("app", "commands", "console", "device_options", "manual", "options", "parser")
+SHARED = (
+    "app",
+    "commands",
+    "console",
+    "device_options",
+    "log_options",
+    "manual",
+    "options",
+    "parser",
+)
 SHARED += ("unused", "walls")  # modules that are no commands
 COMMANDS = {
     name: f"{__package__}.{name}"

@@ -120,7 +120,24 @@ def ends() -> Iterator[list[int]]:
 
 
 @dataclass(frozen=True)
-class FigureOptions:
+class FigureLook:
+    """How a command draws its figures.
+
+    Attributes:
+        format: Formats of the figures: png, svg, pdf; several may be given.
+        dpi: Resolution of PNG files [pixels/inch]; by default 100, and 300 in print.
+        style: For a screen, or for print: one column of 8.5 cm, or two of 17.5 cm.
+    """
+
+    format: tuple[Literal["png", "svg", "pdf"], ...] = ("png",)
+    dpi: Annotated[float | None, Bound(10.0, 2400.0)] = None
+    style: Literal["screen", "print", "print-wide"] = "screen"
+
+    unused: ClassVar[tuple[Unused, ...]] = (undrawn("no-plots"), undrawn("no-maps"))
+
+
+@dataclass(frozen=True)
+class FigureOptions(FigureLook):
     """How a command writes its figures.
 
     Attributes:
@@ -130,21 +147,17 @@ class FigureOptions:
         data: Also write the numbers that each figure shows, as CSV.
     """
 
-    format: tuple[Literal["png", "svg", "pdf"], ...] = ("png",)
-    dpi: Annotated[float | None, Bound(10.0, 2400.0)] = None
-    style: Literal["screen", "print", "print-wide"] = "screen"
     data: bool = False
-
-    unused: ClassVar[tuple[Unused, ...]] = (undrawn("no-plots"), undrawn("no-maps"))
 
 
 def save_figures(
-    figures: Mapping[str, Figure], folder: Path, options: FigureOptions | None = None
+    figures: Mapping[str, Figure], folder: Path, options: FigureLook | None = None
 ) -> dict[str, list[Path]]:
     """Writes figures as folder/NAME.png or in other formats, and returns the files by name."""
     o = options or FigureOptions()
+    data = isinstance(o, FigureOptions) and o.data
     written = {
-        name: figure.save(folder / name, o.format, o.dpi, o.style, o.data)
+        name: figure.save(folder / name, o.format, o.dpi, o.style, data)
         for name, figure in figures.items()
     }
     return {name: files for name, files in written.items() if files}
@@ -153,7 +166,7 @@ def save_figures(
 def deliver(
     found: Result,
     out: Path,
-    figures: FigureOptions | None = None,
+    figures: FigureLook | None = None,
     *,
     text: str | None = None,
     pages: Mapping[str, Callable[[], str]] | None = None,

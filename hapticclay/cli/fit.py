@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from ..errors import Bound, ParameterError
 from ..files import writable
 from . import console
-from .identify import column_names
+from .log_options import LogOptions, column_names, found_line
 from .options import Loose
 
 if TYPE_CHECKING:
@@ -29,16 +29,18 @@ class FitCommand:
     """Fit the law by which clay resists, f = (Fy + K |v|^n) v/|v| + b v, and choose its terms.
 
     Attributes:
-        source: CSV file of time [s], position [m] and force of the clay on the tool, counted as
-            resistance [N]; or the folder of a record, or its record.npz.
+        source: Log of time, position and force of the clay on the tool, counted as resistance:
+            text, Parquet, MATLAB, HDF5 and others; or the folder of a record, or its record.npz.
         out: Folder for fit.json and fit.png.
         axis: Axis of a record; "path" is along the motion, whatever its direction.
-        columns: Names in the file, as in t=time p=pos f=force.
+        columns: Names in the file, as in t=time p=pos f=force; those that are not given are looked
+            for.
         laws: Candidate laws: viscous, Coulomb, Bingham, power-law, Herschel-Bulkley; by default
             all.
         level: Confidence level of the intervals.
         time: First and last time to use [s].
         place: Lowest and highest position to use [m].
+        log: Units of the columns.
         figures: Format and style of the figure.
     """
 
@@ -50,6 +52,7 @@ class FitCommand:
     level: float = 0.95
     time: Annotated[tuple[float, float] | None, Bound(unit="s", names=("first", "last"))] = None
     place: Annotated[tuple[float, float] | None, Bound(unit="m", names=("low", "high"))] = None
+    log: LogOptions = LogOptions()
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
@@ -57,12 +60,14 @@ class FitCommand:
         from ..studies.flow_models import FLOW_LAWS
 
         writable(self.out)
-        recorded = os.path.isdir(self.source) or self.source.suffix == ".npz"
+        recorded = self._recorded
         if self.source.suffix == ".toml":
-            bound = "must be a CSV file or a record, not a scenario: run it first"
+            bound = "must be a log or a record, not a scenario: run it first"
             raise ParameterError("source", str(self.source), bound)
-        if recorded and self.columns:
-            raise ParameterError("columns", self.columns, "is for a CSV file: leave it out")
+        for name in ("columns", "units", "counts", "table", "where"):
+            words = self.columns if name == "columns" else getattr(self.log, name)
+            if recorded and words:
+                raise ParameterError(name, words, "is for a log: leave it out")
         if self.axis and not recorded:
             raise ParameterError("axis", self.axis, "is for a record: leave it out")
         fitted = fit_flow(
@@ -76,18 +81,29 @@ class FitCommand:
         console.deliver(fitted, self.out, self.figures)
         return 0
 
+    @property
+    def _recorded(self) -> bool:
+        """Whether the source is a record of this package."""
+        return os.path.isdir(self.source) or self.source.suffix == ".npz"
+
     def _measured(self) -> Measurement:
-        from ..studies.measurement import Measurement
+        from ..studies.measurement import measured, named_columns
 
         given = column_names(self.columns, FIT_COLUMNS, COLUMNS_EXAMPLE)
-        names = {x: x for x in FIT_COLUMNS} | given
+        log, names = (
+            self.log.log(self.source, "source"),
+            {FIT_COLUMNS[k]: x for k, x in given.items()},
+        )
+        own = {theirs: name for name, theirs in FIT_COLUMNS.items()}
         try:
-            return Measurement.load(self.source, {FIT_COLUMNS[k]: x for k, x in names.items()})
+            names = named_columns(log, names, input="force")
         except ParameterError as error:  # in the words of this command
-            field, bound = error.field, error.bound
-            for name, theirs in FIT_COLUMNS.items():
-                if field == f"columns.{theirs}":
-                    field = f"columns.{name}"
-                    if name not in given:
-                        bound += f"; give --columns {COLUMNS_EXAMPLE}"
-            raise ParameterError(field, error.value, bound) from None
+            key = error.field.removeprefix("columns.")
+            if key not in own:
+                raise
+            hint = "" if own[key] in given else f"; give --columns {COLUMNS_EXAMPLE}"
+            value = own[key] if error.value == key else error.value
+            raise ParameterError(f"columns.{own[key]}", value, error.bound + hint) from None
+        if line := found_line(given, {own[key]: name for key, name in names.items()}):
+            print(line)
+        return measured(log, names, "linear")

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from ..errors import Bound, ParameterError, choice
+from ..errors import Bound
 from ..files import writable
 from ..model.constants import AXES
 from . import console
+from .log_options import LogOptions, column_names, found_line
+from .options import Loose
 from .unused import Unused
 
 if TYPE_CHECKING:
@@ -29,12 +31,14 @@ SPACING, QUICK_SPACING = 0.08, 0.2  # [m] between the poses of the map
 class IdentifyCommand:
     """Identify G, Sh and Th on the simulated arm (Figs. 4, 5, 6); takes a minute.
 
-    With --csv, identify one of them from measured columns in SI units.
+    With a FILE, identify one of them from a log of your own device.
 
     Attributes:
-        out: Folder for identify.json, fig4.png, fig5.png, fig6.png and map.png; with --csv for
+        file: Log of time, input (for G the command, for S and Th the force of the hand on the
+            handle) and output (position of the handle): text, Parquet, MATLAB, HDF5 and others.
+        out: Folder for identify.json, fig4.png, fig5.png, fig6.png and map.png; with a file for
             identify.json and identify.png.
-        axis: Axis to identify. With --csv, the axis of the printed equation to compare with, by
+        axis: Axis to identify. With a file, the axis of the printed equation to compare with, by
             default x.
         noise: Add sensor noise: encoders with 65536 counts per turn, a force sensor with 0.02 N
             rms.
@@ -43,19 +47,19 @@ class IdentifyCommand:
         quick: Use shorter signals and a coarser map.
         seed: Seed of the signals' phases and of the noise.
         control: Control of the runs; "sampled" takes about ten minutes, two with --quick.
-        csv: File of measured columns. Its first line names them: time [s], input (for G the command
-            [m], for S and Th the force of the hand on the handle [N]) and output (position of the
-            handle [m]).
+        csv: The file, as in earlier releases.
         what: Block to fit to the file, by default G.
-        columns: Names in the file, as in t=time input=cmd output=pos. reference=NAME adds the
-            signal that drives the experiment; use it if a position or force is noisy or part of a
-            loop.
+        columns: Names in the file, as in t=time input=cmd output=pos; those that are not given
+            are looked for. reference=NAME adds the signal that drives the experiment; use it if a
+            position or force is noisy or part of a loop.
         band: Lowest and highest frequency to fit [Hz].
         held: A computer holds the input of the file from sample to sample.
         paper: Show the paper's equation beside the fit, in the table and the figure.
+        log: Units of the columns.
         figures: Formats and style of the figures.
     """
 
+    file: Loose[Path | None] = None
     out: Path = Path("out/identify")
     axis: Literal["x", "y", "both"] = "both"
     noise: bool = False
@@ -69,27 +73,32 @@ class IdentifyCommand:
     band: Annotated[tuple[float, float] | None, Bound(unit="Hz", names=("low", "high"))] = None
     held: bool = False
     paper: bool = False
+    log: LogOptions = LogOptions()
     figures: console.FigureOptions = console.FigureOptions()
 
     unused: ClassVar[tuple[Unused, ...]] = (
-        Unused(
-            ("noise", "map", "quick", "seed", "control"),
-            "is for the simulated arm: leave it out with --csv",
-            ("csv",),
+        Unused(("file",), "is the file: leave --csv out", ("csv",)),
+        *(
+            Unused(
+                ("noise", "map", "quick", "seed", "control"),
+                "is for the simulated arm: leave it out with a file",
+                (file,),
+            )
+            for file in ("file", "csv")
         ),
         Unused(
-            ("what", "columns", "band", "held", "paper"),
-            "is for measured columns: give --csv FILE too",
+            ("what", "columns", "band", "held", "paper", "units", "counts", "table", "where"),
+            "is for a log: give FILE too",
             (),
-            ("csv",),
+            ("file", "csv"),
         ),
     )
 
     def __call__(self) -> int:
         from ..studies.identified_blocks import IdentifiedBlocks
 
-        if self.csv:
-            return self._measured(self.csv)
+        if file := self.file or self.csv:
+            return self._measured(file)
         writable(self.out)
         with console.fraction_bar("identify") as show:
             results = self._blocks(show)
@@ -99,13 +108,18 @@ class IdentifyCommand:
 
     def _measured(self, file: Path) -> int:
         from ..studies.identified_blocks import IdentifiedBlocks
-        from ..studies.measurement import COLUMNS, Measurement
+        from ..studies.measurement import COLUMNS, measured, named_columns
         from ..studies.spectral_fit import identify_data
 
         writable(self.out)
-        data = Measurement.load(file, column_names(self.columns, COLUMNS))
+        what, given = self.what or "G", column_names(self.columns, COLUMNS)
+        log = self.log.log(file, "csv" if self.csv else "file")
+        names = named_columns(log, given, input="command" if what == "G" else "force")
         axis = "x" if self.axis == "both" else self.axis
-        result = identify_data(data, self.what or "G", axis, band=self.band, held=self.held)
+        data = measured(log, names, "hold" if self.held else "spline")
+        result = identify_data(data, what, axis, band=self.band, held=self.held)
+        if line := found_line(given, names):
+            print(line)
         console.deliver(IdentifiedBlocks((result,), paper=self.paper), self.out, self.figures)
         return 0
 
@@ -135,20 +149,3 @@ class IdentifyCommand:
             seed=self.seed,
             progress=lambda done, total: show(done / total, "map"),
         )
-
-
-def column_names(
-    words: Sequence[str],
-    columns: Collection[str],
-    example: str = "t=time input=cmd output=pos",
-) -> dict[str, str]:
-    """Names of columns from words such as "input=cmd"."""
-    out: dict[str, str] = {}
-    for word in words:
-        key, _, name = word.partition("=")
-        if not name:
-            raise ParameterError("columns", word, f"must be words such as {example}")
-        if choice("columns", key, tuple(columns)) in out:
-            raise ParameterError("columns", word, f"must give {key} once")
-        out[key] = name
-    return out

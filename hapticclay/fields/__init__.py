@@ -87,11 +87,14 @@ class Part(Node):
             terms = ((k, terms_field(k)) for k in classes.values())
             kind, name = next(((k, name) for k, name in terms if name), (None, ""))
             return value if kind is None else make_part(kind, {name: value}, {}, path)
+        if isinstance(value, Mapping) and Mapping in self.kinds:
+            return dict(value)
         if not isinstance(value, Mapping) or not classes:
             return super()._read(value, path, old)
         data, kind = dict(value), self._usual(classes)
         if type(old) in classes.values():
             kind = type(old)
+        kind = _class_with(data, kind, [x for x in self.kinds if x in classes.values()])
         if KIND in data and not any(KIND in nodes_of(k) for k in classes.values()):
             kind = classes[choice(join_names(path, KIND), data.pop(KIND), tuple(classes))]
         if kind is None:
@@ -99,6 +102,8 @@ class Part(Node):
         return make_part(kind, data, values_of(old) if type(old) is kind else {}, path)
 
     def write(self, value: Any, old: Any, path: str, units: dict[str, str]) -> Any:
+        if isinstance(value, Mapping):
+            return {k: super(Part, self).write(x, old, path, units) for k, x in value.items()}
         if not dataclasses.is_dataclass(value):
             return super().write(value, old, path, units)
         kind, classes, terms = type(value), self.classes(), terms_field(type(value))
@@ -107,7 +112,8 @@ class Part(Node):
             old = UNSET if old is UNSET else None
             return nodes_of(kind)[terms].write(getattr(value, terms), old, path, units)
         data = _fields_as_data(value, old, path, units)
-        usual = self._usual(classes) is kind and type(old) not in classes.values()
+        before = type(old) if type(old) in classes.values() else kind
+        usual = self._usual(classes) is kind is before
         if len(classes) == 1 or (usual and old is not UNSET) or KIND in nodes_of(kind):
             return data
         return {KIND: kind.__name__.lower(), **data}
@@ -127,6 +133,15 @@ class Part(Node):
             for field in leaves(kind, path, default if type(default) is kind else UNSET):
                 about = f"of {name}: {field.about}" if len(classes) > 1 else field.about
                 yield field._replace(about=about)
+
+
+def _class_with(data: Mapping[str, Any], kind: Any, named: Sequence[type]) -> Any:
+    """The class that plain data without a kind is of: another named one, if that alone fits."""
+    names = set(data)
+    if kind is None or KIND in names or names <= {*nodes_of(kind)}:
+        return kind
+    fits = [x for x in named if names <= {*nodes_of(x)}]
+    return fits[0] if len(fits) == 1 else kind
 
 
 # ---- the node of a type hint ---------------------------------------------------------------------

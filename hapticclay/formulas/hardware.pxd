@@ -6,7 +6,7 @@ cdef double slide(long case) noexcept nogil
 cdef double round_to_even(double x, double step) noexcept nogil
 cdef double quantize(double x, long bits, double span) noexcept nogil
 cdef double encode(double q, long long counts) noexcept nogil
-cdef (double, double) velocity_difference(double then, (double, double) old, double k, (double, double) q, double Ts) noexcept nogil
+cdef double velocity_difference(double then, double old, double k, double q, double Ts) noexcept nogil
 cdef double low_pass(double y, double mean, double cutoff, double span) noexcept nogil
 cdef (double, double) filter_step(double *f, double x0, double x1, double u) noexcept nogil
 cdef (double, double) coulomb_friction((double, double) w, double a11, double a12, double a22, double *limit) noexcept nogil

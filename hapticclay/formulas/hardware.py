@@ -35,9 +35,8 @@ def encode(q, counts):
 
 
 def velocity_difference(then, old, k, q, Ts):
-    """Mean rates of both joints from sample `then` with angles `old` to sample k [rad/s]."""
-    span = (k - then) * Ts
-    return (q[0] - old[0]) / span, (q[1] - old[1]) / span
+    """Mean rate of a joint from sample `then` with angle `old` to sample k with angle q [rad/s]."""
+    return (q - old) / ((k - then) * Ts)
 
 
 def low_pass(y, mean, cutoff, span):

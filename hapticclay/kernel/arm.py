@@ -3,6 +3,7 @@
 import math
 
 from ..formulas import arm as law
+from . import joints
 
 
 def place(m, q1, q2):
@@ -10,6 +11,14 @@ def place(m, q1, q2):
     links, a = m.links, q1 + q2
     x, y = links[0] * math.cos(q1), links[0] * math.sin(q1)
     return x + links[1] * math.cos(a) - m.ox, y + links[1] * math.sin(a) - m.oy
+
+
+def here(m, s):
+    """Position of the handle, (x, y) [m]."""
+    if m.general:
+        joints.handle_at(m, s, s.e)
+        return s.e.x.p, s.e.y.p
+    return place(m, s.q[0], s.q[1])
 
 
 def handle_at(m, k, q1, q2, r1, r2):
@@ -35,8 +44,8 @@ def at_rates(k, w1, w2):
 def link_torques(m, k):
     """Motor torques that give the link accelerations together with the net force."""
     u, links, x, y = k.u, m.links, k.x.net, k.y.net
-    t2 = links[3] * k.g2 - u[2] * x - u[3] * y
-    k.tau1, k.tau2 = links[2] * k.g1 - u[0] * x - u[1] * y + t2, t2
+    t2 = links[3] * k.g[1] - u[2] * x - u[3] * y
+    k.tau[0], k.tau[1] = links[2] * k.g[0] - u[0] * x - u[1] * y + t2, t2
 
 
 def pushed(m, u, t1, t2):
@@ -60,24 +69,27 @@ def step_engine(m, s, k, h, even):
         push1, push2 = law.joint_torques(x.net + x.damped, y.net + y.damped, k.u)
         b0, b1 = x.b1, y.b1
     else:
-        a1, a2 = (k.w1 - s.w1) / h, (k.w1 + k.w2 - s.w1 - s.w2) / h
-        push1, push2 = links[2] * a1 + links[3] * a2 - k.tau1, links[3] * a2 - k.tau2
+        a1, a2 = (k.w[0] - s.w[0]) / h, (k.w[0] + k.w[1] - s.w[0] - s.w[1]) / h
+        push1, push2 = links[2] * a1 + links[3] * a2 - k.tau[0], links[3] * a2 - k.tau[1]
         b0 = b1 = 0.0
     ctrl, applied, timestep, q, w = e.ctrl, e.applied, e.timestep, e.q, e.w
-    ctrl[0], ctrl[1] = k.tau1, k.tau2
+    ctrl[0], ctrl[1] = k.tau[0], k.tau[1]
     if m.clay:
         ctrl[2], ctrl[3] = b0, b1
     applied[0], applied[1], timestep[0] = push1, push2, h
+    w[0], w[1] = s.w[0], s.w[1]  # after a hit: the velocity after half a kick
     e.step(e.model, e.data)
-    s.q1, s.q2, s.w1, s.w2 = q[0], q[1], w[0], w[1]
+    s.q[0], s.q[1], s.w[0], s.w[1] = q[0], q[1], w[0], w[1]
 
 
 def put(m, s):
     """Puts the arm where it is in a state, for the engine's next step."""
-    e = m.engine
+    e, s.sensed = m.engine, 0
+    if m.general:
+        return
     q, w, ranges, timestep = e.q, e.w, e.ranges, e.timestep
-    q[0], q[1], w[0], w[1], timestep[0] = s.q1, s.q2, s.w1, s.w2, m.dt
-    ranges[0], ranges[1], ranges[2], ranges[3] = -m.limit1, m.limit1, -m.limit2, m.limit2
+    q[0], q[1], w[0], w[1], timestep[0] = s.q[0], s.q[1], s.w[0], s.w[1], m.dt
+    ranges[0], ranges[1], ranges[2], ranges[3] = -m.limit[0], m.limit[0], -m.limit[1], m.limit[1]
 
 
 def accelerations(m, z, now):

@@ -6,6 +6,7 @@ from . cimport arm
 from . cimport borders
 from . cimport groove
 from . cimport hardware
+from . cimport joints
 from . cimport memory
 from . cimport methods
 from . cimport sampled
@@ -14,6 +15,7 @@ from . cimport watch
 from . cimport yielding
 
 cdef void begin(Model m, State s, double px, double py, double vx, double vy) noexcept nogil
+cdef void put_joints(Model m, State s, double px, double py, double vx, double vy) noexcept nogil
 cdef void put_axis(Model m, State s, long i, double p, double v) noexcept nogil
 cdef void put_clay(Model m, State s, double px, double py) noexcept nogil
 cdef void put_machine(Model m, State s, double px, double py) noexcept nogil

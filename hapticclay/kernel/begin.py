@@ -4,17 +4,29 @@ import math
 
 from ..formulas import arm as arm_law
 from ..formulas import regions
-from . import arm, borders, groove, hardware, memory, methods, sampled, viscous, watch, yielding
+from . import (
+    arm,
+    borders,
+    groove,
+    hardware,
+    joints,
+    memory,
+    methods,
+    sampled,
+    viscous,
+    watch,
+    yielding,
+)
 
 
 def begin(m, s, px, py, vx, vy):
     """Puts a state to the start of a run, the handle at p with velocity v."""
     memory.cleared(s)
-    s.q1, s.q2 = arm_law.inverse_kinematics(m.ox + px, m.oy + py, m.links)
-    u = s.k.u
-    u[0], u[1], u[2], u[3] = arm_law.jacobian(s.q1, s.q2, m.links)
-    r1, r2 = arm_law.joint_velocity(vx, vy, u, 1.0)
-    s.w1, s.w2 = r1, r2 - r1
+    if m.general:
+        for i in range(m.joints):
+            s.q[i] = m.start[i]
+    else:
+        put_joints(m, s, px, py, vx, vy)
     s.max_step = s.spring_step = s.mode_step = math.inf
     s.form_before = s.form_after = -1.0
     arm.put(m, s)
@@ -24,6 +36,15 @@ def begin(m, s, px, py, vx, vy):
     watch.begin(s.watch)
     if m.method == methods.SAMPLED:
         put_machine(m, s, px, py)
+
+
+def put_joints(m, s, px, py, vx, vy):
+    """Joints of the arm in closed form, with the handle at p and velocity v."""
+    s.q[0], s.q[1] = arm_law.inverse_kinematics(m.ox + px, m.oy + py, m.links)
+    u = s.k.u
+    u[0], u[1], u[2], u[3] = arm_law.jacobian(s.q[0], s.q[1], m.links)
+    r1, r2 = arm_law.joint_velocity(vx, vy, u, 1.0)
+    s.w[0], s.w[1] = r1, r2 - r1
 
 
 def put_axis(m, s, i, p, v):
@@ -41,7 +62,10 @@ def put_clay(m, s, px, py):
     """The clay around the handle."""
     ix, iy = regions.region_of(m.table, (px, py))
     k, seen = s.k, s.seen
-    arm.handle_at(m, k, s.q1, s.q2, s.w1, s.w1 + s.w2)
+    if m.general:
+        joints.handle_at(m, s, k)
+    else:
+        arm.handle_at(m, k, s.q[0], s.q[1], s.w[0], s.w[0] + s.w[1])
     borders.enter(m, s, ix, iy, k.x.p, k.y.p, -1, 1.0)
     viscous.age(s)
     if m.groove:
@@ -59,7 +83,9 @@ def put_machine(m, s, px, py):
         if not m.own:
             z.delta, z.rate, z.y, z.yrate, z.start = a.delta, a.rate, a.y, a.yrate, a.delta
             memory.copied4(z.z, a.z)
-        z.place, z.tool, z.w = p, p, s.w2 if i else s.w1
+        z.place, z.tool = p, p
+    for j in range(m.joints):
+        now.w[j], now.past[j] = s.w[j], hardware.encoded(m, j, s.q[j])
     now.due = now.due_then = math.inf
     sampled.put_times(m, now, 0)
     if m.window > 0:
@@ -72,17 +98,17 @@ def put_machine(m, s, px, py):
 
 def fill_angles(m, s):
     """Past angles: before the start the joints have long turned at their rates."""
-    ring = m.angles
+    ring, width = m.angles, m.joints + 1
     for j in range(m.window):
         n = j - m.window
-        q1, q2 = s.q1 + n * m.Ts * s.w1, s.q2 + n * m.Ts * s.w2
-        ring[3 * j] = 1.0 * n
-        ring[3 * j + 1], ring[3 * j + 2] = hardware.encoded(m, q1), hardware.encoded(m, q2)
+        ring[width * j] = 1.0 * n
+        for i in range(m.joints):
+            ring[width * j + 1 + i] = hardware.encoded(m, i, s.q[i] + n * m.Ts * s.w[i])
 
 
 def change(m, s):
     """Continues in a changed scene with the same borders."""
-    px, py = arm.place(m, s.q1, s.q2)
+    px, py = arm.here(m, s)
     drag, entered, s.drag = s.drag, s.entered, 0.0
     s.springs_dissipated = s.springs_stored = 0.0
     for i in range(2):

@@ -13,10 +13,10 @@ NUDGE = 1e-9  # of the limit, beyond the torque that brings a joint to rest
 def find(m, s, k, t1, t2):
     """Friction torques in a kick under torques of the motors [N.m]."""
     if m.acts and m.special and m.flow:
-        k.slip1 = torque_of(m, s, k, 0, t1, t2)
-        k.slip2 = torque_of(m, s, k, 1, t1 + k.slip1, t2)
+        k.slip[0] = torque_of(m, s, k, 0, t1, t2)
+        k.slip[1] = torque_of(m, s, k, 1, t1 + k.slip[0], t2)
     else:
-        k.slip1, k.slip2 = linear(m, s, k, t1, t2)
+        k.slip[0], k.slip[1] = linear(m, s, k, t1, t2)
 
 
 def drive(m, s, k, t1, t2):
@@ -28,11 +28,11 @@ def drive(m, s, k, t1, t2):
 def linear(m, s, k, t1, t2):
     """Where the rates are linear in the torques: by those of one N.m more on either joint."""
     drive(m, s, k, t1, t2)
-    n1, n2 = k.w1, k.w2
+    n1, n2 = k.w[0], k.w[1]
     drive(m, s, k, t1 + 1.0, t2)
-    x1, x2 = k.w1, k.w2
+    x1, x2 = k.w[0], k.w[1]
     drive(m, s, k, t1, t2 + 1.0)
-    y1, y2 = k.w1, k.w2
+    y1, y2 = k.w[0], k.w[1]
     mixed = 0.5 * (x2 - n2 + y1 - n1)  # equal except for rounding
     return law.coulomb_friction((n1, n2), x1 - n1, mixed, y2 - n2, m.slip)
 
@@ -48,7 +48,7 @@ def rate(m, s, k, i, f, t1, t2):
     else:
         t2 = t2 + f
     drive(m, s, k, t1, t2)
-    return k.w2 if i else k.w1
+    return k.w[1] if i else k.w[0]
 
 
 def torque_of(m, s, k, i, t1, t2):

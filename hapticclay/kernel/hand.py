@@ -7,7 +7,7 @@ def load(m, k):
         h = max(k.before, k.after)  # at the start and the end the kick is half of one
     else:
         h = k.H
-    for i in range(2):
+    for i in range(m.axes):
         a, o = m.axis[i], k.axis[i]
         mass = a.mass + 0.25 * a.spring * h * h
         o.f -= a.spring * o.p - mass * o.c + (a.damper * k.L - mass / k.H) * o.v

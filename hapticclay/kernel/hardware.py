@@ -5,7 +5,7 @@ import math
 from ..formulas import hardware as law
 from . import arm
 
-QUEUED = 11  # numbers of an entry: time, then torques, force, guard, pull and velocity of its tool
+QUEUED = 9  # numbers of an entry besides torques: time, force, guard, pull and velocity of its tool
 CHANCE = 4  # numbers of a sample: its delay [s], whether it is lost, noise (x, y) [N]
 
 
@@ -38,45 +38,51 @@ def measured(m, s, i, f):
         z, to = s.now.axis[i].filter, s.next.axis[i].filter
         to[0], to[1] = law.filter_step(m.filter, z[0], z[1], f)
         f = z[0]
+    return converted(m, f)
+
+
+def converted(m, f):
+    """An axis of the force after the converter [N]."""
     return law.quantize(f, m.adc_bits, m.adc_range)
 
 
 # ---- joints --------------------------------------------------------------------------------------
 
 
-def encoded(m, q):
-    """A joint angle as its encoder reads it [rad]."""
-    return law.encode(q, m.encoder)
+def encoded(m, i, q):
+    """The angle of a joint as its encoder reads it [rad]."""
+    return law.encode(q, m.counts[i])
 
 
-def differenced(m, s, q1, q2):
-    """Joint rates by the difference of measured angles [rad/s]."""
-    ring, now, after = m.angles, s.now, s.next
-    row, k = 3 * now.oldest, 1.0 * now.k
-    w1, w2 = law.velocity_difference(ring[row], (ring[row + 1], ring[row + 2]), k, (q1, q2), m.Ts)
-    if m.cutoff > 0.0:
-        span = (k - ring[3 * ((now.oldest + m.window - 1) % m.window)]) * m.Ts
-        w1 = law.low_pass(now.x.w, w1, m.cutoff, span)
-        w2 = law.low_pass(now.y.w, w2, m.cutoff, span)
-    after.x.w, after.y.w = w1, w2
+def differenced(m, s, q, w):
+    """Joint rates by the difference of measured angles q, into w [rad/s]."""
+    ring, now, after, n = m.angles, s.now, s.next, m.joints + 1
+    old, k = n * now.oldest, 1.0 * now.k
+    last = (k - ring[n * ((now.oldest + m.window - 1) % m.window)]) * m.Ts
+    for i in range(m.joints):
+        w[i] = law.velocity_difference(ring[old], ring[old + 1 + i], k, q[i], m.Ts)
+        if m.cutoff > 0.0:
+            w[i] = law.low_pass(now.w[i], w[i], m.cutoff, last)
+        after.w[i] = w[i]
     after.oldest = (now.oldest + 1) % m.window
-    return w1, w2
 
 
 def note_angles(m, s):
     """Stores the angles of the next sample."""
-    ring, row = m.angles, 3 * s.now.oldest
-    ring[row], ring[row + 1], ring[row + 2] = 1.0 * s.now.k, encoded(m, s.q1), encoded(m, s.q2)
+    ring, row = m.angles, (m.joints + 1) * s.now.oldest
+    ring[row] = 1.0 * s.now.k
+    for i in range(m.joints):
+        ring[row + 1 + i] = encoded(m, i, s.q[i])
 
 
 # ---- torques -------------------------------------------------------------------------------------
 
 
-def drive(m, s, t1, t2):
+def drive(m, s, tau):
     """Gives torques to the motors, within their limits and after the converter."""
-    t1, t2 = arm.clipped(t1, m.limit1), arm.clipped(t2, m.limit2)
-    s.next.x.tau = law.quantize(t1, m.dac_bits, m.dac_range1)
-    s.next.y.tau = law.quantize(t2, m.dac_bits, m.dac_range2)
+    for i in range(m.joints):
+        t = arm.clipped(tau[i], m.limit[i])
+        s.next.tau[i] = law.quantize(t, m.dac_bits, m.dac_range[i])
 
 
 # ---- the rendered clay ---------------------------------------------------------------------------
@@ -118,7 +124,7 @@ def guarded(m, s, k, i, f):
 def note_force(m, s):
     """Stores the force that a sample requests."""
     row = 2 * s.next.newest
-    m.forces[row], m.forces[row + 1] = s.requested[2], s.requested[3]
+    m.forces[row], m.forces[row + 1] = s.requested[m.joints], s.requested[m.joints + 1]
 
 
 # ---- delay ---------------------------------------------------------------------------------------
@@ -126,47 +132,54 @@ def note_force(m, s):
 
 def advance_queue(m, s, now):
     """Advances the queue of torques, and holds those that are due."""
-    ring, q, after = m.queue, s.now, s.next
+    ring, q, after, width = m.queue, s.now, s.next, QUEUED + m.joints
     time, n = q.when + m.delay, 0
-    while n < q.n and ring[QUEUED * ((q.first + n) % m.queue_rows)] <= now:
+    while n < q.n and ring[width * ((q.first + n) % m.queue_rows)] <= now:
         n += 1
     waits = s.responded
     if n == q.n and s.responded and time <= now:
         waits = 0
     elif n > 0:
-        hold(after, ring, QUEUED * ((q.first + n - 1) % m.queue_rows) + 1)
+        hold(m, after, ring, width * ((q.first + n - 1) % m.queue_rows) + 1)
     else:
+        for i in range(m.joints):
+            after.tau[i] = q.tau[i]
         for i in range(2):
             z, to = q.axis[i], after.axis[i]
-            to.tau, to.force, to.guard = z.tau, z.force, z.guard
-            to.pull, to.pull_rate = z.pull, z.pull_rate
+            to.force, to.guard, to.pull, to.pull_rate = z.force, z.guard, z.pull, z.pull_rate
     after.first, left = q.first + n, q.n - n
     after.due = due_time(m, after.first, left, 0, waits, time)
     after.due_then = due_time(m, after.first, left, 1, waits, time)
     after.n = left + 1 if waits else left
 
 
-def hold(machine, of, j):
-    """Lets the motors hold the ten numbers of an output, from index j on."""
+def hold(m, machine, of, j):
+    """Lets the motors hold the numbers of an output, from index j on."""
+    for i in range(m.joints):
+        machine.tau[i] = of[j + i]
+    j += m.joints
     for i in range(2):
         to = machine.axis[i]
-        to.tau, to.force, to.guard = of[j + i], of[j + 2 + i], of[j + 4 + i]
-        to.pull, to.pull_rate = of[j + 6 + i], of[j + 8 + i]
+        to.force, to.guard = of[j + i], of[j + 2 + i]
+        to.pull, to.pull_rate = of[j + 4 + i], of[j + 6 + i]
 
 
-def note_request(s):
+def note_request(m, s):
     """Notes the output that a sample requests."""
+    to, j = s.requested, m.joints
+    for i in range(j):
+        to[i] = s.next.tau[i]
     for i in range(2):
-        z, to = s.next.axis[i], s.requested
-        to[i], to[2 + i], to[4 + i], to[6 + i], to[8 + i] = (
-            z.tau, z.force, z.guard, z.pull, z.pull_rate
+        z = s.next.axis[i]
+        to[j + i], to[j + 2 + i], to[j + 4 + i], to[j + 6 + i] = (
+            z.force, z.guard, z.pull, z.pull_rate
         )  # fmt: skip
 
 
 def due_time(m, first, n, i, waits, time):
     """When the i-th of n entries is due [s]; after them, the one that waits, if any."""
     if i < n:
-        return m.queue[QUEUED * ((first + i) % m.queue_rows)]
+        return m.queue[(QUEUED + m.joints) * ((first + i) % m.queue_rows)]
     return time if i == n and waits else math.inf
 
 
@@ -174,7 +187,8 @@ def enqueue(m, s):
     """Writes the output that a sample requests into the queue, where it comes later."""
     end = s.next.first + s.next.n
     if end != s.now.first + s.now.n:
-        ring, j = m.queue, QUEUED * ((end - 1) % m.queue_rows)
+        ring, width = m.queue, QUEUED + m.joints
+        j = width * ((end - 1) % m.queue_rows)
         ring[j] = s.now.when + m.delay
-        for i in range(QUEUED - 1):
+        for i in range(width - 1):
             ring[j + 1 + i] = s.requested[i]

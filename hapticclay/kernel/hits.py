@@ -22,7 +22,7 @@ def first_step(m, s, after):
     e, halved = s.e, s.before > 0.0
     if halved:
         kick.by_servo(m, s, e, 0.0)
-        ledger.add_work(m, s.work, s.work_at_event, e, e.o1, e.o2, s.now)
+        ledger.add_work(m, s.work, s.work_at_event, e, e.o, s.now)
         swap(m, s, e)
     kick.by_servo(m, s, s.k, first)
     if kick.is_limited(m, s.k):
@@ -37,8 +37,8 @@ def first_step(m, s, after):
 
 def swap(m, s, e):
     """Swaps a state with that after the half kick that ends at its sample."""
-    s.w1, e.w1, s.w2, e.w2 = e.w1, s.w1, e.w2, s.w2
-    s.g1, e.g1, s.g2, e.g2 = e.g1, s.g1, e.g2, s.g2
+    s.w[0], e.w[0], s.w[1], e.w[1] = e.w[0], s.w[0], e.w[1], s.w[1]
+    s.g[0], e.g[0], s.g[1], e.g[1] = e.g[0], s.g[0], e.g[1], s.g[1]
     s.before, e.after = e.after, s.before  # which is 0
     for i in range(2):
         z, o = s.axis[i], e.axis[i]

@@ -39,11 +39,11 @@ def evaluate(m, s, z, since, row, out):
     servo_law(m, k, z)
     modes.respond(m, s, k, out)
     compute_torques(m, k, out)
-    if abs(k.tau1) > m.limit1 or abs(k.tau2) > m.limit2:
+    if abs(k.tau[0]) > m.limit[0] or abs(k.tau[1]) > m.limit[1]:
         if m.modal and (m.shaping or m.formed) and modes.rests_somewhere(s):
             hold(m, s, k, out)
-        k.tau1, k.tau2 = arm.clipped(k.tau1, m.limit1), arm.clipped(k.tau2, m.limit2)
-        torque_law(m, k, k.tau1, k.tau2)
+        k.tau[0], k.tau[1] = arm.clipped(k.tau[0], m.limit[0]), arm.clipped(k.tau[1], m.limit[1])
+        torque_law(m, k, k.tau[0], k.tau[1])
         modes.respond(m, s, k, out)
     finish(m, k, z, out)
     a.fe, b.fe = clayx + (lawx + a.r), clayy + (lawy + b.r)
@@ -74,13 +74,13 @@ def torque_law(m, k, t1, t2):
 
 def compute_torques(m, k, out):
     """Torques that give the handle its response."""
-    k.g1, k.g2 = arm_law.joint_velocity(out.x.acc, out.y.acc, k.u, 1.0)
+    k.g[0], k.g[1] = arm_law.joint_velocity(out.x.acc, out.y.acc, k.u, 1.0)
     arm.link_torques(m, k)
 
 
 def finish(m, k, z, out):
     """Torques, and the rates of compensator and reference."""
-    out.tau1, out.tau2 = k.tau1, k.tau2
+    out.tau1, out.tau2 = k.tau[0], k.tau[1]
     out.push1, out.push2 = arm_law.joint_torques(k.x.net, k.y.net, k.u)
     for i in range(2):
         o, q, a, c = k.axis[i], z.axis[i], out.axis[i], m.axis[i]
@@ -96,7 +96,7 @@ def powers(m, k, z, out):
     """Power of muscle, motors, clay, the damper of the hand, and the sum of the magnitudes [W]."""
     x, y, a, b, p = k.x, k.y, out.x, out.y, out.power
     p[0] = x.uh * x.v + y.uh * y.v
-    p[1] = k.tau1 * z.w1 + k.tau2 * z.w2
+    p[1] = k.tau[0] * z.w1 + k.tau[1] * z.w2
     p[2] = a.fe * x.v + b.fe * y.v
     p[3] = m.x.damper * x.v * x.v + m.y.damper * y.v * y.v
     p[4] = abs(p[0]) + abs(p[1])
@@ -120,7 +120,7 @@ def hold(m, s, k, out):
     best1, best2, least = 0.0, 0.0, math.inf
     for case in range(9):
         side1, side2 = side(case // 3), side(case % 3)
-        t1, t2 = side1 * m.limit1, side2 * m.limit2
+        t1, t2 = side1 * m.limit[0], side2 * m.limit[1]
         if side1 == 0.0 and side2 == 0.0:
             det = (1.0 - xx) * (1.0 - yy) - xy * yx
             t1, t2 = ((1.0 - yy) * b1 + xy * b2) / det, ((1.0 - xx) * b2 + yx * b1) / det
@@ -130,12 +130,12 @@ def hold(m, s, k, out):
             t2 = (b2 + yx * t1) / (1.0 - yy)
         w1, w2 = b1 + xx * t1 + xy * t2, b2 + yx * t1 + yy * t2
         # excess of a free motor over its limit, or shortfall of the request at a limit
-        wrong1 = m.limit1 - side1 * w1 if side1 != 0.0 else abs(t1) - m.limit1
-        wrong2 = m.limit2 - side2 * w2 if side2 != 0.0 else abs(t2) - m.limit2
-        wrong = max(wrong1 / m.limit1, wrong2 / m.limit2)
+        wrong1 = m.limit[0] - side1 * w1 if side1 != 0.0 else abs(t1) - m.limit[0]
+        wrong2 = m.limit[1] - side2 * w2 if side2 != 0.0 else abs(t2) - m.limit[1]
+        wrong = max(wrong1 / m.limit[0], wrong2 / m.limit[1])
         if wrong < least:
             best1, best2, least = t1, t2, wrong
-    k.tau1, k.tau2 = best1, best2
+    k.tau[0], k.tau[1] = best1, best2
 
 
 def side(case):
@@ -153,4 +153,4 @@ def requested_under(m, s, k, out, law, t1, t2):
     modes.plain_response(k, out)
     compute_torques(m, k, out)
     x.f, y.f = fx, fy
-    return k.tau1, k.tau2
+    return k.tau[0], k.tau[1]

@@ -3,6 +3,7 @@ from .records cimport Kick, Model, State
 from ..formulas cimport arm as arm_law
 from . cimport arm
 from . cimport hand
+from . cimport joints
 from . cimport own_laws
 from . cimport servo
 from . cimport signals

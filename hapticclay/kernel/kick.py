@@ -5,7 +5,7 @@ function here or in the module of its part.
 """
 
 from ..formulas import arm as arm_law
-from . import arm, hand, own_laws, servo, signals, springs, viscous, yielding
+from . import arm, hand, joints, own_laws, servo, signals, springs, viscous, yielding
 
 
 def begin(k, before, after):
@@ -16,7 +16,7 @@ def begin(k, before, after):
 
 def take_over(m, s, k):
     """Takes over what the kick before left."""
-    k.o1, k.o2 = s.w1, s.w2
+    k.o[0], k.o[1] = s.w[0], s.w[1]
     if m.special:
         for i in range(2):
             z, o = s.axis[i], k.axis[i]
@@ -39,6 +39,8 @@ def load(m, s, k):
         for i in range(2):
             o = k.axis[i]
             o.f, o.d, o.b0, o.b1, o.clay, o.clay_d = o.uh, 0.0, 0.0, 0.0, 0.0, 0.0
+    if m.axes > 2:
+        k.z.uh = k.z.f = k.z.d = 0.0
     if m.hand:
         hand.load(m, k)
 
@@ -47,7 +49,7 @@ def end_path(m, k):
     """Straightens the path of a handle that clay stops."""
     if m.stiff and k.splits != 0.0:
         viscous.rest_after_sample(k)
-    if m.flow and k.o1 == 0.0 and k.o2 == 0.0:
+    if m.flow and k.o[0] == 0.0 and k.o[1] == 0.0:
         k.x.c = k.y.c = 0.0
 
 
@@ -66,11 +68,14 @@ def move(m, s, k):
         y.net = y.f - y.d * y.u - k.dxy * x.u
         damped(k)
         x.fe, y.fe = x.clay + x.damped, y.clay + y.damped
-    k.g1, k.g2 = arm_law.joint_velocity(x.u - x.v, y.u - y.v, k.u, k.H)
+    if m.general:
+        joints.answer(m, k)
+        return
+    k.g[0], k.g[1] = arm_law.joint_velocity(x.u - x.v, y.u - y.v, k.u, k.H)
     if k.still > 0.0:
-        k.w1 = k.w2 = 0.0
+        k.w[0] = k.w[1] = 0.0
     else:
-        k.w1, k.w2 = k.o1 + k.H * k.g1, k.o2 + k.H * (k.g2 - k.g1)
+        k.w[0], k.w[1] = k.o[0] + k.H * k.g[0], k.o[1] + k.H * (k.g[1] - k.g[0])
 
 
 def damped(k):
@@ -130,24 +135,24 @@ def by_servo(m, s, k, after):
     """The kick of the continuous law at a sample, before a step of length `after`."""
     begin(k, s.before, after)
     take_over(m, s, k)
-    half, r1, r2 = 0.5 * s.before, s.w1, s.w1 + s.w2
-    arm.handle_at(m, k, s.q1, s.q2, r1, r2)
-    arm.turning(k, r1 + half * s.g1, r2 + half * s.g2)
+    half, r1, r2 = 0.5 * s.before, s.w[0], s.w[0] + s.w[1]
+    arm.handle_at(m, k, s.q[0], s.q[1], r1, r2)
+    arm.turning(k, r1 + half * s.g[0], r2 + half * s.g[1])
     load(m, s, k)
     servo.servo_law(m, s, k)
     move(m, s, k)
     arm.link_torques(m, k)
-    t1, t2 = k.tau1, k.tau2
-    if abs(t1) > m.limit1 or abs(t2) > m.limit2:
-        k.tau1, k.tau2 = arm.clipped(t1, m.limit1), arm.clipped(t2, m.limit2)
-        servo.torque_law(m, k, k.tau1, k.tau2)
+    t1, t2 = k.tau[0], k.tau[1]
+    if abs(t1) > m.limit[0] or abs(t2) > m.limit[1]:
+        k.tau[0], k.tau[1] = arm.clipped(t1, m.limit[0]), arm.clipped(t2, m.limit[1])
+        servo.torque_law(m, k, k.tau[0], k.tau[1])
         move(m, s, k)
     servo.advance(m, s, k)
 
 
 def is_limited(m, k):
     """Whether a motor is at its limit in a kick."""
-    return abs(k.tau1) >= m.limit1 or abs(k.tau2) >= m.limit2
+    return abs(k.tau[0]) >= m.limit[0] or abs(k.tau[1]) >= m.limit[1]
 
 
 def velocity(m, k, i):

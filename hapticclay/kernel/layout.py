@@ -45,28 +45,33 @@ def many(record: Any, n: int) -> Kind:
 
 
 def record(declaration: type) -> Any:
-    """The class with slots of a declaration; `x` and `y` name the records of a field `axis`.
+    """The class with slots of a declaration; `x`, `y`, `z` name the records of a field `axis`.
 
     A declaration that extends a record begins with its fields.
     """
     own = declaration.__annotations__.items()
     fields = {**getattr(declaration, "kinds", {})}
     fields |= {name: x if isinstance(x, Kind) else Kind(x) for name, x in own}
-    has_axes = "axis" in fields
+    axes = axes_of(fields)
 
     def __init__(self):
         for name, kind in fields.items():
             setattr(self, name, kind.start())
-        if has_axes:
-            self.x, self.y = self.axis
+        for i, name in enumerate(axes):
+            setattr(self, name, self.axis[i])
 
-    slots = [*fields, "x", "y"] if has_axes else list(fields)
+    slots = [*fields, *axes]
     body = {"__slots__": slots, "__init__": __init__, "__doc__": declaration.__doc__}
     made: Any = type(declaration.__name__, (), body)
     made.__module__ = declaration.__module__
     made.kinds, made.copy = fields, staticmethod(copier_of(fields))
     made.copy_numbers = staticmethod(copier_of(fields, with_places=False))
     return made
+
+
+def axes_of(fields: dict[str, Kind]) -> str:
+    """Names of the records of a field `axis`, a letter each."""
+    return "xyz"[: fields["axis"].n] if "axis" in fields else ""
 
 
 def copier_of(fields: dict[str, Kind], with_places: bool = True) -> Any:
@@ -99,8 +104,8 @@ def struct_of(made: Any) -> Any:
         one = struct_of(c) if kind.is_record else NUMBERS[c][1]
         fields.append((name, one * kind.n if kind.n else one))
     body: dict[str, Any] = {"_fields_": fields}
-    if "axis" in made.kinds:
-        body |= {c: property(lambda view, i=i: view.axis[i]) for i, c in enumerate("xy")}
+    names = enumerate(axes_of(made.kinds))
+    body |= {c: property(lambda view, i=i: view.axis[i]) for i, c in names}
     return type(made.__name__, (ctypes.Structure,), body)
 
 
@@ -131,7 +136,7 @@ def save(view: Any, row: Any) -> None:
 
 HEAD = """\
 /* Written from kernel/records.py. A record in a record is an array of one, which C takes for its
-   address: so names refer to records, as in Python. x and y name the two axes. */
+   address: so names refer to records, as in Python. x, y, z name the axes. */
 #include <string.h>
 #define copied(to, of) memcpy(to, of, sizeof *(of))
 """
@@ -147,7 +152,8 @@ def header(records: Any, functions: str) -> str:
             c = f"{kind.of.__name__}_s" if kind.is_record else kind.of
             size = (f"[{kind.n}]" if kind.n else "") + ("[1]" if kind.is_record else "")
             if name == "axis":
-                text += f"    union {{ {c} axis{size}; struct {{ {c} x[1], y[1]; }}; }};\n"
+                each = ", ".join(f"{x}[1]" for x in axes_of(made.kinds))
+                text += f"    union {{ {c} axis{size}; struct {{ {c} {each}; }}; }};\n"
             else:
                 text += f"    {c} {name}{size};\n"
         text += f"}};\ntypedef struct {made.__name__}_s *{made.__name__};\n"
@@ -168,5 +174,5 @@ def declarations(records: Any, functions: str) -> str:
             c = kind.of.__name__ if kind.is_record else kind.of
             text += f"        {c} {name}" + (f"[{kind.n}]\n" if kind.n else "\n")
             if name == "axis":
-                text += f"        {c} x, y\n"
+                text += f"        {c} {', '.join(axes_of(made.kinds))}\n"
     return text

@@ -1,31 +1,49 @@
 """The ledger of energy: what a kick adds to it."""
 
-from . import hand
+from . import hand, joints
 
 
-def add_work(m, of, to, k, w1, w2, machine):
+def add_work(m, of, to, k, w, machine):
     """The ledger `of` with the works of a kick, into `to`.
 
-    w1 and w2 are the joint rates before it, `machine` is the one whose torques act in it.
+    w are the joint rates before it, `machine` is the one whose torques act in it.
     """
     x, y, H = k.x, k.y, k.H
     vx, vy = 0.5 * (x.v + x.u), 0.5 * (y.v + y.u)
     muscle = H * (x.uh * vx + y.uh * vy)
-    motors = 0.5 * H * (k.tau1 * (w1 + k.w1) + k.tau2 * (w2 + k.w2))
+    power = k.tau[0] * (w[0] + k.w[0])
+    for i in range(1, m.joints):
+        power += k.tau[i] * (w[i] + k.w[i])
+    motors = 0.5 * H * power
     clay = H * (x.fe * vx + y.fe * vy)
     taken = H * (hand.damping_force(m, k, 0) * vx + hand.damping_force(m, k, 1) * vy)
+    if m.general:
+        taken, to.joints = more_taken(m, k, w, taken, of.joints)
     to.muscle, to.motors, to.clay = of.muscle + muscle, of.motors + motors, of.clay + clay
     to.hand, to.through = of.hand + taken, of.through + (abs(muscle) + abs(motors))
     if m.hardware:
-        add_hardware_work(m, of, to, k, w1, w2, machine)
+        add_hardware_work(m, of, to, k, w, machine)
 
 
-def add_hardware_work(m, of, to, k, w1, w2, machine):
+def more_taken(m, k, w, hand_taken, joints_taken):
+    """What the damper of the hand along z and those of the joints take in addition [J]."""
+    if m.axes > 2:
+        z = k.z
+        hand_taken += k.H * hand.damping_force(m, k, 2) * 0.5 * (z.v + z.u)
+    for i in range(m.joints):
+        force = k.L * joints.damping(m, w, i) + k.R * joints.damping(m, k.w, i)
+        joints_taken += 0.5 * k.H * force * (w[i] + k.w[i])
+    return hand_taken, joints_taken
+
+
+def add_hardware_work(m, of, to, k, w, machine):
     """The same of hardware, and of clay that the motors hold."""
     a, b, x, y, H = machine.x, machine.y, k.x, k.y, k.H
     vx, vy = 0.5 * (x.v + x.u), 0.5 * (y.v + y.u)
-    r1, r2 = 0.5 * (w1 + k.w1), 0.5 * (w2 + k.w2)
-    to.friction = of.friction - H * (k.slip1 * r1 + k.slip2 * r2)
+    power = k.slip[0] * (0.5 * (w[0] + k.w[0]))
+    for i in range(1, m.joints):
+        power += k.slip[i] * (0.5 * (w[i] + k.w[i]))
+    to.friction = of.friction - H * power
     to.guard = of.guard + H * (a.guard * vx + b.guard * vy)
     to.coupling = of.coupling + H * (a.pull * (vx - a.pull_rate) + b.pull * (vy - b.pull_rate))
     if m.renders:

@@ -117,7 +117,7 @@ def march(m, s, h):
 
 def start(m, s, z):
     """The start of a step."""
-    z.q1, z.q2, z.w1, z.w2 = s.q1, s.q2, s.w1, s.w2
+    z.q1, z.q2, z.w1, z.w2 = s.q[0], s.q[1], s.w[0], s.w[1]
     for i in range(2):
         a, o = s.axis[i], z.axis[i]
         o.delta, o.rate, o.y, o.yrate = a.delta, a.rate, a.y, a.yrate
@@ -212,10 +212,10 @@ def is_finite(z):
 def write(m, s):
     """Writes the row of a sample."""
     a, o, row, n = s.a, s.a.shown, m.rows, ROW * s.row
-    row[n], row[n + 1], row[n + 2], row[n + 3] = s.q1, s.q2, a.p1, a.p2
+    row[n], row[n + 1], row[n + 2], row[n + 3] = s.q[0], s.q[1], a.p1, a.p2
     row[n + 4], row[n + 5], row[n + 6], row[n + 7] = a.v1, a.v2, o.x.fh, o.y.fh
     row[n + 8], row[n + 9], row[n + 10], row[n + 11] = o.tau1, o.tau2, o.x.shown, o.y.shown
-    row[n + 12], row[n + 13], row[n + 14], row[n + 15] = o.x.b, o.y.b, s.w1, s.w2
+    row[n + 12], row[n + 13], row[n + 14], row[n + 15] = o.x.b, o.y.b, s.w[0], s.w[1]
     if m.records_clay_force:
         out = m.rendered
         out[3 * s.row], out[3 * s.row + 1] = o.x.fe, o.y.fe
@@ -225,7 +225,7 @@ def take(m, s):
     """Takes the step tried: the state becomes that at its end."""
     z, q, w = s.a.end, m.engine.q, m.engine.w
     q[0], q[1], w[0], w[1] = z.q1, z.q2, z.w1, z.w2
-    s.q1, s.q2, s.w1, s.w2 = z.q1, z.q2, z.w1, z.w2
+    s.q[0], s.q[1], s.w[0], s.w[1] = z.q1, z.q2, z.w1, z.w2
     for i in range(2):
         a, o = s.axis[i], z.axis[i]
         a.delta, a.rate, a.y, a.yrate = o.delta, o.rate, o.y, o.yrate

@@ -1,6 +1,7 @@
 cimport cython
 from .records cimport Model, State
 from . cimport arm
+from . cimport joints
 from . cimport kick
 from . cimport march
 from . cimport onset
@@ -15,6 +16,7 @@ cdef long CONTINUOUS, SAMPLED, ACCURATE
 cdef void control(Model m, State s) noexcept nogil
 cdef void attempt(Model m, State s, double after) noexcept nogil
 cdef (double, double) place_after(Model m, State s, double after) noexcept nogil
+@cython.locals(total=cython.double)
 cdef bint is_sound(Model m, State s) noexcept nogil
 cdef void keep(Model m, State s, double after, bint shows) noexcept nogil
 @cython.locals(even=cython.bint)

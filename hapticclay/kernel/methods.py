@@ -7,7 +7,7 @@
 | it may end | at a sample | at an event too | within a sample |
 """
 
-from . import arm, kick, march, onset, rows, sampled, servo, signals, yielding
+from . import arm, joints, kick, march, onset, rows, sampled, servo, signals, yielding
 
 CONTINUOUS, SAMPLED, ACCURATE = range(3)
 
@@ -33,14 +33,19 @@ def place_after(m, s, after):
     if m.method == ACCURATE:
         return arm.place(m, s.a.end.q1, s.a.end.q2)
     k = s.k
-    return arm.place(m, s.q1 + after * k.w1, s.q2 + after * k.w2)
+    if m.general:
+        return joints.place_after(m, s, after)
+    return arm.place(m, s.q[0] + after * k.w[0], s.q[1] + after * k.w[1])
 
 
 def is_sound(m, s):
     """Whether the step tried ends with rates of an arm."""
     if m.method == ACCURATE:
         return march.is_finite(s.a.end)
-    return abs(s.k.w1) + abs(s.k.w2) < march.FASTEST
+    total = abs(s.k.w[0])
+    for i in range(1, m.joints):
+        total += abs(s.k.w[i])
+    return total < march.FASTEST
 
 
 def keep(m, s, after, shows):
@@ -73,24 +78,29 @@ def take(m, s, after):
         for i in range(2):
             z, o = s.axis[i], k.axis[i]
             z.owed, z.stuck, z.anchor = o.owed, o.stuck, o.anchor
-    s.g1, s.g2 = k.g1, k.g2
+    if m.general:
+        joints.step(m, s, k, after)
+        return
+    s.g[0], s.g[1] = k.g[0], k.g[1]
     arm.step_engine(m, s, k, after, even)
     if k.still > 0.0:  # the engine's rounding would let it creep
         w = m.engine.w
-        w[0] = w[1] = s.w1 = s.w2 = 0.0
+        w[0] = w[1] = s.w[0] = s.w[1] = 0.0
 
 
 def halt(m, s):
     """The state after the last kick of a run, at its sample."""
     if m.method != ACCURATE:
-        s.w1, s.w2, s.g1, s.g2, s.before = s.k.w1, s.k.w2, s.k.g1, s.k.g2, 0.0
+        for i in range(m.joints):
+            s.w[i], s.g[i] = s.k.w[i], s.k.g[i]
+        s.before = 0.0
 
 
 def arrive(m, s):
     """Velocity at the end of the step that led here, on its side of a border, (x, y) [m/s]."""
     k = s.k
     if m.method == ACCURATE:
-        arm.handle_at(m, k, s.q1, s.q2, s.w1, s.w1 + s.w2)
+        arm.handle_at(m, k, s.q[0], s.q[1], s.w[0], s.w[0] + s.w[1])
         return k.x.v, k.y.v
     rows.repeat(m, s, k, 0.0)
     vx, vy, _, _ = rows.arrived(m, s, kick.velocity(m, k, 0), kick.velocity(m, k, 1), 0.0, 0.0)

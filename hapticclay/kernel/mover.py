@@ -72,14 +72,16 @@ def addresses_of(model: Any, data: Any) -> tuple[int, int]:
             mujoco.mj_passive(model, data)
         finally:
             mujoco.set_mjcb_passive(before)
-        return _asked.pop(me)
+        found = _asked.pop(me)
+        assert all(found)
+        return found
 
 
 class Mover:
     """An arm of the engine: its model and data, and the records by which rows call it."""
 
     def __init__(self, scenario: Scenario):
-        self.model = engine.build(scenario)
+        self.model = self.build(scenario)
         self.data = mujoco.MjData(self.model)
         self.out = np.zeros(2)
         self.places: dict[str, np.ndarray] = {
@@ -91,32 +93,42 @@ class Mover:
         self._plain: Any = None
         self._row: Any = None
 
+    def build(self, scenario: Scenario) -> Any:
+        """The engine's model."""
+        return engine.build(scenario)
+
     @property
     def plain(self) -> Any:
         """The record for CPython."""
         if self._plain is None:
-            made = records.Engine()
-            for name, function in CALLS.items():
-                setattr(made, name, getattr(mujoco, function))
-            made.bias = bias
-            made.model, made.data = self.model, self.data
-            for name, array in self.places.items():
-                setattr(made, name, memoryview(array))  # pyright: ignore[reportArgumentType]
-            self._plain = made
+            self._plain = records.Engine()
+            self.fill_plain(self._plain)
         return self._plain
+
+    def fill_plain(self, made: Any) -> None:
+        """Fills the record for CPython."""
+        for name, function in CALLS.items():
+            setattr(made, name, getattr(mujoco, function))
+        made.bias = bias
+        made.model, made.data = self.model, self.data
+        for name, array in self.places.items():
+            setattr(made, name, memoryview(array))  # pyright: ignore[reportArgumentType]
 
     @property
     def row(self) -> np.ndarray:
         """The record for compiled code, shape (1,)."""
         if self._row is None:
-            made: Any = np.zeros(1, layout.dtype_of(records.Engine))
-            for name, function in CALLS.items():
-                made[name] = address(function)
-            made["model"], made["data"] = addresses_of(self.model, self.data)
-            for name, array in self.places.items():
-                made[name] = array.ctypes.data
-            self._row = made
+            self._row = np.zeros(1, layout.dtype_of(records.Engine))
+            self.fill_row(self._row)
         return self._row
+
+    def fill_row(self, made: Any) -> None:
+        """Fills the record for compiled code."""
+        for name, function in CALLS.items():
+            made[name] = address(function)
+        made["model"], made["data"] = addresses_of(self.model, self.data)
+        for name, array in self.places.items():
+            made[name] = array.ctypes.data
 
     def rest(self, scenario: Scenario) -> None:
         """Puts the engine to a scenario, at rest."""
@@ -149,6 +161,14 @@ class Movers:
         if key not in self.known:
             if len(self.known) >= STORED:
                 del self.known[next(iter(self.known))]  # the oldest one
-            self.known[key] = Mover(scenario)
+            self.known[key] = _new(scenario)
         self.known[key].rest(scenario)
         return self.known[key]
+
+
+def _new(scenario: Scenario) -> Mover:
+    if scenario.is_closed_form:
+        return Mover(scenario)
+    from .joint_mover import JointMover  # imported only for an arm from a file
+
+    return JointMover(scenario)

@@ -15,9 +15,9 @@ def evaluate(m, s):
 
 def set_velocity(m, s, vx, vy):
     """Gives the arm another velocity of the handle along the axes of the clay."""
-    s.w1 = s.w2 = 0.0
+    s.w[0] = s.w[1] = 0.0
     if vx != 0.0 or vy != 0.0:
-        s.w1, s.w2 = modes.joint_rates(m, s, s.q1, s.q2, vx, vy)
+        s.w[0], s.w[1] = modes.joint_rates(m, s, s.q[0], s.q[1], vx, vy)
 
 
 def choose_modes(m, s, after):
@@ -59,7 +59,7 @@ def tried_mode(j, is_open, ended, mode):
 def choose_axes(m, s):
     """Puts the modes of clay whose axes yield separately."""
     x, y = s.mode[0], s.mode[1]
-    vx, vy = modes.velocity(m, s, s.q1, s.q2, s.w1, s.w2)
+    vx, vy = modes.velocity(m, s, s.q[0], s.q[1], s.w[0], s.w[1])
     x.mode, restx = first_mode(s, 0, vx)
     y.mode, resty = first_mode(s, 1, vy)
     grip = evaluate(m, s)
@@ -67,7 +67,7 @@ def choose_axes(m, s):
     resty = resty or (modes.is_active(s, 1) and modes.is_nearly_at_rest(m, s, grip, 1))
     if not (restx or resty):
         return
-    px, py = modes.place_of(m, s.q1, s.q2)
+    px, py = modes.place_of(m, s.q[0], s.q[1])
     if restx and x.mode != 0.0:
         x.anchor = px
     if resty and y.mode != 0.0:
@@ -104,7 +104,7 @@ def fit_modes(m, s, restx, resty):
 def choose_way(m, s):
     """Puts the modes of clay that resists along the motion; a slow handle follows its push."""
     a, ended = s.mode[0], s.mode[0].ended
-    vx, vy = modes.velocity(m, s, s.q1, s.q2, s.w1, s.w2)
+    vx, vy = modes.velocity(m, s, s.q[0], s.q[1], s.w[0], s.w[1])
     active = modes.is_active(s, 0)
     rests = active and (a.mode == 0.0 or ended != 0.0 or (vx == 0.0 and vy == 0.0))
     modes.put(s, 0.0 if rests else modes.SLIDING, 0.0 if rests else modes.SLIDING)

@@ -7,7 +7,20 @@ many steps as it needs, and the run takes the last.
 import math
 
 from ..formulas import regions
-from . import arm, borders, ends, hits, laws, march, memory, methods, sampled, springs, viscous
+from . import (
+    arm,
+    borders,
+    ends,
+    hits,
+    joints,
+    laws,
+    march,
+    memory,
+    methods,
+    sampled,
+    springs,
+    viscous,
+)
 
 OPEN, FINISHED, TIME_LIMIT, NOT_FINITE, UNRESOLVED = range(5)  # status of a run
 # to a region within one sample: a handle that slides along a border then completes the step
@@ -69,7 +82,10 @@ def take(m, s, after, target):
         viscous.age(s)
         if m.special:
             k = s.e  # not needed any more
-            arm.handle_at(m, k, s.q1, s.q2, s.w1, s.w1 + s.w2)
+            if m.general:
+                joints.handle_at(m, s, k)
+            else:
+                arm.handle_at(m, k, s.q[0], s.q[1], s.w[0], s.w[0] + s.w[1])
             laws.moved(m, s, k.x.p, k.y.p, k.x.v, k.y.v, after)
     t = s.t + after
     if target - t <= 1e-9 * m.dt:
@@ -90,7 +106,7 @@ def cross(m, s, i, up):
     if i == 0 and up > 0 and border == m.table[regions.END]:
         s.closing = FINISHED
         return
-    x, y = arm.place(m, s.q1, s.q2)
+    x, y = arm.here(m, s)
     borders.enter_beyond(m, s, x, y, i, up, 1.0)
 
 
@@ -105,7 +121,7 @@ def bound(m, s, after):
 def try_step(m, s, after, overx, overy, first):
     """Tries the next step, shortened to the first border ahead."""
     axis, up = -1, 0
-    herex, herey = arm.place(m, s.q1, s.q2)
+    herex, herey = arm.here(m, s)
     while True:
         if m.special and m.springs:
             after = springs.longest_step(s, after)
@@ -187,8 +203,6 @@ def step_to_event(m, s):
     elif not methods.is_sound(m, s):
         s.code = NOT_FINITE
     else:
-        w = m.engine.w
-        w[0], w[1] = s.w1, s.w2  # after a hit it starts from the velocity after half a kick
         take(m, s, after, target)
         if axis >= 0:
             cross(m, s, axis, up)

@@ -10,13 +10,19 @@ without that part, and no function reads it then.
 from .layout import Kind, floats, many, real, record, thing, whole, wholes
 
 LAWS = 4  # most laws of the clay of a user in a scene
+JOINTS = 12  # most joints of an arm
 engine_step, engine_bias = Kind("engine_step"), Kind("engine_bias")
+engine_full, engine_jac = Kind("engine_full"), Kind("engine_jac")
+engine_dot = Kind("engine_dot")
 own_control, law_load = Kind("own_control"), Kind("law_load")
 law_moved, law_force = Kind("law_moved"), Kind("law_force")
 engine_of = Kind("Engine_s *")
 FUNCTIONS = """\
 typedef void (*engine_step)(void *, void *);
 typedef void (*engine_bias)(void *, void *, int, double *);
+typedef void (*engine_full)(void *, void *, double *);
+typedef void (*engine_jac)(void *, void *, double *, double *, int);
+typedef void (*engine_dot)(void *, void *, double *, double *, double *, int);
 typedef void (*own_control)(double *);
 typedef void (*law_load)(double *, Kick_s *);
 typedef void (*law_moved)(double *, double, double, double, double, double);
@@ -25,6 +31,9 @@ typedef void (*law_force)(double *, double, double, double, double, double *);
 TYPES = """\
     ctypedef void (*engine_step)(void *, void *) noexcept nogil
     ctypedef void (*engine_bias)(void *, void *, int, double *) noexcept nogil
+    ctypedef void (*engine_full)(void *, void *, double *) noexcept nogil
+    ctypedef void (*engine_jac)(void *, void *, double *, double *, int) noexcept nogil
+    ctypedef void (*engine_dot)(void *, void *, double *, double *, double *, int) noexcept nogil
     ctypedef void (*own_control)(double *) noexcept nogil
     ctypedef void (*law_load)(double *, Kick_s *) noexcept nogil
     ctypedef void (*law_moved)(double *, double, double, double, double, double) noexcept nogil
@@ -53,6 +62,42 @@ class Engine:
     M: floats
     forces: floats  # of bias
     out: floats  # of the force of a user's law
+    # of an arm on the engine's terms
+    factor: engine_step  # mj_factorM
+    full: engine_full  # mj_fullM
+    move: engine_step  # mj_step2
+    jacobian: engine_jac  # mj_jacSite or mj_jacBody
+    jacobian_rate: engine_dot  # mj_jacDot
+    handle: floats  # its place [m]
+    J: floats  # engine's Jacobian of the handle, and its rate, by axis and degree of freedom
+    Jdot: floats
+    scratch: thing  # data of poses that are tried
+    scratch_q: floats
+    scratch_handle: floats
+    scratch_forces: floats
+    scratch_J: floats  # at measured angles: Jacobian of the handle, torques that hold the arm
+    scratch_bias: floats
+    joint_M: floats  # by the joints: inertia, Jacobian of the handle, bias torques
+    joint_J: floats
+    joint_bias: floats
+    joint_D: floats  # of a closed chain: dampers of its followers, centripetal acceleration
+    joint_c: floats
+    pose: floats  # positions and rates given to the functions of a closed chain
+    at_pose: own_control
+    at_rates: own_control
+    at_scratch: own_control
+    none: floats  # no array
+    site: whole  # the handle's index as a site or body, and that of its body
+    body: whole
+    freedoms: whole
+    # scratch of a kick
+    factored: real  # time over which dampers stand in that factor
+    lower: floats  # Cholesky factor of the inertia of a kick, by rows
+    Y: floats  # rates of the joints per force of the handle, by joint and axis
+    free: floats  # rates after a kick, at first without that force
+    moment: floats  # momentum after a kick without friction and that force
+    matrix: floats  # scratch of the solution with friction
+    pivots: wholes
 
 
 @record
@@ -105,8 +150,34 @@ class Model:
     links: real[5]  # Arm.links
     ox: real  # world position of p = 0 [m]
     oy: real
-    limit1: real  # of the torques [N.m]
-    limit2: real
+    limit: real[12]  # of the torques [N.m]
+    joints: whole
+    axes: whole  # of the handle
+    general: whole  # the arm is on the engine's terms, not in closed form
+    closed: whole  # constraints of its chain are projected out, by functions in Python
+    dof: wholes  # degree of freedom of each joint
+    row: whole[3]  # axis of the world of each axis
+    at: real[3]  # place of p = 0 [m]
+    places: whole  # borders or the end of the path are looked for
+    damper: real[12]  # of the joints [N.m.s/rad]
+    spring: real[12]  # [N.m/rad]
+    pull: real[12]  # of the spring at q = 0 [N.m]
+    drive_damper: real[12]  # the part of these that motors make
+    drive_spring: real[12]
+    drive_pull: real[12]
+    joint_law: whole  # proportional and derivative laws drive the joints
+    gains: real[12]  # [N.m/rad], 0 where the drives have them
+    rate_gains: real[12]  # [N.m.s/rad]
+    reference: real[12]  # [rad]
+    rate: whole  # how a joint's rate is had: 0 exact, 1 difference, 2 filter
+    rate_cutoff: real  # [rad/s]
+    rate_bits: whole
+    rate_range: real  # [rad/s]
+    fed_friction: real[36]  # Fc, k, Fv of each joint
+    feeds_gravity: whole
+    weight: real[3]  # of the hand [N]
+    start: real[12]  # joints at the start [rad]
+    extra: floats  # what such an arm adds to rows
     # loop
     shaping: whole  # inertia is shaped
     formed: whole  # compensators have another shape than K/(s (s + pole))
@@ -163,7 +234,8 @@ class Model:
     chance: whole
     chances: floats  # four numbers a sample
     chance_first: whole
-    encoder: whole  # counts per turn, 0 for none
+    encoder: whole  # joints have encoders
+    counts: whole[12]  # per turn
     window: whole  # samples of the difference, 0 for exact rates
     cutoff: real  # of the low-pass after it [Hz], 0 for none
     angles: floats  # ring of past angles
@@ -172,13 +244,12 @@ class Model:
     adc_bits: whole
     adc_range: real  # [N]
     dac_bits: whole
-    dac_range1: real  # [N.m]
-    dac_range2: real
+    dac_range: real[12]  # [N.m]
     delay: real  # of the torques [s], 0 for none
     queue: floats  # ring of torques on their way
     queue_rows: whole
     friction: whole
-    slip: real[2]  # Coulomb torques [N.m]
+    slip: real[12]  # Coulomb torques [N.m]
     guard: whole  # passivity controller
     guard_whole: whole  # whole samples of the delay
     guard_share: real  # the rest of it
@@ -213,7 +284,7 @@ class Model:
     rendered: floats
     max_crossings: whole
     max_stops: whole
-    axis: many(ModelAxis, 2)
+    axis: many(ModelAxis, 3)
 
 
 @record
@@ -275,6 +346,9 @@ class Kick:
     Wxx: real  # mobility [1/kg]
     Wxy: real
     Wyy: real
+    Wxz: real
+    Wyz: real
+    Wzz: real
     Sxx: real  # that of the law
     Sxy: real
     Syy: real
@@ -282,17 +356,12 @@ class Kick:
     clay_dxy: real  # of it, of the clay
     splits: real  # whether stiff clay is split
     still: real  # whether clay holds the handle
-    o1: real  # joint rates before [rad/s]
-    o2: real
-    w1: real  # after
-    w2: real
-    g1: real  # link accelerations [rad/s^2]
-    g2: real
-    tau1: real  # torques of the motors [N.m]
-    tau2: real
-    slip1: real  # of friction [N.m]
-    slip2: real
-    axis: many(KickAxis, 2)
+    o: real[12]  # joint rates before [rad/s]
+    w: real[12]  # after
+    g: real[12]  # accelerations [rad/s^2], in closed form those of the links
+    tau: real[12]  # torques of the motors [N.m]
+    slip: real[12]  # of friction [N.m]
+    axis: many(KickAxis, 3)
 
 
 @record
@@ -342,16 +411,14 @@ class StateAxis(LoopAxis):
 
 @record
 class MachineAxis(LoopAxis):
-    """One axis, or joint, of controller and hardware."""
+    """One axis of controller and hardware."""
 
     start: real  # its start and command [m]
-    tau: real  # that a joint holds [N.m]
     force: real  # of the clay as rendered [N]
     guard: real  # of it, from the passivity controller [N]
     pull: real  # of the virtual coupling [N]
     pull_rate: real  # velocity of its tool [m/s]
     net: real  # given to the compensator [N]
-    w: real  # joint rate as measured [rad/s]
     filter: real[2]  # of the force
     energy: real  # that the passivity observer counts [J]
     place: real  # of the handle at the last sample [m]
@@ -371,6 +438,9 @@ class Machine:
     n: whole
     due: real
     due_then: real
+    tau: real[12]  # that joints hold [N.m]
+    w: real[12]  # joint rates as measured [rad/s]
+    past: real[12]  # joint positions as measured at the last sample [rad]
     axis: many(MachineAxis, 2)
 
 
@@ -387,6 +457,7 @@ class Work:
     guard: real  # of the passivity controller
     coupling: real  # of the virtual coupling
     rendered: real  # of the force that the motors hold for the clay
+    joints: real  # taken by the dampers of the joints
 
 
 @record
@@ -506,12 +577,10 @@ class State:
     t: real  # [s]
     i: whole  # sample at or before now
     before: real  # length of the step that led here [s]
-    q1: real  # joints
-    q2: real
-    w1: real
-    w2: real
-    g1: real
-    g2: real
+    q: real[12]  # joints
+    w: real[12]
+    g: real[12]
+    sensed: whole  # the engine has the arm at q
     max_step: real  # after a hit [s]
     entered: real  # 1.0 if the handle has just entered this clay
     springs_dissipated: real  # energy [J]
@@ -534,9 +603,11 @@ class State:
     # sampled control
     at_event: whole  # an event begins the step
     responded: whole  # the controller responded to its sample
-    requested: real[10]  # its response: torques, force, guard, pull and velocity of the tool
-    fh1: real  # force of the hand in the kick to the event
-    fh2: real
+    requested: real[20]  # its response: torques, force, guard, pull and velocity of the tool
+    angles: real[12]  # of the joints as measured [rad], and their rates [rad/s]
+    rates: real[12]
+    fz: real  # force of the hand along z on a sensor [N]
+    fh: real[3]  # force of the hand in the kick to the event
     delta1: real  # compensator at the sample [m]
     delta2: real
     # accurate method

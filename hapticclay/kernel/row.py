@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import ctypes
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..model import regions
-from ..model.sampled_controller import BUFFER, Controller
+from ..model.sampled_controller import Controller
 from ..scene.scenario import Scenario
-from . import arm, begin, layout, march, native, path, records, rows, scene, watch
+from . import arm, begin, joints, layout, march, native, path, records, rows, scene, watch
 from .mover import Mover
 
 CHUNK = 4096  # rows between two looks at a run (progress, Ctrl-C, outcome); fits the cache
@@ -34,6 +35,7 @@ class Buffers:
         self.rows = np.empty((CHUNK + 1, rows.ROW))
         self.crossings = np.empty((CROSSINGS, 4))
         self.stops, self.rendered = np.empty((1, 3)), np.empty((1, 3))
+        self.extra = np.empty((1, 0))
 
     def make_room(self, m: Any) -> None:
         """Makes room for what a scene records in addition to its rows."""
@@ -41,11 +43,13 @@ class Buffers:
             self.stops = np.empty((STOPS, 3))
         if m.records_clay_force and len(self.rendered) <= CHUNK:
             self.rendered = np.empty((CHUNK + 1, 3))
+        if m.general and self.extra.shape != (CHUNK + 1, joints.width(m)):
+            self.extra = np.empty((CHUNK + 1, joints.width(m)))
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
         """By the names of their fields."""
-        names = "rows", "crossings", "stops", "rendered"
+        names = "rows", "crossings", "stops", "rendered", "extra"
         return {name: getattr(self, name) for name in names}
 
 
@@ -151,7 +155,8 @@ class Row:
         """Puts the state to the start of a run."""
         if self.caller is not None:
             state = self.caller.controller.state
-            self.arrays["buffer"][BUFFER : BUFFER + len(state)] = state
+            start = self.caller.start
+            self.arrays["buffer"][start : start + len(state)] = state
         for law in self.laws:
             law.z[:] = law.start
         self.put_start(*map(float, (*scenario.start, *scenario.velocity)))
@@ -166,12 +171,19 @@ class Row:
         self._step(path.advance, self.m, self.s, room)
 
     def peek(self) -> np.ndarray:
-        """The row that the next step would write, and the force of the clay, shape (18,)."""
+        """The row that the next step would write, and the force of the clay, shape (18,).
+
+        Then comes what an arm from a file adds to rows.
+        """
         m, n = self.m, self.s.row
         arm.put(m, self.s)
         self._step(path.peek, m, self.s, self.spare)
         rendered = self.buffers.rendered[n, :2] if m.records_clay_force else (0.0, 0.0)
-        return np.concatenate((self.buffers.rows[n], rendered))
+        return np.concatenate((self.buffers.rows[n], rendered, self.extra_at(n)))
+
+    def extra_at(self, n: int) -> np.ndarray:
+        """What an arm from a file adds to a row."""
+        return self.buffers.extra[n] if self.m.general else self.buffers.extra[0, :0]
 
     def _step(self, make: Any, *arguments: Any) -> None:
         """Makes steps, where the step of an exactly straight arm raises."""
@@ -195,6 +207,10 @@ class Row:
             raise self.failed[0]
         if self.caller is not None:
             self.caller.check()
+
+    def strained(self, n: int, limits: Sequence[float]) -> list[int]:
+        """How many of the last n rows have |tau| of each motor at its limit or above."""
+        return [watch.strained(self.m, self.s, n, i, limit) for i, limit in enumerate(limits)]
 
     def is_quiet(self, first: int, n: int) -> bool:
         """Whether the monitor can have nothing to report on rows, nor had it before."""
@@ -235,7 +251,11 @@ class NativeRow(Row):
         self.s = layout.view_of(records.State, self.states)
         self.addresses = self.models.ctypes.data, self.states.ctypes.data
         self.rooms, self.which = np.zeros(1, np.int64), np.zeros(1, np.int64)
+        self.shown, self.counts = np.zeros(SHOWN), np.zeros(2, np.int64)
         self.call = *self.addresses, self.which.ctypes.data, 1
+        # finding an address takes as long as a step
+        self.rooms_at, self.counts_at = self.rooms.ctypes.data, self.counts.ctypes.data
+        self.shown_at = self.spare.ctypes.data, self.shown.ctypes.data
         self._start(scenario, mover, buffers)
 
     def model_of(self, m: Any) -> Any:
@@ -273,12 +293,16 @@ class NativeRow(Row):
 
     def advance(self, room: int) -> None:
         self.rooms[0] = room
-        self.machine.advance(*self.call, self.rooms.ctypes.data, False)
+        self.machine.advance(*self.call, self.rooms_at, False)
 
     def peek(self) -> np.ndarray:
-        shown = np.zeros(SHOWN)
-        self.machine.peek(*self.call, self.spare.ctypes.data, shown.ctypes.data)
-        return shown
+        n = self.s.row
+        self.machine.peek(*self.call, *self.shown_at)
+        return np.append(self.shown, self.extra_at(n)) if self.m.general else self.shown.copy()
+
+    def strained(self, n: int, limits: Sequence[float]) -> list[int]:
+        self.machine.strained(*self.call, n, *limits, self.counts_at)
+        return self.counts.tolist()
 
     def is_quiet(self, first: int, n: int) -> bool:
         return self.machine.look(*self.addresses, first, n)

@@ -2,6 +2,7 @@ cimport cython
 from .records cimport Kick, Model, State
 from ..formulas cimport arm as arm_law
 from . cimport hand
+from . cimport joints
 from . cimport kick
 from . cimport laws
 from . cimport ledger

@@ -1,7 +1,7 @@
 """What a run keeps of a kick: its row of the record, and its entry in the ledger of energy."""
 
 from ..formulas import arm as arm_law
-from . import hand, kick, laws, ledger, own_laws, sampled, springs, viscous
+from . import hand, joints, kick, laws, ledger, own_laws, sampled, springs, viscous
 
 ROW = 16  # floats of a row: q, p, v, fh, tau, delta, b, q', two axes each
 
@@ -16,19 +16,24 @@ def write(m, s, k, after):
         vx, vy, fx, fy = arrived(m, s, vx, vy, fx, fy)
     bx, by = viscous.damping(m, s, 0, end), viscous.damping(m, s, 1, end)
     hx, hy = hand.force(m, k, 0), hand.force(m, k, 1)
+    share = 0.0
     if m.ratio:
         dx, dy, share = sampled.shown_output(s, after)
-        hx, hy = hx + share * (s.fh1 - hx), hy + share * (s.fh2 - hy)
+        hx, hy = hx + share * (s.fh[0] - hx), hy + share * (s.fh[1] - hy)
         if m.special and m.flow:
             fx, fy = x.sf + share * (s.e.x.sf - x.sf), y.sf + share * (s.e.y.sf - y.sf)
             fx, fy = laws.motion_force(m, s, vx, vy, fx, fy)
     else:
         dx, dy = kick.shown_delta(k, 0), kick.shown_delta(k, 1)
-    r1, r2 = arm_law.joint_velocity(vx, vy, k.u, 1.0)
+    r1 = r2 = 0.0
+    if m.general:
+        joints.write(m, s, k, share)
+    else:
+        r1, r2 = arm_law.joint_velocity(vx, vy, k.u, 1.0)
     row, n = m.rows, ROW * s.row
-    row[n], row[n + 1], row[n + 2], row[n + 3] = s.q1, s.q2, x.p, y.p
+    row[n], row[n + 1], row[n + 2], row[n + 3] = s.q[0], s.q[1], x.p, y.p
     row[n + 4], row[n + 5], row[n + 6], row[n + 7] = vx, vy, hx, hy
-    row[n + 8], row[n + 9], row[n + 10], row[n + 11] = k.tau1, k.tau2, dx, dy
+    row[n + 8], row[n + 9], row[n + 10], row[n + 11] = k.tau[0], k.tau[1], dx, dy
     row[n + 12], row[n + 13], row[n + 14], row[n + 15] = bx, by, r1, r2 - r1
     if m.records_clay_force:
         write_force(m, s, k, end, vx, vy, fx, fy)
@@ -83,6 +88,6 @@ def keep(m, s, k, after, shows):
         write(m, s, k, after)
         s.row += 1
     if sampled.is_early(s, after):
-        ledger.add_work(m, s.work_at_event, s.work, k, s.e.w1, s.e.w2, s.next)
+        ledger.add_work(m, s.work_at_event, s.work, k, s.e.w, s.next)
     else:
-        ledger.add_work(m, s.work, s.work, k, s.w1, s.w2, s.now)
+        ledger.add_work(m, s.work, s.work, k, s.w, s.now)

@@ -8,6 +8,8 @@ from . cimport arm
 from . cimport friction
 from . cimport hand
 from . cimport hardware
+from . cimport joint_law
+from . cimport joints
 from . cimport kick
 from . cimport laws
 from . cimport ledger
@@ -17,7 +19,7 @@ from . cimport signals
 from . cimport viscous
 from . cimport yielding
 
-cdef long STATE, NOT_FINITE
+cdef long NOT_FINITE
 cdef double SLACK, REACTION
 
 cdef bint is_early(State s, double after) noexcept nogil
@@ -25,22 +27,23 @@ cdef Machine machine_of(State s, double after) noexcept nogil
 cdef void by_hold(Model m, State s, Kick k, double after) noexcept nogil
 cdef void across(Model m, State s, Kick k, double after) noexcept nogil
 cdef void move_under(Model m, State s, Kick k, Machine machine) noexcept nogil
-cdef void from_event(Kick e, Kick k) noexcept nogil
+cdef void from_event(Model m, State s, Kick e, Kick k) noexcept nogil
 @cython.locals(samples=cython.bint)
 cdef void act(Model m, State s) noexcept nogil
 cdef void event(Model m, State s, long samples, double now) noexcept nogil
 cdef void rest(Model m, State s, Kick e) noexcept nogil
 cdef void put_times(Model m, Machine machine, long long k) noexcept nogil
 cdef void sample(Model m, State s) noexcept nogil
-cdef void respond(Model m, State s, Kick k, double w1, double w2, double fx, double fy) noexcept nogil
-cdef (double, double) sense(Model m, State s, Kick k) noexcept nogil
+cdef void respond(Model m, State s, Kick k, double fx, double fy) noexcept nogil
+cdef void sense(Model m, State s, Kick k) noexcept nogil
 cdef (double, double) on_sensor(Model m, State s, Kick k, double ux, double uy) noexcept nogil
-cdef (double, double) acceleration(Model m, Kick k, double fx, double fy, double t1, double t2) noexcept nogil
+cdef (double, double) acceleration(Model m, State s, Kick k, double fx, double fy) noexcept nogil
 @cython.locals(B=(cython.double, cython.double, cython.double, cython.double))
-cdef (double, double) reaction(Model m, State s, Kick k, double fx, double fy, double t1, double t2) noexcept nogil
+cdef (double, double) reaction(Model m, State s, Kick k, double fx, double fy) noexcept nogil
 cdef void compute(Model m, State s, Kick k, double fx, double fy) noexcept nogil
 cdef double output(Model m, MachineAxis z, long i, double f) noexcept nogil
-cdef void call_own_controller(Model m, State s, double q1, double q2, double w1, double w2, double fx, double fy) noexcept nogil
+@cython.locals(size=cython.double)
+cdef void call_own_controller(Model m, State s, double fx, double fy) noexcept nogil
 cdef void advance(Model m, State s, long i, double shift) noexcept nogil
 cdef void advance_form(Model m, long i, MachineAxis z, MachineAxis to, double shift) noexcept nogil
 cdef double form_row(double *c, long j, double *z, double y, double yrate, double start, double f) noexcept nogil

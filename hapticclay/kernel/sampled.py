@@ -14,6 +14,8 @@ from . import (
     friction,
     hand,
     hardware,
+    joint_law,
+    joints,
     kick,
     laws,
     ledger,
@@ -26,7 +28,6 @@ from . import (
 
 SLACK = 1e-9  # share of dt: events so close count as one
 REACTION = 1e-9  # [s] a force within this time after a sample counts as that at it
-STATE = 9  # where the state of the user's own controller begins in its buffer
 NOT_FINITE = 3
 
 
@@ -47,7 +48,7 @@ def by_hold(m, s, k, after):
     """The kick under the torques that the motors hold: from an event, else across the sample."""
     if is_early(s, after):
         kick.begin(k, 0.0, after)
-        from_event(s.e, k)
+        from_event(m, s, s.e, k)
         move_under(m, s, k, s.next)
     else:
         across(m, s, k, after)
@@ -57,29 +58,39 @@ def across(m, s, k, after):
     """The kick across the sample, even if an event begins there."""
     kick.begin(k, s.before, after)
     kick.take_over(m, s, k)
-    r1, r2 = s.w1, s.w1 + s.w2
-    arm.handle_at(m, k, s.q1, s.q2, r1, r2)
-    arm.turning(k, r1, r2)
+    if m.general:
+        joints.before_kick(m, s, k)
+    else:
+        r1, r2 = s.w[0], s.w[0] + s.w[1]
+        arm.handle_at(m, k, s.q[0], s.q[1], r1, r2)
+        arm.turning(k, r1, r2)
     move_under(m, s, k, s.now)
 
 
 def move_under(m, s, k, machine):
     """Motion in a kick under the torques of a machine."""
+    for i in range(m.joints):
+        k.tau[i], k.slip[i] = machine.tau[i], 0.0
+    if m.general:
+        joints.move_under(m, s, k)
+        return
     kick.load(m, s, k)
-    k.tau1, k.tau2 = machine.x.tau, machine.y.tau
-    k.slip1 = k.slip2 = 0.0
     if m.friction:
-        friction.find(m, s, k, k.tau1, k.tau2)
-        friction.drive(m, s, k, k.tau1 + k.slip1, k.tau2 + k.slip2)
+        friction.find(m, s, k, k.tau[0], k.tau[1])
+        friction.drive(m, s, k, k.tau[0] + k.slip[0], k.tau[1] + k.slip[1])
     else:
-        friction.drive(m, s, k, k.tau1, k.tau2)
+        friction.drive(m, s, k, k.tau[0], k.tau[1])
 
 
-def from_event(e, k):
+def from_event(m, s, e, k):
     """Begins where the kick to an event ended."""
+    for i in range(m.joints):
+        k.o[i] = e.w[i]
+    if m.general:
+        joints.from_event(m, s, k)
+        return
     memory.copied4(k.u, e.u)
     k.Wxx, k.Wxy, k.Wyy = e.Wxx, e.Wxy, e.Wyy
-    k.o1, k.o2 = e.w1, e.w2
     for i in range(2):
         o, z = k.axis[i], e.axis[i]
         o.p, o.v, o.c, o.owed0, o.stuck0, o.anchor0 = z.p, z.v, z.c, z.owed, z.stuck, z.anchor
@@ -101,17 +112,23 @@ def act(m, s):
 def event(m, s, samples, now):
     """The kick that leads to an event, the measurement, and the torques after it."""
     e = s.e
-    s.fh1 = s.fh2 = 0.0
-    e.tau1 = e.tau2 = e.slip1 = e.slip2 = 0.0
+    for i in range(m.axes):
+        s.fh[i] = 0.0
+    for i in range(m.joints):
+        e.tau[i] = e.slip[i] = 0.0
     s.at_event = 0
     if s.before > 0.0:
         across(m, s, e, 0.0)
-        s.fh1, s.fh2 = hand.force(m, e, 0), hand.force(m, e, 1)
-        ledger.add_work(m, s.work, s.work_at_event, e, e.o1, e.o2, s.now)
+        for i in range(m.axes):
+            s.fh[i] = hand.force(m, e, i)
+        ledger.add_work(m, s.work, s.work_at_event, e, e.o, s.now)
     else:
         rest(m, s, e)
         memory.copied(s.work_at_event, s.work)
-    arm.at_rates(e, e.w1, e.w2)
+    if m.general:
+        joints.at_event(m, e)
+    else:
+        arm.at_rates(e, e.w[0], e.w[1])
     memory.copied(s.next, s.now)
     s.delta1, s.delta2 = s.now.x.delta, s.now.y.delta
     s.at_event, s.responded = 1, 0
@@ -124,9 +141,14 @@ def event(m, s, samples, now):
 def rest(m, s, e):
     """A kick of no length."""
     kick.take_over(m, s, e)
-    arm.handle_at(m, e, s.q1, s.q2, s.w1, s.w1 + s.w2)
-    e.w1, e.w2 = s.w1, s.w2
-    for i in range(2):
+    e.H = 0.0
+    for i in range(m.joints):
+        e.w[i], e.g[i] = s.w[i], 0.0
+    if m.general:
+        joints.before_kick(m, s, e)
+    else:
+        arm.handle_at(m, e, s.q[0], s.q[1], s.w[0], s.w[0] + s.w[1])
+    for i in range(m.axes):
         o = e.axis[i]
         o.u, o.owed, o.stuck, o.anchor, o.sf, o.stop = o.v, o.owed0, o.stuck0, o.anchor0, 0.0, 0.0
 
@@ -140,48 +162,60 @@ def put_times(m, machine, k):
 
 def sample(m, s):
     """Sense, compute, hold."""
-    seen = s.k
-    w1, w2 = sense(m, s, seen)
-    ux, uy = signals.push_now(m, s)
-    fx, fy = on_sensor(m, s, seen, ux, uy)
-    fx, fy = hardware.measured(m, s, 0, fx), hardware.measured(m, s, 1, fy)
+    seen, fx, fy = s.k, 0.0, 0.0
+    sense(m, s, seen)
+    if not m.joint_law:
+        ux, uy = signals.push_now(m, s)
+        fx, fy = on_sensor(m, s, seen, ux, uy)
+        fx, fy = hardware.measured(m, s, 0, fx), hardware.measured(m, s, 1, fy)
+        if m.axes > 2:
+            s.fz = hardware.converted(m, s.fz)
     dx, dy = signals.command_over_sample(m, s)
     if not hardware.is_lost(m, s.now.k):
         s.responded = 1
-        respond(m, s, seen, w1, w2, fx, fy)
-        hardware.note_request(s)
-    if not m.own:
+        respond(m, s, seen, fx, fy)
+        hardware.note_request(m, s)
+    if not m.own and not m.joint_law:
         advance(m, s, 0, dx)
         advance(m, s, 1, dy)
     put_times(m, s.next, s.now.k + 1)
 
 
-def respond(m, s, k, w1, w2, fx, fy):
+def respond(m, s, k, fx, fy):
     """Response of the controller to a sample that is not lost."""
-    q1, q2 = hardware.encoded(m, s.q1), hardware.encoded(m, s.q2)
+    q, w = s.angles, s.rates
+    for i in range(m.joints):
+        q[i] = hardware.encoded(m, i, s.q[i])
     if m.window > 0:
-        w1, w2 = hardware.differenced(m, s, q1, q2)
+        hardware.differenced(m, s, q, w)
     if m.own:
-        call_own_controller(m, s, q1, q2, w1, w2, fx, fy)
-        return
-    if m.encoder > 0:
-        arm.handle_at(m, k, q1, q2, w1, w1 + w2)
-        arm.turning(k, w1, w1 + w2)
-    elif m.window > 0:
-        arm.at_rates(k, w1, w2)
-    compute(m, s, k, fx, fy)
+        call_own_controller(m, s, fx, fy)
+    elif m.joint_law:
+        joint_law.respond(m, s, k)
+    else:
+        if m.encoder > 0:
+            arm.handle_at(m, k, q[0], q[1], w[0], w[0] + w[1])
+            arm.turning(k, w[0], w[0] + w[1])
+        elif m.window > 0:
+            arm.at_rates(k, w[0], w[1])
+        compute(m, s, k, fx, fy)
 
 
 # ---- sense ---------------------------------------------------------------------------------------
 
 
 def sense(m, s, k):
-    """The handle at a sample, into k; returns the joint rates [rad/s].
+    """The handle at a sample, into k, and the joint rates there [rad/s].
 
     Half a kick holds too little of stiff clay: the velocity there is that of a whole kick, with the
     step before it repeated.
     """
     e, x, y = s.e, s.e.x, s.e.y
+    for i in range(m.joints):
+        s.rates[i] = e.w[i]
+    if m.general:
+        joints.sensed_handle(m, s, k)
+        return
     vx, vy = x.u, y.u
     if m.acts and m.special and m.stiff and s.before > 0.0:
         across(m, s, k, s.before)
@@ -193,10 +227,10 @@ def sense(m, s, k):
         o, z = k.axis[i], e.axis[i]
         o.p, o.v, o.c = z.p, z.v, z.c
     if vx == x.u and vy == y.u:
-        return e.w1, e.w2
+        return
     r1, r2 = arm_law.joint_velocity(vx, vy, e.u, 1.0)
+    s.rates[0], s.rates[1] = r1, r2 - r1
     arm.at_rates(k, r1, r2 - r1)
-    return r1, r2 - r1
 
 
 def on_sensor(m, s, k, ux, uy):
@@ -204,8 +238,9 @@ def on_sensor(m, s, k, ux, uy):
 
     At the start the handle does not accelerate.
     """
-    e, x, y = s.e, k.x, k.y
-    t1, t2 = e.tau1 + e.slip1, e.tau2 + e.slip2
+    x, y = k.x, k.y
+    if m.general:
+        joints.prepare_sensor(m, s, k)
     hx, hy = ux, uy
     if m.hand:
         hx -= hand.resistance(m, x.p, x.v, x.c, 0)
@@ -215,34 +250,41 @@ def on_sensor(m, s, k, ux, uy):
     if m.acts:
         fx, fy = laws.without_clay(m, s, k, fx, fy)
         if m.special and m.flow:
-            x.pull, y.pull = reaction(m, s, k, fx, fy, t1, t2)
+            x.pull, y.pull = reaction(m, s, k, fx, fy)
+    s.fz = 0.0
     if not m.hand:
         return ux, uy
     if s.before == 0.0:
         hx = ux - hand.resistance(m, x.p, x.v, 0.0, 0)
         return hx, uy - hand.resistance(m, y.p, y.v, 0.0, 1)
-    ax, ay = acceleration(m, k, fx - x.pull, fy - y.pull, t1, t2)
+    ax, ay = acceleration(m, s, k, fx - x.pull, fy - y.pull)
+    if m.axes > 2:
+        s.fz = joints.force_along_z(m, k, fx - x.pull, fy - y.pull, ax, ay)
     return hx - m.x.mass * ax, hy - m.y.mass * ay
 
 
-def acceleration(m, k, fx, fy, t1, t2):
+def acceleration(m, s, k, fx, fy):
     """Acceleration of the handle and its hand under torques and a force, (x, y) [m/s^2]."""
-    ax, ay = arm.pushed(m, k.u, t1, t2)
+    e = s.e
+    if m.general:
+        ax, ay = k.x.rest, k.y.rest
+    else:
+        ax, ay = arm.pushed(m, k.u, e.tau[0] + e.slip[0], e.tau[1] + e.slip[1])
     gx, gy = ax + k.Wxx * fx + k.Wxy * fy, ay + k.Wxy * fx + k.Wyy * fy
     a, b = 1.0 + k.Wxx * m.x.mass, k.Wxy * m.y.mass
-    c, e = k.Wxy * m.x.mass, 1.0 + k.Wyy * m.y.mass
+    c, d = k.Wxy * m.x.mass, 1.0 + k.Wyy * m.y.mass
     r = c / a
-    uy = (gy - r * gx) / (e - r * b)
+    uy = (gy - r * gx) / (d - r * b)
     return (gx - b * uy) / a, uy
 
 
-def reaction(m, s, k, fx, fy, t1, t2):
+def reaction(m, s, k, fx, fy):
     """Force of physical clay that yields at an instant, (x, y) [N].
 
     Where clay holds the handle, this is the force that prevents acceleration.
     """
     x, y, h = k.x, k.y, REACTION
-    ax, ay = acceleration(m, k, fx, fy, t1, t2)
+    ax, ay = acceleration(m, s, k, fx, fy)
     B = controller.velocity_per_force((1.0, 1.0), (k.Wxx, k.Wxy, k.Wyy), (m.x.mass, m.y.mass, 0.0))
     ax, ay = ax - x.c, ay - y.c
     vx, vy = viscous.along(m, x.v, y.v)
@@ -278,13 +320,12 @@ def compute(m, s, k, fx, fy):
     ay, _ = servo.acceleration(m, 1, s.delta2, now.y.y, now.y.yrate, y.p, y.v, y.c)
     servo.put_mobility(m, k)
     ax, ay = ax + k.Sxx * x.net + k.Sxy * y.net, ay + k.Sxy * x.net + k.Syy * y.net
-    k.g1, k.g2 = arm_law.joint_velocity(ax, ay, k.u, 1.0)
+    k.g[0], k.g[1] = arm_law.joint_velocity(ax, ay, k.u, 1.0)
     arm.link_torques(m, k)
-    t1, t2 = k.tau1, k.tau2
     if not m.acts:  # the motors render the clay as well
         a1, a2 = arm_law.joint_torques(fex, fey, k.u)
-        t1, t2 = t1 - a1, t2 - a2
-    hardware.drive(m, s, t1, t2)
+        k.tau[0], k.tau[1] = k.tau[0] - a1, k.tau[1] - a2
+    hardware.drive(m, s, k.tau)
     after.x.force, after.y.force, after.x.net, after.y.net = fex, fey, x.net, y.net
 
 
@@ -297,19 +338,28 @@ def output(m, z, i, f):
     return out + c[j] * a[0] + c[j + 1] * a[1] + c[j + 2] * a[2] + c[j + 3] * a[3]
 
 
-def call_own_controller(m, s, q1, q2, w1, w2, fx, fy):
+def call_own_controller(m, s, fx, fy):
     """The user's own controller: a function of a buffer, which it fills with torques and state."""
-    b, z = m.buffer, s.next
-    b[0], b[1], b[2], b[3], b[4], b[5], b[6] = s.t, q1, q2, w1, w2, fx, fy
-    b[7] = b[8] = math.nan  # stays so where the call fails
+    b, z, n = m.buffer, s.next, m.joints
+    b[0], b[2 * n + 1], b[2 * n + 2] = s.t, fx, fy
+    if m.axes > 2:
+        b[2 * n + 3] = s.fz
+    tau = 2 * n + 1 + m.axes
+    for i in range(n):
+        b[1 + i], b[n + 1 + i] = s.angles[i], s.rates[i]
+        b[tau + i] = math.nan  # stays so where the call fails
     m.control(b)
-    t1, t2 = b[7], b[8]
     s.delta1 = s.delta2 = 0.0
-    if not abs(t1) + abs(t2) < math.inf:
+    size = 0.0
+    for i in range(n):
+        size += abs(b[tau + i])
+        s.angles[i] = b[tau + i]
+    if not size < math.inf:
         s.code = NOT_FINITE
-        z.x.tau, z.y.tau = t1, t2
+        for i in range(n):
+            z.tau[i] = b[tau + i]
     else:
-        hardware.drive(m, s, t1, t2)
+        hardware.drive(m, s, s.angles)
     z.x.force = z.y.force = 0.0
 
 
@@ -383,9 +433,9 @@ def take(m, s):
 
 def keep_own_state(m):
     """The state that the user's own controller returned becomes that before its next sample."""
-    b, n = m.buffer, m.buffer_size
+    b, n, state = m.buffer, m.buffer_size, 3 * m.joints + 1 + m.axes
     for i in range(n):
-        b[STATE + i] = b[STATE + n + i]
+        b[state + i] = b[state + n + i]
 
 
 # ---- the path ------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from ..formulas.constants import B_MAX
 from ..model import compensator, controller, regions
 from ..model import hardware as devices
 from ..model.controller import Servo
-from ..model.sampled_controller import BUFFER, Controller, LawCaller
+from ..model.sampled_controller import Controller, LawCaller
 from ..scene.scenario import Scenario
 from . import hardware, methods, modes, pace, records, sampled, user_laws
 from .march import GROWTH_BLOCK
@@ -38,12 +38,12 @@ class Compiled(NamedTuple):
 def compile_scene(s: Scenario, own: Controller | None = None) -> Compiled:
     """The model of a scene; `own`: the user's controller, in place of the scenario's."""
     m, arrays = records.Model(), {"table": regions.region_table(s.clay, s.length)}
-    put_arm(m, s)
+    put_arm(m, arrays, s)
     put_axes(m, s)
     put_clay(m, arrays, s)
     caller = None
     if s.control == "sampled":
-        caller = put_sampler(m, arrays, s, own or s.controller)
+        caller = put_sampler(m, arrays, s, own)
     elif s.integrator != "fast":
         put_accurate(m, arrays, s)
     laws = user_laws.of_scene(s)
@@ -56,12 +56,18 @@ def compile_scene(s: Scenario, own: Controller | None = None) -> Compiled:
 # ---- arm and loop --------------------------------------------------------------------------------
 
 
-def put_arm(m: Any, s: Scenario) -> None:
+def put_arm(m: Any, arrays: dict[str, np.ndarray], s: Scenario) -> None:
     """Times, arm and the limits of its motors."""
     m.dt, m.t_max, m.last = float(s.dt), float(s.t_max), math.floor(s.t_max / s.dt + 1e-6)
+    if not s.is_closed_form:
+        from . import joint_scene  # imported only for an arm from a file
+
+        joint_scene.put_arm(m, arrays, s)
+        return
     m.links[:] = map(float, s.arm.links)
     m.ox, m.oy = map(float, s.origin)
-    m.limit1, m.limit2 = map(float, s.torque_limit)
+    m.joints = m.axes = 2
+    m.limit[:2] = map(float, s.torque_limit)
     m.shaping = int(bool(s.inertia_shaping))
 
 
@@ -69,19 +75,20 @@ def put_axes(m: Any, s: Scenario) -> None:
     """Compensator, servo, hand and muscle of each axis."""
     m.hand, m.spring_uses_longer_step = int(any(s.operators)), int(s.control == "sampled")
     force = s.steady_force
-    for i, a in enumerate(m.axis):
+    for i, a in enumerate(m.axis[: m.axes]):
+        if th := s.operators[min(i, 1)]:
+            a.mass, a.damper, a.spring = float(th.mass), float(th.damper), float(th.spring)
+    for i, a in enumerate(m.axis[:2]):
         a.servo[:] = map(float, s.servo[i].numbers)
         a.K, a.push = float(s.gain[i]), force[i]
-        if th := s.operators[i]:
-            a.mass, a.damper, a.spring = float(th.mass), float(th.damper), float(th.spring)
     lags = [c.lag for c in s.compensators]
     if all(x and x[0] == 1.0 for x in lags):
-        for a, lag in zip(m.axis, lags, strict=True):
+        for a, lag in zip(m.axis[:2], lags, strict=True):
             a.pole = float(lag[1])  # type: ignore[index]
         return
     m.formed, m.order = 1, max(1, *(c.order for c in s.compensators))
     m.form[:] = [float(x) for c in s.compensators for x in compensator.form_numbers(c)]
-    for i, a in enumerate(m.axis):
+    for i, a in enumerate(m.axis[:2]):
         z = compensator.moving_states(s.compensators[i], s.velocity[i] / a.servo[0])
         a.z0[:] = [float(x) for x in z]
 
@@ -110,7 +117,7 @@ def hardness(s: Scenario, b: Any) -> tuple[Any, Any]:
     if is_held(s) or (s.integrator != "fast" and s.control != "sampled"):
         return False, False
     # share of its velocity that a step of explicit damping would take from a handle without a hand
-    k = b * s.dt * s.arm.links[4]
+    k = b * s.dt * s.free_mobility
     return k > STIFF, s.control != "sampled" and k > HITTING
 
 
@@ -132,7 +139,7 @@ def put_clay(m: Any, arrays: dict[str, np.ndarray], s: Scenario) -> None:
     if stiff:
         m.stiff, m.mobility = 1, float(s.mobility)
     if hits:
-        m.hits, m.first_hit = 1, HITTING / s.arm.links[4]
+        m.hits, m.first_hit = 1, HITTING / s.free_mobility
     if clay.groove:
         put_groove(m, arrays, clay.groove)
 
@@ -190,15 +197,21 @@ def put_sampler(
     """Sampled control and its hardware; returns the caller of the user's own controller."""
     m.method, m.ratio = methods.SAMPLED, round((s.Ts or s.dt) / s.dt)
     m.Ts, caller = m.ratio * float(s.dt), None
-    put_memory(m, s)
+    if own is None and isinstance(s.controller, Controller):
+        own = s.controller
     if own is not None:
-        buffer = np.array([0.0] * BUFFER + [*own.state, *own.state, *own.params])
-        m.own, m.buffer_size, arrays["buffer"] = 1, len(own.state), buffer
-        caller = LawCaller(own, buffer)
+        caller = LawCaller(own, m.joints, m.axes)
+        m.own, m.buffer_size, arrays["buffer"] = 1, len(own.state), caller.numbers
+    elif s.controller is not None:
+        from . import joint_scene  # imported only for a law of joints
+
+        joint_scene.put_law(m, s.controller)
+    else:
+        put_memory(m, s)
     if s.hardware is not None:
         put_hardware(m, arrays, s, s.hardware)
     m.renders = int(m.clay and not m.acts and not m.own)
-    m.hardware = int(m.renders or s.hardware is not None)
+    m.hardware = int(m.renders or m.friction or s.hardware is not None)
     return caller
 
 
@@ -226,29 +239,31 @@ def held_memory(servo: Servo, shape: compensator.Compensator, K: float, T: float
 def put_memory(m: Any, s: Scenario) -> None:
     """Compensator and reference over a control sample."""
     make = formed_memory if m.formed else held_memory
-    for i, a in enumerate(m.axis):
+    for i, a in enumerate(m.axis[:2]):
         rows = make(s.servo[i], s.compensators[i], s.gain[i], m.Ts).ravel().tolist()
         a.memory[: len(rows)] = rows
 
 
 def put_hardware(m: Any, arrays: dict[str, np.ndarray], s: Scenario, io: Any) -> None:
     """The hardware between computer and arm."""
-    m.encoder = int(io.encoder or 0)
+    counts = io.encoder if isinstance(io.encoder, tuple) else (io.encoder or 0,) * m.joints
+    m.encoder, m.counts[: m.joints] = int(any(counts)), map(int, counts)
     if io.jitter > 0.0 or io.dropout_probability > 0.0 or io.force_noise > 0.0:
         n = min(int(s.t_max / m.Ts), NOISE_AHEAD) + 8
         m.chance, arrays["chances"] = 1, devices.SampleNoise(io).table(0, n).ravel()
     m.uneven = int(io.jitter > 0.0 or io.delay > 0.0)
     if io.velocity == "difference":
         m.window, m.cutoff = int(io.velocity_window), float(io.velocity_filter or 0.0)
-        arrays["angles"] = np.zeros(3 * m.window)
+        arrays["angles"] = np.zeros((m.joints + 1) * m.window)
     if io.force_filter is not None:
         m.filtered = 1
         m.filter[:] = devices.butterworth(io.force_filter, io.filter_order, m.Ts)
     m.adc_bits, m.adc_range = int(io.adc_bits or 0), float(io.adc_range)
     m.dac_bits = int(io.dac_bits or 0)
-    m.dac_range1, m.dac_range2 = map(float, io.dac_range or s.torque_limit)
+    m.dac_range[: m.joints] = map(float, io.dac_range or m.limit[: m.joints])
     put_delay(m, arrays, float(io.delay), io.passivity)
-    m.friction, m.slip[:] = int(any(io.friction)), map(float, io.friction)
+    if s.is_closed_form:
+        m.friction, m.slip[:2] = int(any(io.friction)), map(float, io.friction)
     if io.coupling is not None:
         m.coupling = 1
         m.coupling_spring, m.coupling_damper = float(io.coupling.spring), float(io.coupling.damper)
@@ -267,7 +282,7 @@ def put_delay(m: Any, arrays: dict[str, np.ndarray], delay: float, guarded: bool
     m.delay = delay
     if delay > 0.0:
         m.queue_rows = late + QUEUE
-        arrays["queue"] = np.zeros(hardware.QUEUED * m.queue_rows)
+        arrays["queue"] = np.zeros((hardware.QUEUED + m.joints) * m.queue_rows)
     if guarded:
         m.guard, m.guard_whole, m.guard_share = 1, late, float(share)
         arrays["forces"] = np.zeros(2 * (late + 2))

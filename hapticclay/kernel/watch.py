@@ -33,11 +33,21 @@ def look(m, s, first, n):
         first += 1
 
 
+def strained(m, s, n, motor, limit):
+    """How many of the last n rows have |tau| of a motor at a limit or above; NaN counts too."""
+    row, found, j = m.rows, 0, max(s.row - n, 0)
+    while j < s.row:
+        if not abs(row[ROW * j + 8 + motor]) < limit:
+            found += 1
+        j += 1
+    return found
+
+
 def is_quiet(m, w, at):
     """Whether a row can have nothing to report."""
     row, seen = m.rows, w.seen
     vx, vy = abs(row[at + 4]), abs(row[at + 5])
-    bound = abs(row[at + 8]) >= m.limit1 or abs(row[at + 9]) >= m.limit2
+    bound = abs(row[at + 8]) >= m.limit[0] or abs(row[at + 9]) >= m.limit[1]
     if not (vx <= SPEED and vy <= SPEED and abs(math.sin(row[at + 1])) >= FOLD):
         return False
     if vx > STILL or vy > STILL:

@@ -17,6 +17,7 @@ import numpy as np
 from ..arguments import part
 from ..errors import Bound
 from .constants import L1, L2, S
+from .traits import NO, Refusal, Trait
 
 Columns = tuple[float, float, float, float]
 Links = tuple[float, float, float, float, float]
@@ -63,3 +64,26 @@ def jacobians(q1: Any, q2: Any, links: Links) -> tuple[Any, ...]:
     """As `jacobian`, (u1x, u1y, u2x, u2y) [m], for arrays of angles [rad]."""
     l1, l2, a = links[0], links[1], q1 + q2
     return -l1 * np.sin(q1), l1 * np.cos(q1), -l2 * np.sin(a), l2 * np.cos(a)
+
+
+_SAMPLED = Refusal("control", "must be 'sampled' with an arm from a file")
+_NO_LOOP = "must be left out with an arm from a file, which has no servo of the handle"
+_IDEAL = Refusal("hardware", "must measure the force ideally with an arm from a file")
+TRAITS = (
+    Trait(
+        "arm from a file", "part", lambda s: not isinstance(s.arm, Arm), NO,
+        {
+            "fast": _SAMPLED,
+            "accurate": Refusal("integrator", "must be 'fast' where control is 'sampled'"),
+            "inertia shaping": Refusal("inertia_shaping", _NO_LOOP),
+            "groove": Refusal("clay", "must not stay cut with an arm from a file"),
+            "passivity controller": Refusal("hardware.passivity", _NO_LOOP),
+            "virtual coupling": Refusal("hardware.coupling", _NO_LOOP),
+            "joint friction": Refusal(
+                "hardware.friction", "must be 0 with an arm from a file: MjcfArm(friction)"
+            ),
+            "force noise": _IDEAL,
+            "force filter": _IDEAL,
+        },
+    ),
+)  # fmt: skip

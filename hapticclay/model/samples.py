@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
 
 from ..arguments import checked, named
-from ..columns import BadCell, Sheet
+from ..columns.log import open_log
 from ..errors import ParameterError, array_of, choice
 from . import pieces
 from .signals import Signal
 
 Between = Literal["linear", "hold"]
 Outside = Literal["hold", "zero"]
-CSV_COLUMNS = ("t", "fx", "fy")
-CSV_UNITS = ("s",), ("N", "m")  # of time, and of x and y
+COLUMNS = ("t", "fx", "fy")
+UNITS = ("s",), ("N", "m"), ("N", "m")
 
 
 @named
@@ -65,45 +64,60 @@ class Samples(Signal):
 
     @classmethod
     @checked
-    def csv(
+    def of(
         cls,
         path: str | os.PathLike[str],
-        columns: Sequence[str] = CSV_COLUMNS,
+        columns: Sequence[str] = COLUMNS,
         between: Between = "linear",
         outside: Outside = "hold",
+        *,
+        units: Mapping[str, str] | None = None,
     ) -> Samples:
-        """Reads samples from a CSV file.
+        """Reads samples from a log: text, or a binary format of docs/logs.md.
 
-        The first line names the columns. Comma, semicolon or tab separate cells; with semicolons or
-        tabs, numbers may have decimal commas. A unit in the name of a column, as in "fx [mN]" or
-        "t_ms", or in a row below the names is converted to SI.
+        A unit in the name of a column, as in "fx [mN]" or "t_ms", or in a row below the names is
+        converted to SI.
 
         Args:
             path: the file.
             columns: names of the columns with time [s], x and y [N, or m for a position].
             between: as the attribute.
             outside: as the attribute.
+            units: unit of a column by name, in place of what the file says.
 
         Raises:
-            ParameterError: a column is missing, a cell is not a number, a unit is unknown or of
-                another quantity, the samples are refused, or the file is not UTF-8 text.
-            OSError: the file cannot be read.
+            ParameterError: the file cannot be read, a column is missing, a cell is not a number, a
+                unit is unknown or of another quantity, or the samples are refused.
         """
         if isinstance(columns, str) or len(columns) != 3:
             raise ParameterError("columns", columns, "must name three columns: time, x, y")
-        sheet = Sheet.read("path", Path(path))
-        for name in columns:
-            choice("columns", name, sheet.head)
-        places = {str(i): sheet.place(name) for i, name in enumerate(columns)}
-        try:
-            cells = sheet.numbers(places, {key: CSV_UNITS[key != "0"] for key in places})
-        except BadCell as error:
-            bound = f"must be a finite number (line {error.line} of {Path(path).name})"
-            raise ParameterError(f"column {error.column}", error.cell, bound) from None
-        t, x, y = (cells[key] for key in places)
+        log = open_log("path", path, units)
+        t, x, y = (log.values(name, x) for name, x in zip(columns, UNITS, strict=True))
         if not len(t):
             raise ParameterError("path", str(path), "must have a line of numbers")
         return cls(t, np.column_stack((x, y)), between, outside)  # type: ignore[arg-type]
+
+    @classmethod
+    @checked
+    def csv(
+        cls,
+        path: str | os.PathLike[str],
+        columns: Sequence[str] = COLUMNS,
+        between: Between = "linear",
+        outside: Outside = "hold",
+    ) -> Samples:
+        """As `of`, by its name in earlier releases.
+
+        Args:
+            path: the file.
+            columns: as those of `of`.
+            between: as the attribute.
+            outside: as the attribute.
+
+        Raises:
+            ParameterError: as by `of`.
+        """
+        return cls.of(path, columns, between, outside)
 
     @cached_property
     def _rows(self) -> np.ndarray:

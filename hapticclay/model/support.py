@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from . import (
+    arm,
     controller,
     hardware,
     operator,
@@ -27,7 +28,7 @@ METHODS = (
     Trait("physical", "method", lambda s: s.control == "sampled" and s.render == "physical"),
 )  # fmt: skip
 PARTS = (
-    *operator.TRAITS, *controller.TRAITS, *signals.TRAITS, *sampled_controller.TRAITS,
+    *arm.TRAITS, *operator.TRAITS, *controller.TRAITS, *signals.TRAITS, *sampled_controller.TRAITS,
     *hardware.TRAITS,
 )  # fmt: skip
 TRAITS = {x.name: x for x in (*METHODS, *LAWS, *PARTS)}

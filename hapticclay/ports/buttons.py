@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from ..arguments import checked, named
+from ..columns.log import columns_of
 from ..errors import Bound, ParameterError, number
-from .device import read_columns
 
 NAMES = ("a", "b", "c", "home")
 
@@ -52,7 +52,7 @@ class ButtonScript:
     @classmethod
     @checked
     def of_file(cls, path: str | os.PathLike[str]) -> ButtonScript:
-        """Reads a script from a CSV file with the columns t [s], a, b, c, home (0 or 1).
+        """Reads a script from a log with the columns t [s], a, b, c, home (0 or 1).
 
         Args:
             path: the file.
@@ -61,7 +61,8 @@ class ButtonScript:
             ParameterError: the file cannot be read, has other columns or other values, or its times
                 do not ascend.
         """
-        rows = read_columns("buttons", path, {"t": ("s",), **dict.fromkeys(NAMES, ())})
+        columns = columns_of("buttons", path, {"t": ("s",), **dict.fromkeys(NAMES, ())})
+        rows = list(zip(*(x.tolist() for x in columns.values()), strict=True))
         for row in rows:
             for name, x in zip(NAMES, row[1:], strict=True):
                 if x not in (0.0, 1.0):

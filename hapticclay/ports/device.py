@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
 from ..arguments import checked, part
-from ..columns import Sheet, unreadable
+from ..columns.log import columns_of
 from ..errors import Bound, ParameterError
 from ..model.constants import TS
 from ..scene.scenario import Scenario
@@ -78,7 +77,7 @@ class Trajectory:
     @classmethod
     @checked
     def of_file(cls, path: str | os.PathLike[str]) -> Trajectory:
-        """Reads a trajectory from a CSV file with the columns t [s], x and y [m].
+        """Reads a trajectory from a log with the columns t [s], x and y [m].
 
         A unit in the name of a column, as in "x [mm]", or in a row below the names is converted.
 
@@ -89,23 +88,9 @@ class Trajectory:
             ParameterError: the file cannot be read, has other columns, a cell that is no number, or
                 a unit that does not fit.
         """
-        rows = read_columns("hand", path, {"t": ("s",), "x": ("m",), "y": ("m",)})
-        return cls(tuple(r[0] for r in rows), tuple((r[1], r[2]) for r in rows))
-
-
-def read_columns(
-    field: str, path: str | os.PathLike[str], units: dict[str, tuple[str, ...]]
-) -> list[tuple[float, ...]]:
-    """Reads some columns of a CSV file."""
-    try:
-        sheet = Sheet.read(field, Path(path))
-    except OSError as error:
-        raise unreadable(field, Path(path), error) from None
-    columns = sheet.numbers(sheet.named(list(units)), units)
-    rows = list(zip(*(columns[name].tolist() for name in units), strict=True))
-    if not rows:
-        raise sheet.refusal("must have a row or more")
-    return rows
+        found = columns_of("hand", path, {"t": ("s",), "x": ("m",), "y": ("m",)})
+        t, x, y = (column.tolist() for column in found.values())
+        return cls(tuple(t), tuple(zip(x, y, strict=True)))
 
 
 class SimulatedDevice(Device):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import checked, named
-from ..columns import Sheet, unreadable
+from ..columns.log import open_log
 from .rows import MOST_ROWS, Rows, write_table
 
 FILE = "exchanges.csv"  # stored with the record of a session
@@ -113,14 +113,10 @@ class Exchanges:
             ParameterError: the file cannot be read, or holds something else.
         """
         file = Path(path) / FILE if os.path.isdir(path) else Path(path)
-        try:
-            sheet = Sheet.read("record", file)
-        except OSError as error:
-            raise unreadable("record", file, error) from None
-        if tuple(sheet.head) != COLUMNS:
-            raise sheet.refusal("must be a file of exchanges (other columns)")
-        columns = sheet.numbers({name: i for i, name in enumerate(COLUMNS)}, {})
-        return cls.of_table(np.column_stack([columns[name] for name in COLUMNS]))
+        log = open_log("record", file)
+        if log.names != COLUMNS:
+            raise log.table.refusal("must be a file of exchanges (other columns)")
+        return cls.of_table(np.column_stack([log.raw(name) for name in COLUMNS]))
 
 
 class ExchangeLog:

@@ -42,7 +42,7 @@ def implausible(scenario: Scenario) -> Iterator[str]:
         field = f"operator.{axis}" if isinstance(given, tuple) else "operator"
         yield from _implausible_hand(field, hands[i])
     clay = scenario.clay
-    if clay is not None and not _within_reach(scenario, clay):
+    if clay is not None and scenario.is_closed_form and not _within_reach(scenario, clay):
         folded, stretched = scenario.arm.reach
         ox, oy = scenario.origin
         yield (

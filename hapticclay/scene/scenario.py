@@ -9,7 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
+
 from ..arguments import checked, named
+from ..arms.joint_law import JointPD, checked_law
+from ..arms.mjcf_arm import MjcfArm
 from ..display import html_table, one_line
 from ..errors import Bound, ParameterError, choice, number, quantity
 from ..fields import JOINTS, check_fields, dotted_names, merged_values, no_field, values_of
@@ -17,7 +21,7 @@ from ..model import samples, shapes  # noqa: F401  # so that files and options k
 from ..model.arm import PAPER, Arm
 from ..model.clay import Clay
 from ..model.compensator import PRINTED, Compensator
-from ..model.constants import GAIN, ORIGIN, PATH_LENGTH, TORQUE_LIMIT, TS, each_axis
+from ..model.constants import AXES, GAIN, ORIGIN, PATH_LENGTH, TORQUE_LIMIT, TS, each_axis
 from ..model.controller import SERVO, Servo
 from ..model.hardware import Hardware
 from ..model.operator import Operator, mobility_with
@@ -29,6 +33,8 @@ from .files import naming_file, read_settings, write_part
 from .text import scenario_rows
 
 SERVO_STEP = 1.0  # radians of the servo's fastest mode in a step: stable below 2, and 4 % off at 1
+MOST_JOINTS = 12  # of an arm from a file, in runs
+SOFT = 1.0  # share of a handle's velocity that clay may take in a step of such an arm
 WHOLE = 1e-6  # tolerance of Ts/dt from a whole number
 REACH_MARGIN = 1e-3  # [m] short of the stretched and the folded arm, where no force can be rendered
 FOLD_MARGIN = math.radians(1.001)  # of the elbow, likewise: a run ends at 1 degree (`monitor.FOLD`)
@@ -46,6 +52,8 @@ Integrator = Literal["fast", "accurate"]
 Control = Literal["continuous", "sampled"]
 Render = Literal["held", "physical"]
 
+FORCE = (1.0, 0.0)  # [N] of this object, as of the next, it is known that it was not given
+CONTINUOUS: Any = "".join(("contin", "uous"))
 SCENARIO_SCHEMA, SCENARIO_SCHEMA_0_2 = "hapticclay-scenario-2", "hapticclay-scenario-1"
 EXPERIMENTS: dict[str, Any] = {}  # classes of `experiments`, by their name in files
 
@@ -62,7 +70,8 @@ class Scenario:
         clay: the virtual clay; None for free space.
         gain: compensator gain K on each axis, 0 to 1e6 [1/kg] for the printed compensator, whose
             virtual mass is 1/K; 0 turns the compensator off.
-        force: constant part of the operator's muscle force uh on each axis [N].
+        force: constant part of the operator's muscle force uh on each axis [N]; none for an arm
+            from a file where it is not given.
         operator: impedance Th of the operator's arm, of both axes or a pair (x, y); None for a
             pure force (Th = 0).
         inertia_shaping: whether the servo shapes the handle's inertia, so that Sh holds at every
@@ -89,18 +98,19 @@ class Scenario:
         stop_when_unstable: whether the run ends when an axis is judged unstable; False lets it go
             on against the torque limits.
         hardware: hardware of a sampled loop; None for an ideal one.
-        arm: the two-link arm.
+        arm: the two-link arm in closed form; or one from a file, which starts at rest at its pose,
+            where p = 0, and whose control is sampled. Its x and y are the axes of its `plane`.
         servo: G and Sh of each axis, (x, y).
         compensator: shape of C, of both axes or a pair (x, y); K/(s^2 + 10 s) as printed. Systems
             of python-control and scipy.signal are taken as well.
-        controller: your own sampled controller, which replaces compensator and servo; None for
-            those.
+        controller: your own sampled controller, or laws of the joints, in place of compensator
+            and servo; None for those.
     """
 
     name: str = "free"
     clay: Clay | None = None
     gain: Annotated[tuple[float, float], Bound(0.0, 1e6, "1/kg")] = GAIN
-    force: Force = (1.0, 0.0)
+    force: Force = FORCE
     operator: Operator | None | tuple[Operator | None, Operator | None] = None
     inertia_shaping: bool = False
     dt: StepLength = TS
@@ -111,24 +121,28 @@ class Scenario:
     origin: Position = ORIGIN
     torque_limit: TorqueLimit = TORQUE_LIMIT
     integrator: Integrator = "fast"
-    control: Control = "continuous"
+    control: Control = CONTINUOUS
     Ts: SamplePeriod = None
     render: Render = "held"
     muscle: Signal | None = None
     command: Signal | None = None
     stop_when_unstable: bool = True
     hardware: Hardware | None = None
-    arm: Arm = PAPER
+    arm: Arm | MjcfArm = PAPER
     servo: tuple[Servo, Servo] = SERVO
     compensator: Compensator | tuple[Compensator, Compensator] = PRINTED
-    controller: Controller | None = None
+    controller: Controller | JointPD | None = None
 
     def __post_init__(self):
         if not isinstance(self.compensator, Compensator):
             object.__setattr__(self, "compensator", _compensators(self.compensator))
+        if isinstance(self.arm, MjcfArm):
+            _suit_arm(self)
         choose_step(self)
         check_fields(self)
         check_scene(self)
+        if isinstance(self.controller, JointPD):
+            checked_law(self.controller, self.joints)
         if self.Ts is not None:
             if self.control != "sampled":
                 raise ParameterError("Ts", self.Ts, "must be None unless control is 'sampled'")
@@ -141,6 +155,9 @@ class Scenario:
                 raise ParameterError("Ts", self.Ts, bound)
         self._check_servo()
         self._check_hardware()
+        if not self.is_closed_form:
+            _check_arm(self)
+            return
         self._check_rotated_axes()
         self._check_soft_clay()
         self._check_reach("start", self.start)
@@ -233,7 +250,30 @@ class Scenario:
     def mobility(self) -> float:
         """Largest acceleration of handle and hand per unit of force [1/kg]."""
         mass = min(th.mass if th else 0.0 for th in self.operators)
-        return mobility_with(self.arm.links[4], mass)
+        return mobility_with(self.free_mobility, mass)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes of the handle, in the order of arrays."""
+        return AXES if isinstance(self.arm, Arm) else tuple(self.arm.axes)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints of the arm."""
+        return JOINTS if isinstance(self.arm, Arm) else self.arm.names
+
+    @property
+    def is_closed_form(self) -> bool:
+        """Whether the arm is the two-link arm in closed form, and not one from a file."""
+        return isinstance(self.arm, Arm)
+
+    @property
+    def free_mobility(self) -> float:
+        """Largest acceleration of the handle per unit of force, without a hand [1/kg]."""
+        if isinstance(self.arm, Arm):
+            return self.arm.links[4]
+        J = self.arm.jacobian()[["xyz".index(c) for c in self.arm.axes[:2]]]
+        return float(np.trace(J @ np.linalg.solve(self.arm.mass_matrix(), J.T)))
 
     @property
     def driven(self) -> bool:
@@ -266,6 +306,10 @@ class Scenario:
             return
         number("hardware.jitter", given.jitter, 0.0, 0.28 * Ts, unit="s")
         number("hardware.delay", given.delay, 0.0, 100.0 * Ts, unit="s")
+        n = len(self.joints)
+        if isinstance(given.encoder, tuple) and len(given.encoder) != n:
+            bound = f"must be one number, or one for each of {n} joints"
+            raise ParameterError("hardware.encoder", given.encoder, bound)
 
     @property
     def rotated(self) -> bool:
@@ -323,6 +367,68 @@ class Scenario:
                 f"unreachable: {r:.4g} m from the shoulder, must be {low:.4g} to {high:.4g} m "
                 f"(origin {self.origin[0]:g}, {self.origin[1]:g} m)",
             )
+
+
+def _suit_arm(s: Scenario) -> None:
+    """Sets what was not given to what an arm from a file can have."""
+    suited = {
+        "control": (CONTINUOUS, "sampled"),
+        "length": (PATH_LENGTH, None),
+        "force": (FORCE, (0.0, 0.0)),
+    }
+    for name, (default, value) in suited.items():
+        if getattr(s, name) is default:
+            object.__setattr__(s, name, value)
+
+
+def _check_arm(s: Scenario) -> None:
+    """Refuses what an arm from a file cannot have, beyond the table of support."""
+    arm, law, io = s.arm, s.controller, s.hardware
+    assert isinstance(arm, MjcfArm)
+    with_arm = "with an arm from a file"
+    given = {
+        "controller": (law is None, f"must be given {with_arm}: a JointPD, or your own"),
+        "command": (s.command is not None, f"must be None {with_arm}, which has no compensator"),
+        "operator": (s.operators[0] != s.operators[1], f"must be one for all axes {with_arm}"),
+    }
+    for name, default in (("start", (0.0, 0.0)), ("velocity", (0.0, 0.0)), ("origin", ORIGIN)):
+        bound = f"must be left out {with_arm}, which starts at rest at its pose"
+        given[name] = (getattr(s, name) != default, bound)
+    bound = f"must be left out {with_arm}, which has its own: MjcfArm(torque_limit)"
+    given["torque_limit"] = (s.torque_limit != TORQUE_LIMIT, bound)
+    for name, (is_wrong, bound) in given.items():
+        if is_wrong:
+            raise ParameterError(name, getattr(s, name), bound)
+    if len(arm.names) > MOST_JOINTS:
+        raise ParameterError("arm", arm.name, f"must have at most {MOST_JOINTS} joints in runs")
+    arm.mechanism.runnable()
+    limits = arm.torque_limit
+    if isinstance(law, JointPD) and law.runs == "drive" and any(map(math.isfinite, limits)):
+        bound = "must be none where drives run the law, whose limits are not simulated"
+        raise ParameterError("arm.torque_limit", limits, bound)
+    if io is not None and io.dac_bits and not all(map(math.isfinite, limits)):
+        bound = "must be finite where a converter gives the torques, whose range it is"
+        raise ParameterError("arm.torque_limit", limits, bound)
+    if io is not None and io.dac_range is not None:
+        bound = f"must be None {with_arm}: its torque limits are the range"
+        raise ParameterError("hardware.dac_range", io.dac_range, bound)
+    _check_arm_in_clay(s)
+
+
+def _check_arm_in_clay(s: Scenario) -> None:
+    """Refuses clay too stiff for such an arm, and yielding clay beside joint friction."""
+    if s.clay is None or s.render == "held":
+        return
+    share = s.clay.largest * s.dt * s.free_mobility
+    if share > SOFT:
+        bound = (
+            f"must be at most {s.dt * SOFT / share:.3g} s, where b reaches {s.clay.largest:.4g} "
+            "N.s/m at the handle of an arm from a file"
+        )
+        raise ParameterError("dt", s.dt, bound)
+    if s.clay.yields and any(s.arm.friction):  # type: ignore[union-attr, arg-type]
+        bound = "must be 'held' where clay yields and joints have friction"
+        raise ParameterError("render", s.render, bound)
 
 
 def choose_step(part: Any) -> None:

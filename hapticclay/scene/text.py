@@ -17,7 +17,7 @@ def scenario_rows(scenario: Any) -> list[tuple[str, str]]:
     s = scenario
     rows = [("K", f"{_pair(s.gain)} 1/kg")]
     if s.controller is not None:
-        rows = [("controller", one_line(getattr(s.controller.law, "__name__", s.controller.law)))]
+        rows = [("controller", one_line(s.controller.words))]
     if s.muscle is None or any(s.force):
         rows.append(("force", f"{_pair(s.force)} N"))
     rows += [
@@ -33,6 +33,9 @@ def scenario_rows(scenario: Any) -> list[tuple[str, str]]:
     goal = "" if s.length is None else f"p_x = {s.length:g} m, or "
     rows.append(("ends at", f"{goal}{s.t_max:g} s"))
     defaults = {f: type(s).__dataclass_fields__[f].default for f in ("arm", "servo", "compensator")}
+    if not s.is_closed_form:
+        rows.insert(0, ("arm", one_line(f"{s.arm.name}: {', '.join(s.arm.names)}")))
+        del defaults["arm"]
     replaced = [name for name, default in defaults.items() if getattr(s, name) != default]
     if replaced:
         rows.append(("replaced", ", ".join(replaced)))

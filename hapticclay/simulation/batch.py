@@ -15,6 +15,7 @@ import numpy as np
 from ..arguments import checked
 from ..errors import Bound, ParameterError
 from ..kernel.engine import warnings_caught
+from ..model.sampled_controller import Controller
 from ..scene.plausible import warn_implausible
 from ..scene.scenario import Scenario
 from . import record
@@ -126,7 +127,7 @@ def checked_scenarios(scenarios: Iterable[Any], seen: set[Any]) -> Iterator[Scen
         if len(seen) < WARNED and scene not in seen:
             seen.add(scene)
             warn_implausible(s)
-        if s.controller is not None:
+        if isinstance(s.controller, Controller):
             s.controller.function()  # imported here, not in a thread
         yield s
 

@@ -42,6 +42,14 @@ EXTRA = {  # arrays that some records have
 COLUMNS = ARRAYS | EXTRA | {"ground": Column("m", "height of the remaining clay")}
 
 
+def parts_of(name: str, scenario: Scenario) -> tuple[str, ...]:
+    """Parts of an array: axes of the handle, or joints of the arm; none for a single number."""
+    parts = COLUMNS[name].parts
+    if name in EXTRA:
+        return parts
+    return {AXES: scenario.axes, JOINTS: scenario.joints}.get(parts, parts)
+
+
 class Recorded(Protocol):
     """A record as tables and files use it: its arrays by name, and these members."""
 

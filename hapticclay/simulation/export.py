@@ -15,7 +15,7 @@ from ..display import one_line
 from ..errors import ParameterError, choice, needing
 from ..files import atomic
 from . import tables
-from .columns import COLUMNS, Recorded
+from .columns import COLUMNS, Recorded, parts_of
 from .stored import check_times
 
 TOPIC = "/hapticclay"  # of MCAP
@@ -79,8 +79,9 @@ def _mcap(record: Recorded, file: IO[bytes]) -> None:
     )
     channel = writer.register_channel(TOPIC, "json", schema)
     arrays = {name: x.tolist() for name, x in tables.recorded_arrays(record).items()}
+    parts = {name: parts_of(name, record.scenario) for name in arrays}
     for i, t in enumerate(arrays["t"]):
-        sample = {name: _entry(COLUMNS[name].parts, x[i]) for name, x in arrays.items()}
+        sample = {name: _entry(parts[name], x[i]) for name, x in arrays.items()}
         at = round(1e9 * t)
         writer.add_message(channel, at, json.dumps(sample).encode(), at, i)
     writer.finish()
@@ -97,7 +98,7 @@ def _sample_schema(record: Recorded) -> dict[str, Any]:
     """The JSON schema of a sample."""
 
     def entry(name: str) -> dict[str, Any]:
-        unit, words, parts = COLUMNS[name]
+        (unit, words, _), parts = COLUMNS[name], parts_of(name, record.scenario)
         kind: dict[str, Any] = {"type": "object" if parts else "number"}
         kind["description"] = f"{words} [{unit}]"
         return kind | ({"properties": {x: {"type": "number"} for x in parts}} if parts else {})
@@ -119,7 +120,7 @@ def _rerun(record: Recorded, file: IO[bytes]) -> None:
     for name, x in tables.recorded_arrays(record).items():
         if name == "t":
             continue
-        lines = [f"{name}_{part}" for part in COLUMNS[name].parts] or [name]
+        lines = [f"{name}_{part}" for part in parts_of(name, record.scenario)] or [name]
         labels = [f"{line} [{COLUMNS[name].unit}]" for line in lines]
         recording.log(name, rr.SeriesLines(names=labels), static=True)
         if len(x):
@@ -139,7 +140,8 @@ def _matlab(record: Recorded, file: IO[bytes]) -> None:
     if record.ground is not None:
         arrays, units = arrays | {"ground": record.ground}, units | {"ground": "m"}
     attributes = tables.attributes_of(record)
-    axes = {name: np.array(COLUMNS[name].parts or ("",), dtype=object) for name in units}
+    parts = {name: parts_of(name, record.scenario) or ("",) for name in units}
+    axes = {name: np.array(x, dtype=object) for name, x in parts.items()}
     try:
         savemat(file, {**arrays, "units": units, "columns": axes, **attributes}, oned_as="column")
     except MatWriteError as error:

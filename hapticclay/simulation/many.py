@@ -83,7 +83,7 @@ class Pattern:
         """The models of runs, and the arrays that they name."""
         out, kept = np.repeat(self.row.models, len(d.gain)), []
         out["ox"], out["oy"] = d.origin.T
-        axis = out["axis"]
+        axis = out["axis"][:, :2]
         axis["K"], axis["push"] = d.gain, d.force
         for i in (0, 1):
             for servo, runs in d.servo[i].items():
@@ -102,7 +102,7 @@ class Pattern:
     def _put_hands(self, out: np.ndarray, hands: np.ndarray) -> None:
         """Puts the operators' arms into models, and the mobility with them."""
         for j, name in enumerate(("mass", "damper", "spring")):
-            out["axis"][name] = hands[:, :, j]
+            out["axis"][name][:, :2] = hands[:, :, j]
         if self.row.m.stiff:
             mass = np.minimum(hands[:, 0, 0], hands[:, 1, 0])
             out["mobility"] = mobility_with(self.scenario.arm.links[4], mass)
@@ -111,7 +111,7 @@ class Pattern:
         """Puts delays of the torques into models; the ring that all use, one after the other."""
         whole, share = np.array([scene.delay_in_samples(x, self.row.m.Ts) for x in delays]).T
         out["delay"], out["queue_rows"] = delays, whole + scene.QUEUE
-        ring = np.zeros(int(hardware.QUEUED * (whole.max() + scene.QUEUE)))
+        ring = np.zeros(int((hardware.QUEUED + 2) * (whole.max() + scene.QUEUE)))
         out["queue"] = ring.ctypes.data
         if not self.row.m.guard:
             return ring

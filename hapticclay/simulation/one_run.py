@@ -6,6 +6,7 @@ import math
 
 from ..errors import ParameterError
 from ..kernel.engine import warnings_caught
+from ..model.sampled_controller import Controller
 from ..scene.scenario import Scenario
 from .engines import engine_for
 from .memory import memory_left
@@ -24,7 +25,7 @@ def run_once(
 ) -> Record:
     """Runs a scenario to its end, with its own integrator and dt."""
     check_memory(scenario, every)
-    if scenario.controller is not None:
+    if isinstance(scenario.controller, Controller):
         scenario.controller.function()  # refused before a run is made
     engine = engine_for(engine, scenario.t_max / scenario.dt)
     with warnings_caught(), borrowed_workspace() as workspace:

@@ -121,7 +121,7 @@ def coordinates(m: Any, i: int) -> list[int]:
     Link i moves the handle along axis i at the nominal pose. Angle and rate of its joint come
     first.
     """
-    joint = [number_of("q2" if i else "q1"), number_of("w2" if i else "w1")]
+    joint = [number_of("q", i), number_of("w", i)]
     names = ["owed"] if m.special and m.acts else []
     names += ["rest", "stretch", "at", "force", "force_before"] if m.springs else []
     loop = ["delta", "rate", "y", "yrate"]
@@ -129,10 +129,10 @@ def coordinates(m: Any, i: int) -> list[int]:
     if not m.ratio:
         form = [number_of("axis", i, "z") + r for r in range(4)] if m.formed else []
         return [*joint, *(number_of("axis", i, name) for name in loop), *form, *clay]
-    held = ["tau"] + ["w"] * bool(m.window)
+    found = [number_of("now", name, i) for name in ["tau"] + ["w"] * bool(m.window)]
     if not m.own:
-        held += loop + ["pull", "pull_rate", "tool"] * bool(m.coupling)
-    found = [number_of("now", "axis", i, name) for name in held]
+        held = loop + ["pull", "pull_rate", "tool"] * bool(m.coupling)
+        found += [number_of("now", "axis", i, name) for name in held]
     if m.filtered:
         found += [number_of("now", "axis", i, "filter") + r for r in range(2)]
     if m.formed and not m.own:
@@ -147,7 +147,7 @@ def rings_of(m: Any) -> list[Ring]:
         found.append(Ring("angles", "oldest", "", 3, ((1,), (2,))))
     if m.delay > 0.0:
         columns = ((1, 7, 9), (2, 8, 10)) if m.coupling else ((1,), (2,))
-        found.append(Ring("queue", "first", "n", QUEUED, columns))
+        found.append(Ring("queue", "first", "n", QUEUED + m.joints, columns))
     if m.own:
         state = tuple(range(BUFFER, BUFFER + m.buffer_size))
         found.append(Ring("buffer", "", "", 1, (state, ())))
@@ -182,12 +182,12 @@ class Map:
     def __init__(self, row: Row, coupled: bool):
         self.row, self.coupled, self.rings = row, coupled, rings_of(row.m)
         self.own = [np.array(coordinates(row.m, i)) for i in (0, 1)]
-        self.moving = [number_of(name) for name in ("q1", "q2", "w1", "w2")]
-        self.torques = [number_of("now", "axis", i, "tau") for i in (0, 1)]
+        self.moving = [number_of(name, i) for name in ("q", "w") for i in (0, 1)]
+        self.torques = [number_of("now", "tau", i) for i in (0, 1)]
 
     def of(self, s: Scenario, i: int, warm: int) -> PeriodMap | None:
         """The map."""
-        n, q = self.row.m.ratio or 1, (self.row.s.q1, self.row.s.q2)
+        n, q = self.row.m.ratio or 1, (self.row.s.q[0], self.row.s.q[1])
         rest = self._at_rest(warm * n)
         if rest is None:
             return None

@@ -28,7 +28,7 @@ from ..scene.text import scenario_rows
 from ..theory import linear_loop
 from ..theory.stability_margins import Verdict
 from .accuracy import Accuracy
-from .columns import ARRAYS, COLUMNS, EXTRA
+from .columns import ARRAYS, COLUMNS, EXTRA, parts_of
 from .monitor import Outcome
 from .run import Crossing, Run, Stop
 from .stored import check_head, check_headers, check_times
@@ -49,6 +49,9 @@ STEADY_SPAN = 0.05  # ... and has done so for so long before and after [s]
 @dataclass(frozen=True, eq=False)
 class Record:
     """Arrays of one run over the same n samples; axes ordered (x, y).
+
+    Those of an arm from a file have a column for each of the handle's axes, in the order of
+    `MjcfArm.axes`, and for each joint.
 
     Attributes:
         t: time [s], shape (n,); in steps of dt, the last one shorter if the run ended between two.
@@ -231,7 +234,7 @@ class Record:
             return np.zeros(self.v.shape, dtype=bool)
         a = np.gradient(self.v, self.t, axis=0)
         moving = np.abs(a) > STEADY * np.abs(self.v)
-        count = np.concatenate((np.zeros((1, 2)), np.cumsum(moving, axis=0)))
+        count = np.concatenate((np.zeros((1, moving.shape[1])), np.cumsum(moving, axis=0)))
         span = max(1, round(STEADY_SPAN / float(self.t[1] - self.t[0])))
         low, high = np.maximum(np.arange(n) - span, 0), np.minimum(np.arange(n) + span + 1, n)
         return count[high] == count[low]
@@ -434,11 +437,11 @@ class Record:
                 arrays = {name: z[name] for name in ARRAYS}
                 extra = {name: z[name] for name in EXTRA if name in z}
                 ground = z["ground"] if "ground" in z else None
-            _check(arrays | extra)
             schema = head["schema"]
             if schema in (RECORD_SCHEMA, RECORD_SCHEMA_0_2):
                 check_head(head)
                 scenario, lost = _scenario(with_present_names(head["scenario"]))
+                _check(arrays | extra, scenario)
                 _check_ground(ground, scenario)
                 check_times(arrays["t"])
                 return cls(
@@ -463,11 +466,12 @@ class Record:
         raise ParameterError("record", str(path), f"must have schema {RECORD_SCHEMA}, has {schema}")
 
 
-def _check(arrays: dict[str, np.ndarray]) -> None:
+def _check(arrays: dict[str, np.ndarray], scenario: Scenario) -> None:
     """Raises ValueError unless arrays are finite and have their shapes."""
     t = arrays["t"]
     for name, x in arrays.items():
-        shape = (t.size, 2) if COLUMNS[name].parts else (t.size,)
+        parts = parts_of(name, scenario)
+        shape = (t.size, len(parts)) if parts else (t.size,)
         if x.shape != shape or x.dtype != np.float64:
             raise ValueError(
                 f"array {name} must be float64 of shape {shape}, is {x.dtype} of shape {x.shape}"
@@ -522,7 +526,7 @@ def port_energy(record: Record) -> np.ndarray:
     """
     power = record.fh * record.v
     steps = 0.5 * np.diff(record.t)[:, None] * (power[1:] + power[:-1])
-    return np.concatenate((np.zeros((1, 2)), np.cumsum(steps, axis=0)))
+    return np.concatenate((np.zeros((1, power.shape[1])), np.cumsum(steps, axis=0)))
 
 
 @checked

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import named
-from ..kernel import arm, energy, modes, mover, path, rows, scene, viscous
+from ..kernel import arm, energy, joints, modes, mover, path, rows, scene, viscous
 from ..kernel.row import CHUNK, Buffers, NativeRow, Row, Saved
 from ..kernel.scene import NOISE_AHEAD
 from ..model import hardware
@@ -102,15 +102,20 @@ class Snapshot(NamedTuple):
     before: Saved
     rows: np.ndarray
     forces: np.ndarray
+    extra: np.ndarray
     record: dict[str, Any]
 
 
 class Kept(NamedTuple):
-    """Samples that are kept: their indices, rows, and forces of the clay where it is not b v."""
+    """Samples that are kept: their indices, rows, and forces of the clay where it is not b v.
+
+    And what an arm from a file adds to rows, see `joint_rows`.
+    """
 
     indices: np.ndarray
     rows: np.ndarray
     forces: np.ndarray
+    extra: np.ndarray
 
 
 class Run:
@@ -150,8 +155,8 @@ class Run:
         self._controller: Controller | None = None  # in place of the scenario's
         self.drives = _drives(scenario)
         self._noise: hardware.SampleNoise | None = None
-        judge = monitor.StabilityMonitor if monitored else monitor.RangeMonitor
-        self.watch = judge(scenario)
+        self.monitored = monitored
+        self.watch = _monitor(scenario, monitored)
         self.steps, self.pause, self.judged = 0, math.inf, 0
         self.kept: list[Kept] = []
         self.last: np.ndarray | None = None
@@ -161,6 +166,7 @@ class Run:
         self.end_time: float | None = None
         native = self.row.engine == "native"
         self.is_quiet = native and scenario.stop_when_unstable and not keep_for_monitor
+        self.is_quiet = self.is_quiet and scenario.is_closed_form
         self.initial_energy = self._stored()
         self._saved = self.row.saved()
         self._ahead: list[float] | None = None
@@ -176,9 +182,9 @@ class Run:
         return self.row.s.i
 
     @property
-    def q(self) -> tuple[float, float]:
-        """Present angles of shoulder and elbow [rad]."""
-        return self.row.s.q1, self.row.s.q2
+    def q(self) -> tuple[float, ...]:
+        """Present angles of the joints [rad]."""
+        return tuple(self.row.s.q[: self.row.m.joints])
 
     @property
     def filled(self) -> int:
@@ -208,8 +214,12 @@ class Run:
 
     def position(self, h: float = 0.0) -> tuple[float, float]:
         """Handle position after the joints have turned at their present rates, (x, y) [m]."""
-        s = self.row.s
-        return arm.place(self.row.m, s.q1 + h * s.w1, s.q2 + h * s.w2)
+        s, m = self.row.s, self.row.m
+        if m.general:
+            q = np.array(s.q[: m.joints]) + h * np.array(s.w[: m.joints])
+            x, y = self.scenario.arm.handle(q)[list(m.row[:2])] - np.array(m.at[:2])  # type: ignore[union-attr]
+            return float(x), float(y)
+        return arm.place(self.row.m, s.q[0] + h * s.w[0], s.q[1] + h * s.w[1])
 
     # ---- steps
 
@@ -361,7 +371,7 @@ class Run:
             self.change(changed)
             return
         self.scenario = self.watch.scenario = changed
-        for a, K in zip(self.row.m.axis, gain, strict=True):
+        for a, K in zip(self.row.m.axis[:2], gain, strict=True):
             a.K = float(K)
         self._ahead = None
 
@@ -383,14 +393,14 @@ class Run:
         """Restarts without a record; not after `change`, or where signals are prepared ahead."""
         self.restore(self._saved)
         self.steps = self.judged = 0
-        self.watch = type(self.watch)(self.scenario)
+        self.watch = _monitor(self.scenario, self.monitored)
         self.outcome = self.end_time = self.last = None
 
     def snapshot(self) -> Snapshot:
         """The run with its record, to return to."""
         n, buffers = self.filled, self.buffers
         record = copy.deepcopy({name: getattr(self, name) for name in RECORDED})
-        made = buffers.rows[:n].copy(), buffers.rendered[:n].copy()
+        made = buffers.rows[:n].copy(), buffers.rendered[:n].copy(), self.extra(n).copy()
         return Snapshot(self.scenario, self.row.saved(), self._saved, *made, record)
 
     def return_to(self, x: Snapshot) -> None:
@@ -402,6 +412,7 @@ class Run:
         self._saved = x.before
         self.buffers.rows[: len(x.rows)] = x.rows
         self.buffers.rendered[: len(x.forces)] = x.forces
+        self.buffers.extra[: len(x.extra)] = x.extra
         for name, value in copy.deepcopy(x.record).items():
             setattr(self, name, value)
 
@@ -425,7 +436,8 @@ class Run:
 
     def ending(self) -> np.ndarray:
         """The last good row, and the force of the clay in it; NaN for none."""
-        return np.full(rows.ROW + 2, np.nan) if self.last is None else self.last
+        more = joints.width(self.row.m) if self.row.m.general else 0
+        return np.full(rows.ROW + 2 + more, np.nan) if self.last is None else self.last
 
     def put_force(self, sample: np.ndarray) -> np.ndarray:
         """Puts the force of the clay into a sample, unless it was recorded."""
@@ -440,13 +452,32 @@ class Run:
 
     def torque_reached(self, n: int, k: int) -> np.ndarray:
         """|tau| of shoulder and elbow that at least k of the last n rows not judged reach [N.m]."""
-        made = self.buffers.rows[max(self.filled - n, 0) : self.filled]
-        return np.sort(np.abs(made[:, 8:10]), axis=0)[-k] if len(made) >= k else np.zeros(2)
+        first = max(self.filled - n, 0)
+        made, m = self.buffers.rows[first : self.filled, 8:10], self.row.m
+        if m.general:
+            made = self.extra(self.filled)[first:, 2 * m.joints : 3 * m.joints]
+        return np.sort(np.abs(made), axis=0)[-k] if len(made) >= k else np.zeros(m.joints)
+
+    def extra(self, n: int) -> np.ndarray:
+        """What an arm from a file adds to the first n rows since the last check."""
+        return self.buffers.extra[: n if self.row.m.general else 0]
+
+    def _for_monitor(self, made: np.ndarray, extra: np.ndarray) -> np.ndarray:
+        """Rows as the monitor takes them, shape (12, n), or joint positions, rates and torques."""
+        return np.ascontiguousarray((extra if self.row.m.general else made[:, :12]).T)
+
+    def strained(self, n: int, limits: Sequence[float]) -> list[int]:
+        """How many of the last n rows not judged have |tau| of each motor at its limit or above."""
+        return self.row.strained(n, limits)
 
     def is_diverging(self) -> bool:
         """Whether the monitor would find the run unstable by now."""
         watch, n = copy.deepcopy(self.watch), self.filled
-        _, found = watch.look(_for_monitor(self.buffers.rows[:n]), self.judged) if n else (0, None)
+        _, found = (
+            watch.look(self._for_monitor(self.buffers.rows[:n], self.extra(n)), self.judged)
+            if n
+            else (0, None)
+        )
         return found is not None or watch.onset is not None
 
     # ---- the record
@@ -497,14 +528,17 @@ class Run:
                 raise SamplesNeeded
             self.is_quiet = False
             for x in self.kept:
-                self.watch.look(_for_monitor(x.rows), int(x.indices[0]))
-        return self.watch.look(_for_monitor(made), self.judged)
+                self.watch.look(self._for_monitor(x.rows, x.extra), int(x.indices[0]))
+        return self.watch.look(self._for_monitor(made, self.extra(len(made))), self.judged)
 
     def _keep(self, made: np.ndarray, good: int) -> None:
         """Keeps good rows."""
         forces = self.buffers.rendered
         force = forces[good - 1, :2] if self.records_force else (0.0, 0.0)
+        extra = self.extra(len(made))
         self.last = self.put_force(np.append(made[good - 1], force))
+        if len(extra):
+            self.last = np.append(self.last, extra[good - 1])
         if not self.recorded:
             return
         keep = np.arange(-self.judged % self.every, good, self.every)
@@ -512,7 +546,8 @@ class Run:
             keep = np.append(keep, good - 1)
         row = made.copy() if len(keep) == len(made) else made[keep]
         force = forces[keep] if self.records_force else forces[:0]
-        self.kept.append(Kept(self.judged + keep, row, force))
+        more = extra[keep] if len(extra) else np.zeros((len(keep), 0))
+        self.kept.append(Kept(self.judged + keep, row, force, more))
 
     def _cut_events(self, t: float) -> None:
         """Removes events after the end of the record."""
@@ -525,7 +560,7 @@ class Run:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The samples kept, by the names of Record's arrays."""
-        indices, made, forces = zip(*self.kept, strict=True)
+        indices, made, forces, extra = zip(*self.kept, strict=True)
         t = np.concatenate(indices) * self.scenario.dt
         if self.end_time is not None and len(t):
             t[-1] = self.end_time
@@ -534,11 +569,15 @@ class Run:
             for name, j in COLUMNS.items()
             if name != "fe"
         }
-        if not self.records_force:
-            return out | {"t": t, "fe": np.column_stack(self._force(*out["b"].T, *out["v"].T))}
-        force = np.concatenate(forces)
-        cut = {"removed": force[:, 2]} if self.row.m.groove else {}
-        return out | {"t": t, "fe": force[:, :2]} | cut
+        if self.records_force:
+            force = np.concatenate(forces)
+            out |= {"removed": force[:, 2]} if self.row.m.groove else {}
+            out["fe"] = force[:, :2]
+        else:
+            out["fe"] = np.column_stack(self._force(*out["b"].T, *out["v"].T))
+        if self.row.m.general:
+            out |= joint_arrays(self.row.m, out, np.concatenate(extra))
+        return out | {"t": t}
 
     def left_ground(self) -> np.ndarray | None:
         """As Record.ground."""
@@ -546,8 +585,15 @@ class Run:
         return x["relief"] * x["ground"] if self.row.m.groove else None
 
     def _stored(self) -> tuple[float, float]:
-        """Energy of the arm, and that stored in the operator's arm, after the last kick [J]."""
+        """Energy of the arm, and that stored in the operator's arm, after the last kick [J].
+
+        Energy of an arm from a file includes that of its weight and springs.
+        """
         m, s = self.row.m, self.row.s
+        if m.general:
+            from .joint_energy import stored  # imported only for an arm from a file
+
+            return stored(self.scenario, m, s)
         return energy.kinetic(m, s), energy.of_hand(m, s)
 
     def balance(self) -> dict[str, float]:
@@ -562,9 +608,12 @@ class Run:
             "passivity_controller": (w.guard, m.guard),
             "coupling": (w.coupling, m.coupling),
             "rendered_clay": (w.rendered, m.renders),
+            "joint_dampers": (w.joints, m.general),
         }
         out |= {name: float(x) for name, (x, is_there) in parts.items() if is_there}
-        out["residual"] -= out.get("friction", 0.0)
+        out["residual"] -= out.get("friction", 0.0) + out.get("joint_dampers", 0.0)
+        if m.general:  # it starts at rest; its weight has no zero of energy
+            out["throughput"] = float(w.through)
         return out
 
 
@@ -587,6 +636,21 @@ def balance(work: Sequence[Any], first: Sequence[Any], last: Sequence[Any]) -> d
     }
 
 
+def joint_arrays(m: Any, pairs: dict[str, np.ndarray], extra: np.ndarray) -> dict[str, np.ndarray]:
+    """Arrays of an arm from a file: of its joints, and along z where its handle moves there.
+
+    pairs: those of x and y; extra: what such an arm adds to rows.
+    """
+    n = m.joints
+    out = {"q": extra[:, :n], "qd": extra[:, n : 2 * n], "tau": extra[:, 2 * n : 3 * n]}
+    if m.axes > 2:
+        z = {name: extra[:, 3 * n + i] for i, name in enumerate(("p", "v", "fh"))}
+        nothing = np.zeros(len(extra))
+        for name in ("p", "v", "fh", "fe", "b", "delta"):
+            out[name] = np.column_stack((pairs[name], z.get(name, nothing)))
+    return out
+
+
 def with_checked(scenario: Scenario, **fields: Any) -> Scenario:
     """A scenario with other fields, whose values have been checked, as has all else."""
     made = object.__new__(type(scenario))
@@ -603,9 +667,14 @@ def _drives(scenario: Scenario) -> Any:
     return Drives(scenario)
 
 
-def _for_monitor(made: np.ndarray) -> np.ndarray:
-    """Rows as the monitor takes them, shape (12, n)."""
-    return np.ascontiguousarray(made[:, :12].T)
+def _monitor(scenario: Scenario, monitored: bool) -> Any:
+    """What judges a run."""
+    if scenario.is_closed_form:
+        judge = monitor.StabilityMonitor if monitored else monitor.RangeMonitor
+        return judge(scenario)
+    from .joint_monitor import JointMonitor  # imported only for an arm from a file
+
+    return JointMonitor(scenario, monitored)
 
 
 def completed(

@@ -14,7 +14,7 @@ import numpy as np
 from ..arguments import checked
 from ..errors import ParameterError, integer, number, numbers_of, pair
 from ..kernel.engine import warnings_caught
-from ..model.hardware import JOINTS
+from ..kernel.row import SHOWN
 from ..model.operator import Operator
 from ..model.sampled_controller import Controller
 from ..scene.plausible import warn_implausible
@@ -22,7 +22,7 @@ from ..scene.scenario import Scenario
 from . import record
 from .engines import engine_for
 from .monitor import Outcome
-from .run import COLUMNS, Run, Snapshot, Workspace
+from .run import COLUMNS, Run, Snapshot, Workspace, joint_arrays
 
 MOST = 1e6  # largest force [N] and torque [N.m] that may be given
 MOST_GAIN = 1e6  # largest K of a scenario [1/kg]
@@ -113,7 +113,7 @@ class Simulation:
         kept = self._kept() | {"keep_for_monitor": True}
         self._run = Run(scenario, 1, self._maker, self._workspace, **kept)
         self._given, self._wall = scenario, 0.0
-        self._torque: tuple[float, float] | None = None
+        self._torque: tuple[float, ...] | None = None
         self._forget()
 
     def _kept(self) -> dict[str, bool]:
@@ -180,7 +180,8 @@ class Simulation:
             record = self.record()
             self._state = Sample(**{name: getattr(record, name)[-1] for name in Sample._fields})
         if self._state is None:
-            self._state = sample_of(self._run.sample_time(), np.array(self.numbers()))
+            m = self._run.row.m
+            self._state = sample_of(self._run.sample_time(), np.array(self.numbers()), m)
         return self._state
 
     def numbers(self) -> list[float]:
@@ -272,13 +273,11 @@ class Simulation:
                 if force != run.scenario.force:
                     run.change_force(force)
             if torque is not None:
-                self._drive(numbers_of("torque", torque, JOINTS, -MOST, MOST, unit="N.m"))
+                self._drive(
+                    numbers_of("torque", torque, run.scenario.joints, -MOST, MOST, unit="N.m")
+                )
             self._state, begin = None, time.perf_counter()
-            goal = run.i + n
-            with warnings_caught():
-                if not run.advance_unprepared(n):
-                    run.pause = goal
-                    run.go(None)
+            make_steps(run, n)
             self._wall += time.perf_counter() - begin
 
     def reset(self, scenario: Scenario | None = None) -> None:
@@ -364,15 +363,25 @@ class Simulation:
             if run.scenario.control != "sampled":
                 bound = "must be 'sampled' where torques are given"
                 raise ParameterError("control", run.scenario.control, bound)
-            if run.i or run.scenario.controller:
+            own = run.scenario.is_closed_form and run.scenario.controller
+            if run.i or own:
                 bound = "must be given from the first step on, and not beside a controller"
                 raise ParameterError("torque", torque, bound)
             self._take_over(torque)
-        self._torque = torque[0], torque[1]
+        self._torque = torque
 
     def _take_over(self, torque: tuple[float, ...]) -> None:
-        self._torque = torque[0], torque[1]
+        self._torque = torque
         self._run.take_over(Controller(lambda *measured: (self._torque, ())))
+
+
+def make_steps(run: Run, n: int) -> None:
+    """Makes n steps of a run that has not ended, fewer if it ends."""
+    goal = run.i + n
+    with warnings_caught():
+        if not run.advance_unprepared(n):
+            run.pause = goal
+            run.go(None)
 
 
 class Alone:
@@ -397,9 +406,14 @@ class Alone:
         self.owner._lock.release()
 
 
-def sample_of(t: float, row: np.ndarray) -> Sample:
-    """A sample from its row."""
-    return Sample(t, *[row[place] for place in PLACES])
+def sample_of(t: float, row: np.ndarray, m: Any = None) -> Sample:
+    """A sample from its row; m: the model of a run whose arm may be from a file."""
+    pairs = [row[place] for place in PLACES]
+    if m is None or not m.general:
+        return Sample(t, *pairs)
+    found = {name: x[None] for name, x in zip(Sample._fields[1:], pairs, strict=True)}
+    found |= joint_arrays(m, found, row[None, SHOWN:])
+    return Sample(t, **{name: x[0] for name, x in found.items()})
 
 
 def gain_of(value: object) -> tuple[float, float]:

@@ -28,7 +28,7 @@ LAST = {"p": "m", "v": "m/s", "fh": "N", "fe": "N", "b": "N.s/m"}  # at the last
 SUMMARY = np.dtype(
     [
         ("code", "U12"),  # record.Outcome.code; the rest of it: record.status of a run made again
-        ("axis", "U1"),  # that is to blame, "" if none
+        ("axis", "U24"),  # or joint that is to blame, "" if none
         ("time", "f8"),  # of the end, or of the verdict [s]
         ("step", "i8"),  # last good sample
         ("steps", "i8"),  # engine steps made
@@ -72,7 +72,7 @@ def of_rows(like: Scenario, m: Any, states: np.ndarray, outs: np.ndarray) -> dic
     sample = np.concatenate((row, force), axis=1)
     return {
         "code": np.where(states["code"] == path.FINISHED, "finished", ends),
-        "axis": np.zeros(len(states), "U1"),
+        "axis": np.zeros(len(states), "U24"),
         "time": states["t"],
         "step": states["i"],
         "steps": outs["steps"],

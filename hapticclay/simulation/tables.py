@@ -11,7 +11,7 @@ from ..errors import needing
 from ..fields import plain_data
 from ..model.constants import AXES
 from ..model.hardware import JOINTS
-from .columns import ARRAYS, COLUMNS, Recorded
+from .columns import ARRAYS, COLUMNS, Recorded, parts_of
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -27,7 +27,7 @@ def record_columns(record: Recorded) -> dict[str, np.ndarray]:
     """Each number of a sample as a column, shape (n,): t, p_x, p_y, v_x, ..., tau_elbow, ..."""
     out = {}
     for name, x in recorded_arrays(record).items():
-        parts = COLUMNS[name].parts
+        parts = parts_of(name, record.scenario)
         out |= {f"{name}_{part}": x[:, i] for i, part in enumerate(parts)} if parts else {name: x}
     return out
 
@@ -37,7 +37,7 @@ def column_units(record: Recorded) -> dict[str, str]:
     return {
         f"{name}_{part}" if part else name: COLUMNS[name].unit
         for name in recorded_arrays(record)
-        for part in COLUMNS[name].parts or ("",)
+        for part in parts_of(name, record.scenario) or ("",)
     }
 
 
@@ -78,8 +78,8 @@ def to_xarray(record: Recorded) -> Dataset:
     }
     coords = {
         "time": ("time", values.pop("t")[1], _labels("t")),
-        "axis": list(AXES),
-        "joint": list(JOINTS),
+        "axis": list(record.scenario.axes),
+        "joint": list(record.scenario.joints),
     }
     block = record.scenario.clay and record.scenario.clay.ground
     if record.ground is not None and block:

@@ -18,7 +18,13 @@ from .impedance import MeasuredImpedance as MeasuredImpedance
 from .impedance import measure_impedance as measure_impedance
 from .labs import Lab as Lab
 from .labs import lab as lab
+from .log_report import LogReport as LogReport
+from .log_report import log_report as log_report
 from .measurement import Measurement as Measurement
+from .pair_identification import IdentifiedPair as IdentifiedPair
+from .pair_identification import PairNumber as PairNumber
+from .pair_identification import identify_pair as identify_pair
+from .pair_log import PairLog as PairLog
 from .population import POPULATIONS as POPULATIONS
 from .population import Band as Band
 from .population import Draw as Draw
@@ -26,6 +32,9 @@ from .population import Hands as Hands
 from .population import gain_band as gain_band
 from .probability import Probability as Probability
 from .removal import removed as removed
+from .replay import Recording as Recording
+from .replay import Replayed as Replayed
+from .replay import replay as replay
 from .robustness import Cost as Cost
 from .robustness import Instability as Instability
 from .robustness import RiskMap as RiskMap

@@ -292,10 +292,12 @@ def fit_flow(
         check_one_law(met, inside)
     position = cleaned(p, quantum(p)) if v is None else None
     try:
-        return _fitted(_Columns(t, position, v, f, inside), names, level, axis, source)
+        fitted = _fitted(_Columns(t, position, v, f, inside), names, level, axis, source)
     except np.linalg.LinAlgError:
         bound = "must be a motion that splines can follow"
         raise ParameterError("position", f"{count} samples", bound) from None
+    notes = data.notes if isinstance(data, Measurement) else ()
+    return dataclasses.replace(fitted, warnings=(*notes, *fitted.warnings))
 
 
 def _law_names(laws: Sequence[str] | str) -> list[str]:

@@ -15,9 +15,11 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..columns import Sheet, unreadable
+from ..columns.finding import find
+from ..columns.log import Log, open_log
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
+from .even_columns import Between, even_columns, unwrapped, wrap_note
 
 COLUMNS = {  # columns of a file and their contents
     "t": "time [s]",
@@ -25,6 +27,7 @@ COLUMNS = {  # columns of a file and their contents
     "output": "position of the handle [m]",
     "reference": "what drives the experiment, free of noise, in any unit",
 }
+MEANINGS = {"t": "time", "input": "force or command", "output": "position"}
 UNITS = {"t": ("s",), "input": ("N", "m"), "output": ("m",)}
 LEAST_ROWS = 100
 LARGEST_VALUE = 1e50  # value in a column; squares and sums of it do not overflow
@@ -46,6 +49,7 @@ class Measurement:
         reference: excitation of the experiment, independent of all noise, in any unit, (n,); None
             uses the input, for Th the position.
         name: name in titles and files.
+        notes: what was done to the rows of a log, one sentence each.
 
     Raises:
         ParameterError: a column is not such an array, is constant or too short; a value is not
@@ -60,6 +64,7 @@ class Measurement:
     output: np.ndarray
     reference: np.ndarray | None = None
     name: str = "data"
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self):
         for column in COLUMNS:
@@ -79,37 +84,97 @@ class Measurement:
 
     @classmethod
     @checked
-    def load(cls, path: str | Path, columns: Mapping[str, str] | None = None) -> Measurement:
-        """Read a CSV file, whose first line names its columns.
+    def load(
+        cls,
+        path: str | Path,
+        columns: Mapping[str, str] | None = None,
+        units: Mapping[str, str] | None = None,
+        counts: Mapping[str, Any] | None = None,
+        held: bool = False,
+    ) -> Measurement:
+        """Reads a log: text, or a binary format of docs/logs.md.
 
-        Comma, semicolon or tab separate cells; empty lines and lines that begin with # are skipped.
-        A last row after a shorter step is skipped too, because a run ends between two samples.
-        Other columns may hold anything. Where semicolons or tabs separate cells, numbers may have
-        decimal commas. Values are SI, unless the name of a column holds another unit, as in
-        "time [ms]" or "t_ms", or a row of units stands below the names: they are then converted.
+        Values are SI, unless the name of a column holds another unit, as in "time [ms]" or "t_ms",
+        a row of units stands below the names, or `units` states one: they are then converted. Rows
+        at uneven times are resampled, with a note (docs/logs.md); a last row after a shorter step
+        is skipped, because a run ends between two samples.
 
         Args:
             path: the file.
-            columns: names in the file of t, input, output and reference; a name not given defaults
-                to its key, and a reference is read only if it is given.
+            columns: names in the file of t, input, output and reference. One that is not given is
+                found if a single column can be meant; a reference is read only if it is given.
+            units: unit of a column by name, in place of what the file says, as {"x": "mm"}.
+            counts: of an encoder's column by name: counts a turn, or the size of a count, as
+                "0.01 mm".
+            held: whether a computer holds the input from row to row; it matters where the rows are
+                not even.
 
         Raises:
-            ParameterError: the file cannot be read, is empty or not UTF-8; a column is missing,
-                named twice, holds a value that is not a finite number, or names a unit that is
-                unknown or of another quantity; or as `Measurement`.
+            ParameterError: the file cannot be read or holds no table; a column is missing, or
+                several can be meant; one is named twice, holds a value that is not a finite number,
+                or is in a unit that is unknown or of another quantity; or as `Measurement`.
         """
-        for key in dict(columns or {}):
+        for key in columns or {}:
             choice("columns", key, tuple(COLUMNS))
-        wanted = {key: key for key in ("t", "input", "output")} | dict(columns or {})
-        try:
-            sheet = Sheet.read("csv", Path(path))
-        except OSError as error:
-            raise unreadable("csv", Path(path), error) from None
-        cells = sheet.numbers(_places(Path(path), sheet.head, wanted), UNITS)
-        steps = np.diff(cells["t"])
-        if len(steps) > 1 and 0.0 < steps[-1] < (1.0 - JITTER) * float(np.median(steps)):
-            cells = {key: x[:-1] for key, x in cells.items()}
-        return cls(**cells, name=Path(path).name)
+        log = open_log("path", path, units, counts)
+        return measured(log, named_columns(log, columns or {}), "hold" if held else "spline")
+
+    @classmethod
+    @checked
+    def resampled(
+        cls,
+        t: Any,
+        input: Any,
+        output: Any,
+        reference: Any = None,
+        name: str = "data",
+        held: bool = False,
+    ) -> Measurement:
+        """Makes a measurement from columns whose steps are not even, as `load` does.
+
+        Args:
+            t: time [s], (n,).
+            input: as the attribute, at these times.
+            output: as the attribute, at these times.
+            reference: as the attribute, at these times.
+            name: as the attribute.
+            held: whether a computer holds the input from row to row.
+
+        Raises:
+            ParameterError: time goes back, or as `Measurement`.
+        """
+        given = {"t": t, "input": input, "output": output, "reference": reference}
+        given = {key: x for key, x in given.items() if x is not None}
+        columns = {key: _column(key, x, t) for key, x in given.items()}
+        made = even_columns(columns, "hold" if held else "spline")
+        return cls(**made.columns, name=name, notes=made.notes)
+
+
+def measured(log: Log, names: Mapping[str, str], between: Between = "spline") -> Measurement:
+    """The measurement in some columns of a log, `between` whose rows the input is as said."""
+    cells, notes = {}, []
+    for key, name in names.items():
+        cells[key] = log.values(name, UNITS[key]) if key in UNITS else log.raw(name)
+    raw, turn, at = unwrapped(log.raw(names["output"]))
+    if len(at):
+        cells["output"] = raw * log.size(log.place(names["output"]), UNITS["output"])[0]
+        notes.append(wrap_note(turn, at, cells["t"]))
+    made = even_columns(cells, between)
+    return Measurement(**made.columns, name=log.path.name, notes=(*notes, *made.notes))
+
+
+def named_columns(log: Log, given: Mapping[str, str], **meanings: str) -> dict[str, str]:
+    """Names in the file by key: those that are given, and those that are found."""
+    names = {
+        key: find(log, f"columns.{key}", key, meaning)
+        for key, meaning in {**MEANINGS, **meanings}.items()
+        if key not in given
+    }
+    for key, name in given.items():
+        names[key] = log.names[log.place(name, f"columns.{key}")]
+    if len(set(names.values())) < len(names):
+        raise ParameterError("columns", names, "must be different columns")
+    return {key: names[key] for key in COLUMNS if key in names}
 
 
 def _column(name: str, value: Any, t: Any) -> np.ndarray:
@@ -141,18 +206,3 @@ def _check_sampling(t: np.ndarray) -> None:
             f"that from row {row} to {row + 1} is {t[row + 1] - t[row]:.6g} s"
         )
         raise ParameterError(f"t[{row + 1}]", float(t[row + 1]), bound)
-
-
-def _places(path: Path, head: list[str], wanted: Mapping[str, str]) -> dict[str, int]:
-    """Indices of the columns in the first line, by the keys of `wanted`."""
-    at = {}
-    for key, name in wanted.items():
-        column = choice(f"columns.{key}", name, tuple(head))
-        if head.count(column) > 1:
-            raise ParameterError(
-                f"columns.{key}", column, f"must stand once in {path}'s first line"
-            )
-        at[key] = head.index(column)
-    if len(set(at.values())) < len(at):
-        raise ParameterError("columns", dict(wanted), "must be different columns")
-    return at

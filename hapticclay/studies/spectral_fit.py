@@ -77,7 +77,7 @@ def identify_data(
     """
     if held and what == "Th":
         raise ParameterError("held", held, 'must be False for "Th", whose input is a position')
-    columns, warnings = _Columns(data.input, data.output, data.reference), []
+    columns, warnings = _Columns(data.input, data.output, data.reference), [*data.notes]
     place = cleaned(columns.output, quantum(columns.output))
     if place.bad.any():
         warnings.append(sentence("position", data.t[place.bad], len(data.t), LOST))

@@ -12,6 +12,8 @@ from .design import Design as Design
 from .design import compare as compare
 from .design import design_gain as design_gain
 from .design import transparency_error as transparency_error
+from .fed_friction import FrictionCycle as FrictionCycle
+from .fed_friction import friction_cycle as friction_cycle
 from .gain_limits import gain_limit as gain_limit
 from .gain_limits import stiffness_limit as stiffness_limit
 from .hand_boxes import Box as Box
@@ -30,6 +32,16 @@ from .loop_passivity import clay_passivity as clay_passivity
 from .loop_passivity import passivity as passivity
 from .loops import Loop as Loop
 from .loops import closed_loop_poles as closed_loop_poles
+from .pair_boxes import PairHands as PairHands
+from .pair_boxes import pair_hands as pair_hands
+from .pair_maps import PairComparison as PairComparison
+from .pair_maps import PairMap as PairMap
+from .pair_maps import compare_links as compare_links
+from .pair_maps import pair_map as pair_map
+from .pair_ports import PairTransparency as PairTransparency
+from .pair_ports import pair_transparency as pair_transparency
+from .pair_verdict import PairLimits as PairLimits
+from .pair_verdict import pair_limits as pair_limits
 from .relay_cycle import ExactCycle as ExactCycle
 from .relay_cycle import exact_cycles as exact_cycles
 from .stability_margins import Margins as Margins

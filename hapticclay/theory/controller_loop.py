@@ -271,8 +271,8 @@ class Rest:
         self.state = np.array([] if controller is None else controller.state)
         if controller is not None:
             self.controller = controller
-            self.buffer = np.zeros(BUFFER + 2 * len(self.state))
-            self.caller = LawCaller(controller, self.buffer)
+            self.caller = LawCaller(controller)
+            self.buffer = self.caller.numbers
             begin = (at, self.state) if near is None else (near.joints, near.state)
             at = self._sought(np.concatenate(begin))
             at, self.state = at[:2], at[2:]
@@ -302,7 +302,8 @@ class Rest:
         self.buffer[BUFFER : BUFFER + n] = x[6:]
         self.caller()
         self.caller.check()
-        return np.concatenate((self.buffer[TORQUE:BUFFER], self.buffer[BUFFER + n :]))
+        after = self.buffer[BUFFER + n : BUFFER + 2 * n]
+        return np.concatenate((self.buffer[TORQUE:BUFFER], after))
 
     def _measured(self, at: np.ndarray) -> np.ndarray:
         return np.concatenate((at[:2], [0.0, 0.0], self._force(at[:2]), at[2:]))

@@ -40,14 +40,14 @@ def crossings(response: Response, angles: np.ndarray) -> list[Crossing]:
 
 def zeros(response: Response, angles: np.ndarray, sign: Sign) -> tuple[np.ndarray, np.ndarray]:
     """Angles at which a number of an eigenvalue of a response changes sign, and the eigenvalue."""
-    values = _branches(np.linalg.eigvals(response(angles)))
-    signs = sign(values)
-    i, branch = np.nonzero(signs[:-1] * signs[1:] < 0.0)
+    values = branches(np.linalg.eigvals(response(angles)))
+    below = sign(values) < 0.0  # a zero on the grid counts once
+    i, branch = np.nonzero(below[:-1] != below[1:])
     ends = angles[i], angles[i + 1]
     return _refined(response, sign, ends, (values[i, branch], values[i + 1, branch]))
 
 
-def _branches(values: np.ndarray) -> np.ndarray:
+def branches(values: np.ndarray) -> np.ndarray:
     """Eigenvalues in an order in which each follows from the one before, shape (m, k)."""
     if values.shape[1] == 1:
         return values

@@ -28,19 +28,31 @@ class Limit(NamedTuple):
         high: its upper end; inf for none.
         free_low: its lower end, which may lie below 0.
         theta: angle of the eigenvalue on the circle at the upper end [rad]; NaN for none.
+        low_theta: likewise at the lower end, which may lie below 0.
     """
 
     low: float
     high: float
     free_low: float
     theta: float
+    low_theta: float
+
+    @property
+    def upper(self) -> tuple[float, float]:
+        """The upper end, and the angle there [rad]."""
+        return self.high, self.theta
+
+    @property
+    def lower(self) -> tuple[float, float]:
+        """The lower end, which may lie below 0, and the angle there [rad]."""
+        return self.free_low, self.low_theta
 
     def frequency(self, Ts: float) -> float:
         """Frequency of that eigenvalue at a control sample [Hz]."""
         return self.theta / (2.0 * math.pi * Ts)
 
 
-NONE = Limit(math.nan, math.nan, math.nan, math.nan)
+NONE = Limit(*[math.nan] * 5)
 
 
 class Circle:
@@ -78,7 +90,7 @@ class Family:
         left: shape (n, k).
         right: shape (n, k).
         present: the gain at u = 0.
-        changed: the loop at u.
+        changed: the loop at u; its changes of other things are keywords.
         held: whether the host holds that torque; else it acts between samples.
     """
 
@@ -87,12 +99,12 @@ class Family:
     left: np.ndarray
     right: np.ndarray
     present: float
-    changed: Callable[[float], JointLoop]
+    changed: Callable[..., JointLoop]
     held: bool = True
 
-    def response(self, angles: np.ndarray, loop: JointLoop | None = None) -> np.ndarray:
-        """right' x per torque along left, of the loop or of another one, shape (m, k, k)."""
-        found = (loop or self.circle).responses(angles)[0 if self.of == "position" else 1]
+    def response(self, angles: np.ndarray) -> np.ndarray:
+        """right' x per torque along left, shape (m, k, k)."""
+        found = self.circle.responses(angles)[0 if self.of == "position" else 1]
         return self.right.T @ found @ self.left
 
     def stable(self, change: float) -> bool:
@@ -152,8 +164,9 @@ def _interval(found: Sequence[Crossing], family: Family) -> Limit:
             low -= 1
         while high + 1 < len(pieces) and stable(high + 1):
             high += 1
-        bottom, top = present + pieces[low][0].change, present + pieces[high][1].change
-        return Limit(max(0.0, bottom), top, bottom, pieces[high][1].theta)
+        (bottom, low_theta), (top, theta) = pieces[low][0], pieces[high][1]
+        bottom, top = present + bottom, present + top
+        return Limit(max(0.0, bottom), top, bottom, theta, low_theta)
     return NONE
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,16 +15,16 @@ from ..arms.joint_law import JointPD, checked_law
 from ..arms.mechanism import Linear
 from ..arms.mjcf_arm import MjcfArm
 from ..results import Result, Tables
-from . import joint_crossings, roots
+from . import joint_changes, joint_crossings, roots
 from .client_loop import Delay, Sample
+from .joint_changes import Edge, Number, slopes
+from .joint_crossings import Crossing
 from .joint_families import Circle, Family, Limit
 from .joint_loop import JointLoop, grid, timing_words
 
 LATEST = 2.0  # [s] largest added delay that is looked for
 SLOWEST = 1.0  # [s] largest control sample that is looked for
 PERIODS = 120  # control samples tried, evenly in their logarithm
-STEP = 1e-4  # relative step of differences
-LEAST = 1e-6  # [kg.m^2 or N.m.s/rad] of a number whose step is relative
 BEYOND = 1e-6  # share beyond a limit at which its motion is looked at
 ROUNDS = 30  # of the search for a delay
 IGNORED = "joint friction, encoder counts, torque limits, backlash and elastic links: left out"
@@ -55,13 +56,24 @@ class JointLimits(Result):
         Kd_scale: least and largest factor of all Kd.
         delay_left: delay that may be added [s]; 0 if the loop is unstable; inf for more than 2 s.
         slowest_rate: lowest rate up to the present one down to which the loop is stable [Hz].
+        slope: present slope of the friction fed forward at rest [N.m.s/rad], shape (n,).
         friction_slope: largest slope of a friction fed forward at rest, Fc k + Fv, of each joint
             [N.m.s/rad], shape (n,).
         Kp_change: change of the largest Kp of each joint with its rotor inertia
             [N.m/rad/(kg.m^2)], its damping [1/s] and the delay [N.m/rad/s], shape (n, 3).
-        scale_change: change of the factor with these of each joint [1/(kg.m^2), rad/(N.m.s)],
+        Kd_change: the same of the largest Kd [1/s, 1, N.m/rad], shape (n, 3).
+        friction_slope_change: the same of the largest slope, shape (n, 3); a least Kd above 0
+            changes by its negative.
+        scale_change: change of the factor of all Kp with rotor inertia and damping of each joint
+            [1/(kg.m^2), rad/(N.m.s)], shape (n, 2).
+        scale_per_delay: change of that factor with the delay [1/s].
+        Kd_scale_change: the same of the least and the largest factor of all Kd, shape (2, n, 2).
+        Kd_scale_per_delay: change of these with the delay [1/s].
+        delay_change: change of the delay left with rotor inertia and damping of each joint
+            [s/(kg.m^2), rad/(N.m)], shape (n, 2); with the delay it changes by -1.
+        rate_change: change of the lowest rate with these [Hz/(kg.m^2), Hz.rad/(N.m.s)],
             shape (n, 2).
-        scale_per_delay: change of the factor with the delay [1/s].
+        rate_per_delay: change of the lowest rate with the delay [Hz/s].
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
     """
 
@@ -95,10 +107,18 @@ class JointLimits(Result):
     Kd_scale: tuple[float, float]
     delay_left: float
     slowest_rate: float
+    slope: np.ndarray
     friction_slope: np.ndarray
     Kp_change: np.ndarray
+    Kd_change: np.ndarray
+    friction_slope_change: np.ndarray
     scale_change: np.ndarray
     scale_per_delay: float
+    Kd_scale_change: np.ndarray
+    Kd_scale_per_delay: tuple[float, float]
+    delay_change: np.ndarray
+    rate_change: np.ndarray
+    rate_per_delay: float
     assumed: tuple[str, ...] = ()
 
     @property
@@ -135,6 +155,10 @@ class JointLimits(Result):
         """The change that gains most, or that brings an unstable loop back."""
         j = self.names.index(self.joint)
         if not self.stable:
+            slope, most = self.slope[j], self.friction_slope[j]
+            if slope > 0.0 and not slope < most:
+                limit = "" if math.isnan(most) else f", at most {most:.4g}"
+                return f"friction fed forward at {self.joint}: slope {slope:.4g} N.m.s/rad{limit}"
             low, high = self.Kp[j]
             if high > low and high < self.stiffness[j]:
                 return f"Kp of {self.joint}, {self.stiffness[j]:.4g} to {high:.4g} N.m/rad or less"
@@ -160,16 +184,24 @@ class JointLimits(Result):
             "Kd [N.m.s/rad]": self.damping,
             "least Kd [N.m.s/rad]": self.Kd[:, 0],
             "largest Kd [N.m.s/rad]": self.Kd[:, 1],
-            "friction slope [N.m.s/rad]": self.friction_slope,
+            "friction slope [N.m.s/rad]": self.slope,
+            "largest friction slope [N.m.s/rad]": self.friction_slope,
         }
-        moves: dict[str, Any] = {
-            "joint": self.names,
-            "largest Kp per rotor inertia [1/s^2]": self.Kp_change[:, 0],
-            "largest Kp per damping [1/s]": self.Kp_change[:, 1],
-            "largest Kp per delay [N.m/rad/s]": self.Kp_change[:, 2],
-            "factor per rotor inertia [1/(kg.m^2)]": self.scale_change[:, 0],
-            "factor per damping [rad/(N.m.s)]": self.scale_change[:, 1],
-        }
+        moves: dict[str, Any] = {"joint": self.names}
+        for name, by, unit in (
+            ("largest Kp", self.Kp_change, "N.m/rad"),
+            ("largest Kd", self.Kd_change, "N.m.s/rad"),
+            ("largest friction slope", self.friction_slope_change, "N.m.s/rad"),
+        ):
+            moves |= {f"{name} per {x}": by[:, i] for i, x in enumerate(_per(unit))}
+        for name, by, unit in (
+            ("factor of Kp", self.scale_change, "1"),
+            ("least factor of Kd", self.Kd_scale_change[0], "1"),
+            ("largest factor of Kd", self.Kd_scale_change[1], "1"),
+            ("delay left", self.delay_change, "s"),
+            ("lowest rate", self.rate_change, "Hz"),
+        ):
+            moves |= {f"{name} per {x}": by[:, i] for i, x in enumerate(_per(unit)[:2])}
         arm: dict[str, Any] = {
             "radius": self.radius,
             "frequency [Hz]": self.frequency,
@@ -180,9 +212,18 @@ class JointLimits(Result):
             "largest factor of all Kd": self.Kd_scale[1],
             "delay left [s]": self.delay_left,
             "lowest rate [Hz]": self.slowest_rate,
-            "factor per delay [1/s]": self.scale_per_delay,
+            "factor of Kp per delay [1/s]": self.scale_per_delay,
+            "least factor of Kd per delay [1/s]": self.Kd_scale_per_delay[0],
+            "largest factor of Kd per delay [1/s]": self.Kd_scale_per_delay[1],
+            "lowest rate per delay [Hz/s]": self.rate_per_delay,
         }
         return {"joints": joints, "sensitivity": moves, "arm": {k: [v] for k, v in arm.items()}}
+
+
+def _per(unit: str) -> list[str]:
+    """Numbers over which a limit of a unit changes, with units."""
+    over = (("rotor inertia", "kg.m^2"), ("damping", "N.m.s/rad"), ("delay", "s"))
+    return [f"{name} [({unit})/({by})]" for name, by in over]
 
 
 def joint_loop(
@@ -231,33 +272,40 @@ def joint_limits(arm: MjcfArm, law: JointPD, Ts: Sample, delay: Delay = 0.0) -> 
     """
     study = Study(arm, law, Ts, delay)
     loop, joints = study.loop, range(len(law))
-    Kp = [study.family("Kp", j) for j in joints]
     all_Kp = study.family("Kp")
-    of_Kp, scale = [x.limit() for x in Kp], all_Kp.limit()
+    of_Kp, scale = [study.family("Kp", j).limit() for j in joints], all_Kp.limit()
     of_Kd, of_all_Kd = [study.family("Kd", j).limit() for j in joints], study.family("Kd").limit()
     radius, frequency, _ = worst_motion(loop)
-    slopes = np.array(law.slopes) + np.array(law.Kd) - np.array([x.free_low for x in of_Kd])
+    slope = np.array(law.slopes)
+    left, rate = delay_crossing(loop), slowest_rate(study)
     return JointLimits(
-        arm.names,
-        np.array(law.Kp),
-        np.array(law.Kd),
-        loop.Ts,
-        loop.delay,
-        radius,
-        frequency,
-        arm.names[first_joint(all_Kp, scale)],
-        scale.high,
-        scale.frequency(loop.Ts),
-        _ends(of_Kp),
-        np.array([x.frequency(loop.Ts) for x in of_Kp]),
-        _ends(of_Kd),
-        (of_all_Kd.low, of_all_Kd.high),
-        delay_left(loop),
-        slowest_rate(study),
-        slopes,
-        *study.changes([*map(Edge, Kp, of_Kp)], Edge(all_Kp, scale)),
-        study.assumed(),
+        names=arm.names,
+        stiffness=np.array(law.Kp),
+        damping=np.array(law.Kd),
+        Ts=loop.Ts,
+        delay=loop.delay,
+        radius=radius,
+        frequency=frequency,
+        joint=arm.names[first_joint(all_Kp, scale)],
+        scale=scale.high,
+        buzz=scale.frequency(loop.Ts),
+        Kp=_ends(of_Kp),
+        Kp_buzz=np.array([x.frequency(loop.Ts) for x in of_Kp]),
+        Kd=_ends(of_Kd),
+        Kd_scale=(of_all_Kd.low, of_all_Kd.high),
+        delay_left=left.change,
+        slowest_rate=rate,
+        slope=slope,
+        friction_slope=slope + np.array(law.Kd) - np.array([x.free_low for x in of_Kd]),
+        **study.changes(of_Kp, of_Kd, (scale, of_all_Kd)),
+        **study.timing_changes(left, rate),
+        assumed=study.assumed(),
     )
+
+
+def gravity_words(compensated: bool) -> str:
+    """What holds the arm, as results say it."""
+    return f"gravity: {'fed forward from the measured pose' if compensated else 'acts'}"
 
 
 def _ends(limits: Sequence[Limit]) -> np.ndarray:
@@ -276,6 +324,7 @@ class Study:
         q: Sequence[float] | np.ndarray | None = None,
     ):
         self.Ts, self.delay = Ts, delay
+        self._known: dict[tuple[int, float, float], tuple[Linear, JointLoop]] = {}
         self.arm, self.law = arm, checked_law(law, arm.names)
         self.compensated = arm.gravity == "compensated" if law.gravity is None else law.gravity
         self.linear = arm.linear(q)
@@ -285,90 +334,108 @@ class Study:
     def remade(self, **changes: Any) -> JointLoop:
         """The loop with another linear arm, law, gains, Ts or delay."""
         now = {name: getattr(self, name) for name in ("linear", "law", "Ts", "delay")} | changes
-        return joint_loop(**now, compensated=self.compensated)
+        loop = joint_loop(**now, compensated=self.compensated)
+        if now["law"].runs == "drive":
+            return loop
+        key = id(now["linear"]), loop.Ts, loop.delay  # gains of the host alone differ
+        return loop.held_as(self._known.setdefault(key, (now["linear"], loop))[1])
+
+    def changed(self, kind: str, joint: int | None = None) -> Callable[..., JointLoop]:
+        """The loop at a change u of Kp or Kd of a joint, or of their common factor, and others."""
+        i, weights = self._weights(kind, joint)
+
+        def changed(u: float, **changes: Any) -> JointLoop:
+            gains = np.array([self.law.Kp, self.law.Kd])
+            gains[i] += u * weights
+            return self.remade(gains=(gains[0], gains[1]), **changes)
+
+        return changed
+
+    def _weights(self, kind: str, joint: int | None) -> tuple[int, np.ndarray]:
+        i = ("Kp", "Kd").index(kind)
+        of_all = np.array((self.law.Kp, self.law.Kd)[i])
+        return i, of_all if joint is None else np.eye(len(self.law))[joint]
 
     def family(self, kind: str, joint: int | None = None) -> Family:
         """Loops of other gains Kp or Kd of a joint; of a common factor of all joints for None."""
-        gains = np.array([self.law.Kp, self.law.Kd])
-        i, unit = ("Kp", "Kd").index(kind), np.eye(len(self.law))
+        (i, weights), unit = self._weights(kind, joint), np.eye(len(self.law))
         used = slice(None) if joint is None else slice(joint, joint + 1)
-        weights = gains[i] if joint is None else unit[joint]
-
-        def changed(u: float) -> JointLoop:
-            now = gains.copy()
-            now[i] += u * weights
-            return self.remade(gains=(now[0], now[1]))
-
         left, right = (weights[:, None] * unit)[:, used], unit[:, used]
-        present = 1.0 if joint is None else float(gains[i, joint])
+        present = 1.0 if joint is None else float((self.law.Kp, self.law.Kd)[i][joint])
         of, held = ("position", "rate")[i], self.law.runs == "host"
+        changed = self.changed(kind, joint)
         return Family(self.circle, of, left, right, present, changed, held)  # type: ignore[arg-type]
 
-    def changes(self, of_Kp: Sequence[Edge], common: Edge) -> tuple[np.ndarray, np.ndarray, float]:
-        """How the largest Kp and the factor change with rotor inertia, damping and delay."""
-        n = len(self.law)
-        of_joint, of_all = np.full((n, 3), math.nan), np.full((n, 2), math.nan)
-        step = STEP * self.Ts
-        late = [self.remade(delay=self.delay + i * step) for i in (0, 1, 2)]
-        for j, edge in enumerate(of_Kp):
-            for k, name in enumerate(("inertia", "damping")):
-                size = STEP * max(getattr(self.linear, name)[j, j], LEAST)
-                sides = [self._nudged(name, j, sign * size) for sign in (1.0, -1.0)]
-                of_joint[j, k] = edge.slope(sides, 2.0 * size)
-                of_all[j, k] = common.slope(sides, 2.0 * size)
-            of_joint[j, 2] = edge.slope(late, step)
-        return of_joint, of_all, common.slope(late, step)
+    # ---- how limits move
 
-    def _nudged(self, name: str, j: int, by: float) -> JointLoop:
-        matrix = getattr(self.linear, name).copy()
-        matrix[j, j] += by
-        return self.remade(linear=self.linear._replace(**{name: matrix}))
+    @cached_property
+    def _numbers(self) -> list[list[Number]]:
+        return joint_changes.numbers(self.linear, self.delay, self.Ts)
+
+    def _slopes(
+        self, kind: str, joint: int | None, end: tuple[float, float], over: Sequence[Number]
+    ) -> np.ndarray:
+        """Change of a limit and of its angle, of a gain or a common factor, per number."""
+        gains, changed = (self.law.Kp, self.law.Kd)["Kp" != kind], self.changed(kind, joint)
+        present, size = (1.0, 1.0) if joint is None else (gains[joint], max(gains))
+
+        def at(x: float, **changes: Any) -> JointLoop:
+            return changed(x - present, **changes)
+
+        return slopes(Edge(at, *end, size), over)
+
+    def changes(
+        self, of_Kp: Sequence[Limit], of_Kd: Sequence[Limit], common: tuple[Limit, Limit]
+    ) -> dict[str, Any]:
+        """How limits of gains change with rotor inertia, damping and delay, by name."""
+        (rotors, dampings, late), n = self._numbers, len(self.law)
+
+        def own(kind: str, ends: Sequence[tuple[float, float]]) -> np.ndarray:
+            over = [[rotors[j], dampings[j], *late] for j in range(n)]
+            return np.array([self._slopes(kind, j, ends[j], over[j]) for j in range(n)])
+
+        def whole(kind: str, end: tuple[float, float]) -> tuple[np.ndarray, float]:
+            *by_arm, by_delay = self._slopes(kind, None, end, [*rotors, *dampings, *late]).tolist()
+            return np.array(by_arm).reshape(2, n).T, by_delay
+
+        scale, least, largest = (
+            whole("Kp", common[0].upper),
+            whole("Kd", common[1].lower),
+            whole("Kd", common[1].upper),
+        )
+        return {
+            "Kp_change": own("Kp", [x.upper for x in of_Kp]),
+            "Kd_change": own("Kd", [x.upper for x in of_Kd]),
+            "friction_slope_change": -own("Kd", [x.lower for x in of_Kd]),
+            "scale_change": scale[0],
+            "scale_per_delay": scale[1],
+            "Kd_scale_change": np.array([least[0], largest[0]]),
+            "Kd_scale_per_delay": (least[1], largest[1]),
+        }
+
+    def timing_changes(self, left: Crossing, rate: float) -> dict[str, Any]:
+        """How the delay left and the lowest rate change, by name."""
+        (rotors, dampings, late), n = self._numbers, len(self.law)
+        most = Edge(
+            lambda T, **changes: self.remade(delay=T, **changes),
+            self.delay + left.change,
+            left.theta,
+            self.Ts,
+        )
+        by_delay = slopes(most, [*rotors, *dampings]).reshape(2, n).T
+        Ts = 1.0 / rate
+        theta = _angle(self.remade(Ts=Ts)) if SLOWEST > Ts > self.Ts else math.nan
+        longest = Edge(lambda T, **changes: self.remade(Ts=T, **changes), Ts, theta, Ts)
+        by_rate = -(rate**2) * slopes(longest, [*rotors, *dampings, *late])
+        return {
+            "delay_change": by_delay,
+            "rate_change": by_rate[:-1].reshape(2, n).T,
+            "rate_per_delay": float(by_rate[-1]),
+        }
 
     def assumed(self) -> tuple[str, ...]:
         """What the verdict rests on, a sentence each."""
-        gravity = "fed forward from the measured pose" if self.compensated else "acts"
-        return (*self.arm.notes, f"gravity: {gravity}", IGNORED)
-
-
-class Edge:
-    """The upper limit of a held gain, and how it moves with a number a of the loop.
-
-    At the limit an eigenvalue x = -1/u of the response is real. A change of a moves theta so that
-    it stays real: dx/da = Re x_a - Re x_theta Im x_a/Im x_theta, and du/da = dx/da / x^2.
-    """
-
-    def __init__(self, family: Family, limit: Limit):
-        theta, pi = limit.theta, math.pi
-        self._family, self._at = family, np.array([theta])
-        self.known = family.held and 0.0 < theta <= pi
-        self._along: complex | None = None  # x_theta; None at z = -1, where all stays real
-        if not self.known:
-            return
-        near = -1.0 / (limit.high - family.present)
-        self._x = _eigenvalue(family.response(self._at)[0], near)
-        if turn := min(1e-6 * theta, 0.5 * (pi - theta)):
-            around = family.response(np.array([theta + turn, theta - turn]))
-            right, left = (_eigenvalue(matrix, self._x) for matrix in around)
-            self._along = (right - left) / (2.0 * turn)
-
-    def slope(self, loops: Sequence[JointLoop], step: float) -> float:
-        """Change of the limit per a; NaN for a limit that is not on the circle.
-
-        The loops are those at a + step/2 and a - step/2, or at a, a + step and a + 2 step.
-        """
-        if not self.known:
-            return math.nan
-        weights = (1.0, -1.0) if len(loops) == 2 else (-1.5, 2.0, -0.5)
-        found = [_eigenvalue(self._family.response(self._at, x)[0], self._x) for x in loops]
-        by = sum(w * y for w, y in zip(weights, found, strict=True)) / step
-        if self._along is not None:
-            by = by.real - self._along.real * by.imag / self._along.imag
-        return float(np.real(by) / self._x.real**2)
-
-
-def _eigenvalue(matrix: np.ndarray, near: complex) -> complex:
-    values = np.linalg.eigvals(matrix)
-    return complex(values[np.argmin(np.abs(values - near))])
+        return (*self.arm.notes, gravity_words(self.compensated), IGNORED)
 
 
 # ---- present motion, delay and rate --------------------------------------------------------------
@@ -391,41 +458,46 @@ def first_joint(family: Family, limit: Limit) -> int:
     return worst_motion(family.changed(change))[2]
 
 
-def delay_left(loop: JointLoop) -> float:
-    """Delay that may be added to a stable loop [s]; 0 for an unstable one, inf for more than 2 s.
+def delay_crossing(loop: JointLoop) -> Crossing:
+    """Delay that may be added to a stable loop [s], and the angle of the eigenvalue there.
 
-    With whole samples more of delay, a crossing is where an eigenvalue of the open loop has size 1
-    and turns into -1. The share of a sample moves it little, so a few rounds find it.
+    0 for an unstable loop, inf for more than 2 s. With whole samples more of delay, a crossing is
+    where an eigenvalue of the open loop has size 1 and turns into 1. The share of a sample moves it
+    little, so a few rounds find it.
     """
     if not loop.stable():
-        return 0.0
-    total = loop.delay
+        return Crossing(0.0, math.nan)
+    total, theta = loop.delay, math.nan
     for turn in range(ROUNDS):
-        more = samples_left(loop.with_delay(total), 0.5 if turn else 0.0) * loop.Ts
+        samples, theta = samples_left(loop.with_delay(total), 0.5 if turn else 0.0)
+        more = samples * loop.Ts
         if math.isinf(more) or total + more - loop.delay > LATEST:
-            return math.inf
+            return Crossing(math.inf, math.nan)
         total += more
         if abs(more) <= 1e-12 * (total + loop.Ts):
             break
-    return max(0.0, total - loop.delay)
+    return Crossing(max(0.0, total - loop.delay), theta)
 
 
-def samples_left(loop: JointLoop, before: float = 0.0) -> float:
+def samples_left(loop: JointLoop, before: float = 0.0) -> Crossing:
     """Whole samples of delay, as a real number, until the first crossing; inf for none.
 
     Args:
         loop: the loop.
         before: how far a crossing may lie before the present delay [samples].
     """
-
-    def opened(angles: np.ndarray) -> np.ndarray:
-        q, v = loop.open_responses(angles)
-        return -(loop.position @ q + loop.rate @ v)
-
-    theta, x = joint_crossings.zeros(opened, grid(loop), lambda values: np.log(np.abs(values)))
+    theta, x = joint_crossings.zeros(loop.opened, grid(loop), lambda values: np.log(np.abs(values)))
     late = np.angle(x)[:, None] / theta[:, None] + np.arange(-1, 3) * 2.0 * math.pi / theta[:, None]
-    late = late[late >= -before]
-    return float(late.min(initial=math.inf))
+    late = np.where(late >= -before, late, math.inf)
+    if not len(theta):
+        return Crossing(math.inf, math.nan)
+    i = int(late.min(axis=1).argmin())
+    return Crossing(float(late[i].min()), float(theta[i]))
+
+
+def _angle(loop: JointLoop) -> float:
+    """Angle of the largest eigenvalue of the map [rad]."""
+    return abs(float(np.angle(loop.eigenvalues[0])))
 
 
 def slowest_rate(study: Study) -> float:

@@ -57,13 +57,14 @@ class JointLoop:
         return len(self.inertia)
 
     @cached_property
-    def _hold(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def hold(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Transition of (q, q') over a sample, response to the torque due in it, to the one before.
 
         Shapes (2n, 2n), (2n, n), (2n, n).
         """
-        share = self._late[1]
-        whole, late = self._transition(self.Ts), self._transition((1.0 - share) * self.Ts)
+        share = self.late[1]
+        whole = self._transition(self.Ts)
+        late = self._transition((1.0 - share) * self.Ts) if share else whole
         return whole[0], late[1], whole[1] - late[1]
 
     def _transition(self, t: float) -> tuple[np.ndarray, np.ndarray]:
@@ -77,9 +78,19 @@ class JointLoop:
         return e[: 2 * n, : 2 * n], e[: 2 * n, 2 * n :]
 
     @cached_property
-    def _late(self) -> tuple[int, float]:
+    def late(self) -> tuple[int, float]:
         """Whole samples of the delay, and the rest as a share of a sample."""
         return linear_loop.whole_samples(self.delay, self.Ts)
+
+    @property
+    def samples_late(self) -> int:
+        """Whole samples of the delay."""
+        return self.late[0]
+
+    @property
+    def states(self) -> int:
+        """Order of the map, at most."""
+        return self.n * (4 + self.late[0])
 
     # ---- the matrix
 
@@ -89,7 +100,7 @@ class JointLoop:
         Raises:
             ParameterError: the delay makes it larger than 1,200 states.
         """
-        n, (whole, share) = self.n, self._late
+        n, (whole, share) = self.n, self.late
         measured = {"exact": 0, "difference": 1, "filter": 2}[self.velocity]
         queue = whole + (share > 0.0)
         size = n * (2 + measured + queue)
@@ -98,10 +109,10 @@ class JointLoop:
             raise ParameterError("delay", self.delay, f"must be at most {most:g} s at this rate")
         unit = np.eye(size).reshape(-1, n, size)  # rows of each group of n states
         q, w, memory, queued = unit[0], unit[1], unit[2 : 2 + measured], unit[2 + measured :]
-        keep, gain = self._filter
+        keep, gain = self.rate_filter
         v = w if not measured else gain * (q - memory[0]) + (keep * memory[1] if keep else 0.0)
         torques = [-(self.position @ q + self.rate @ v), *queued]
-        step, now, before = self._hold
+        step, now, before = self.hold
         out = np.zeros((size, size))
         out[: 2 * n] = step @ np.vstack([q, w]) + now @ torques[whole]
         if share > 0.0:
@@ -112,7 +123,7 @@ class JointLoop:
         return out
 
     @property
-    def _filter(self) -> tuple[float, float]:
+    def rate_filter(self) -> tuple[float, float]:
         """v_k = keep v_k-1 + gain (q_k - q_k-1)."""
         if self.cutoff is None:
             return 0.0, 1.0 / self.Ts
@@ -158,13 +169,36 @@ class JointLoop:
 
     def open_responses(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Position and measured rate per held torque, both (m, n, n), of the joints alone."""
-        n, (step, now, before), (whole, share) = self.n, self._hold, self._late
+        n, (step, now, before), (whole, share) = self.n, self.hold, self.late
         z = np.exp(1j * theta)[:, None, None]
         given = now + before / z if share > 0.0 else now
         x = np.linalg.solve(z * np.eye(2 * n) - step, given * z**-whole)
         q, w = x[:, :n], x[:, n:]
-        keep, gain = self._filter
-        return q, w if self.velocity == "exact" else gain * (1.0 - 1.0 / z) / (1.0 - keep / z) * q
+        return q, w if self.velocity == "exact" else self.measured(theta)[:, None, None] * q
+
+    def opened(self, theta: np.ndarray) -> np.ndarray:
+        """The open loop, from a held torque around to the host's, shape (m, n, n)."""
+        q, v = self.open_responses(theta)
+        return -(self.position @ q + self.rate @ v)
+
+    def between_responses(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Position and measured rate per torque of a sine between samples, in the closed loop.
+
+        Both (m, n, n); theta of shape (m,) is the turn of the sine in a sample, > 0 and <= pi.
+        """
+        s = 1j * theta[:, None, None] / self.Ts
+        q = np.linalg.inv(self.inertia * s**2 + self.damping * s + self.stiffness)
+        v = self.measured(theta)[:, None, None] * q
+        back, rate = self.responses(theta)
+        fed = self.position @ q + self.rate @ v
+        return q - back @ fed, v - rate @ fed
+
+    def measured(self, theta: np.ndarray) -> np.ndarray:
+        """Measured rate per position of a sine at the samples, shape (m,)."""
+        if self.velocity == "exact":
+            return 1j * theta / self.Ts
+        (keep, gain), back = self.rate_filter, np.exp(-1j * theta)
+        return gain * (1.0 - back) / (1.0 - keep * back)
 
     def at_rest(self) -> np.ndarray:
         """Position per constant torque added to the host's [rad/(N.m)], shape (n, n)."""
@@ -178,7 +212,13 @@ class JointLoop:
 
     def feeding(self, position: np.ndarray, rate: np.ndarray) -> JointLoop:
         """The loop with more feedback in the held torque, shapes (n, n)."""
-        return replace(self, position=self.position + position, rate=self.rate + rate)
+        found = replace(self, position=self.position + position, rate=self.rate + rate)
+        return found.held_as(self)
+
+    def held_as(self, other: JointLoop) -> JointLoop:
+        """The loop itself, with what another one of the same joints, Ts and delay has computed."""
+        self.__dict__["hold"] = other.hold
+        return self
 
 
 def timing_words(Ts: float, delay: float) -> str:
@@ -186,15 +226,18 @@ def timing_words(Ts: float, delay: float) -> str:
     return f"{1.0 / Ts:.4g} Hz, {1e3 * delay:.3g} ms late"
 
 
-def grid(loop: JointLoop) -> np.ndarray:
+def grid(loop: Any) -> np.ndarray:
     """Angles of a search, > 0 and <= pi: even, by factors, and dense at resonances."""
-    whole = loop._late[0]
-    even = np.linspace(0.0, math.pi, 400 * (1 + whole // 8) + 1)[1:]
+    even = np.linspace(0.0, math.pi, 400 * (1 + loop.samples_late // 8) + 1)[1:]
     found: list[Any] = [even, np.geomspace(1e-6, 1.0, 400)]
-    if loop.n * (4 + whole) <= MOST_STATES // 3:
-        z = np.linalg.eigvals(loop.map())
-        z = z[(np.abs(z) > 0.5) & (z.imag >= 0.0)]
-        near = np.tan(np.linspace(-1.5, 1.5, 15))
-        found.append((np.angle(z)[:, None] + np.abs(1.0 - np.abs(z))[:, None] * near).ravel())
+    if loop.states <= MOST_STATES // 3:
+        found.append(near_resonances(np.linalg.eigvals(loop.map())))
     every = np.concatenate(found)
     return np.unique(every[(every > 0.0) & (every <= math.pi)])
+
+
+def near_resonances(z: np.ndarray) -> np.ndarray:
+    """Angles dense around those of eigenvalues near the unit circle."""
+    z = z[(np.abs(z) > 0.5) & (z.imag >= 0.0)]
+    near = np.tan(np.linspace(-1.5, 1.5, 15))
+    return (np.angle(z)[:, None] + np.abs(1.0 - np.abs(z))[:, None] * near).ravel()

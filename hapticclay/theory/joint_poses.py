@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -78,6 +79,11 @@ class OverPoses(Result):
         low, high = np.nanmin(self.scale), np.nanmax(self.scale)
         return f"{at}: all Kp up to {low:.4g} to {high:.4g} times; {name} first at {share:.0%}"
 
+    def remarks(self) -> Sequence[str]:
+        """The verdict, the worst pose, and what it rests on."""
+        pose = " ".join(f"{name}={q:.4g}" for name, q in self.worst_pose.items())
+        return [self.headline(), f"worst pose: {pose}", *self.assumed]
+
     def tables(self) -> Tables:
         """Every pose, and how often each joint buzzes first."""
         poses: dict[str, Any] = {f"{name} [rad]": self.q[:, j] for j, name in enumerate(self.names)}
@@ -125,7 +131,7 @@ def over_poses(
             if error.field != "pose":
                 raise
             continue
-        assumed = study.assumed()
+        assumed = tuple(x for x in study.assumed() if not x.startswith("pose:"))
         rows.append((q, _handle(arm, q), *_at_pose(study)))
         if len(rows) == poses:
             break

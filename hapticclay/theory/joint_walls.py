@@ -16,9 +16,11 @@ from ..arms.mjcf_arm import MjcfArm
 from ..errors import Bound, ParameterError
 from ..model.operator import NO_HAND, Operator
 from ..results import Result, Tables
+from . import joint_changes
 from .client_loop import Delay, Sample
+from .joint_changes import Edge, slopes
 from .joint_families import Circle, Family, Limit
-from .joint_gains import IGNORED, joint_loop
+from .joint_gains import IGNORED, gravity_words, joint_loop
 from .joint_loop import JointLoop, timing_words
 
 AXES = ("x", "y", "z")
@@ -34,6 +36,7 @@ class WallLimit(Result):
     """The stiffest wall at the handle of an arm, along one axis of the world.
 
     Attributes:
+        names: joints, shape (n,).
         axis: axis of the wall.
         K: largest stable stiffness [N/m]; inf for no limit, 0 or NaN if none is stable.
         low: least stable stiffness [N/m], mostly 0.
@@ -42,6 +45,9 @@ class WallLimit(Result):
         B: damping of the wall [N.s/m].
         Ts: control sample [s].
         delay: from a sample to its torques [s].
+        K_change: change of K with rotor inertia and damping of each joint
+            [N/m/(kg.m^2), 1/(m^2.s)], shape (n, 2).
+        K_per_delay: change of K with the delay [N/m/s].
         line_B: dampings from 0 to that at which no wall is stable [N.s/m].
         line_K: largest stable stiffness at them [N/m]: the Z-width of the arm along the axis.
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
@@ -49,11 +55,13 @@ class WallLimit(Result):
 
     drawn_by = "hapticclay.views.joint_plots:wall_plot"
     written_as = "wall"
+    printed = {"wall": ("axis", "largest K [N/m]", "least K [N/m]", "buzz [Hz]", "mass [kg]")}
 
     def remarks(self) -> Sequence[str]:
         """What the verdict rests on."""
         return [self.headline(), *self.assumed]
 
+    names: tuple[str, ...]
     axis: str
     K: float
     low: float
@@ -62,6 +70,8 @@ class WallLimit(Result):
     B: float
     Ts: float
     delay: float
+    K_change: np.ndarray
+    K_per_delay: float
     line_B: np.ndarray
     line_K: np.ndarray
     assumed: tuple[str, ...] = ()
@@ -86,9 +96,16 @@ class WallLimit(Result):
             "B [N.s/m]": self.B,
             "Ts [s]": self.Ts,
             "delay [s]": self.delay,
+            "largest K per delay [N/m/s]": self.K_per_delay,
         }
         line: dict[str, Any] = {"B [N.s/m]": self.line_B, "largest K [N/m]": self.line_K}
-        return {"wall": {name: [x] for name, x in row.items()}, "line": line}
+        moves: dict[str, Any] = {
+            "joint": self.names,
+            "largest K per rotor inertia [N/m/(kg.m^2)]": self.K_change[:, 0],
+            "largest K per damping [1/(m^2.s)]": self.K_change[:, 1],
+        }
+        wall = {name: [x] for name, x in row.items()}
+        return {"wall": wall, "sensitivity": moves, "line": line}
 
 
 def held_arm(linear: Linear, operator: Operator) -> Linear:
@@ -139,13 +156,22 @@ def wall_limit(
     if not np.abs(along).max() > STILL:
         raise ParameterError("axis", axis, "must be one along which the handle can move")
     none = (0.0,) * len(arm.names)
-    law = JointPD(none, none, velocity=velocity)
-    loop = joint_loop(linear, law, Ts, delay, arm.gravity == "compensated")
+    law, compensated = JointPD(none, none, velocity=velocity), arm.gravity == "compensated"
+    square = np.outer(along, along)
+
+    def rendered(K: float, **changes: Any) -> JointLoop:
+        now = {"linear": linear, "law": law, "Ts": Ts, "delay": delay} | changes
+        return joint_loop(**now, compensated=compensated).feeding(K * square, B * square)
+
+    loop = joint_loop(linear, law, Ts, delay, compensated)
     mass = float(1.0 / (along @ np.linalg.solve(linear.inertia, along)))
     limit = _limit(loop, along, B)
+    over = [x for numbers in joint_changes.numbers(linear, delay, Ts) for x in numbers]
+    *by_arm, by_delay = slopes(Edge(rendered, *limit.upper, 1.0), over).tolist()
     line_B = np.linspace(0.0, max(MOST_B * mass / (Ts + delay), 1.2 * B), LINE)
     line_K = np.array([_limit(loop, along, b).high for b in line_B.tolist()])
     return WallLimit(
+        arm.names,
         axis,
         limit.high,
         limit.low,
@@ -154,9 +180,11 @@ def wall_limit(
         B,
         Ts,
         delay,
+        np.array(by_arm).reshape(2, -1).T,
+        by_delay,
         line_B,
         np.nan_to_num(line_K, nan=0.0, posinf=math.inf),
-        (*arm.notes, IGNORED),
+        (*arm.notes, gravity_words(compensated), IGNORED),
     )
 
 

@@ -1,6 +1,7 @@
 """Arms from files: their mechanics against other derivations, and what is refused."""
 
 import math
+import re
 from pathlib import Path
 
 import mujoco
@@ -97,6 +98,31 @@ def test_gravity_stiffness_is_the_curvature_of_the_energy(name):
         for i in range(n)
     ]
     np.testing.assert_allclose(arm.gravity_stiffness(), found, atol=2e-5)
+
+
+def test_the_five_bar_has_its_published_bars():
+    """Elbow to handle is 75 mm on both sides, at any pose of the motors."""
+    arm = card("five_bar")
+    for q in ([0.9599, 2.1817], [0.6, 2.0], [1.3, 2.6]):
+        for base, angle in zip((0.0, -0.025), q, strict=True):
+            elbow = base + 0.063 * math.cos(angle), 0.063 * math.sin(angle)
+            assert math.dist(elbow, arm.handle(q)[:2]) == pytest.approx(0.075, abs=1e-9)
+
+
+def test_a_pose_that_does_not_close_the_chain_is_told():
+    assert "close" not in " ".join(card("five_bar").notes)
+    text = (CARDS / "five_bar.xml").read_text().replace("1.31643921903851 2.18", "1.0 2.18")
+    notes = hc.MjcfArm(mujoco.MjSpec.from_string(text)).notes
+    assert "does not close the chain: right_elbow was moved by 0.316" in " ".join(notes)
+
+
+def test_connected_points_are_told():
+    """Drawn at its zero position, with all bars along x, a chain of other bars is made."""
+    assert "(0.075, 0, 0) of right_tip is (0.075, 0, 0) of left_tip [m]" in card("five_bar").notes
+    drawn = (CARDS / "five_bar.xml").read_text()
+    flat = re.sub(r' (ref|euler)="[^"]*"', "", drawn)
+    notes = hc.MjcfArm(mujoco.MjSpec.from_string(flat)).notes
+    assert "(0.075, 0, 0) of right_tip is (0.1, 0, 0) of left_tip [m]" in notes
 
 
 def test_values_by_name_and_by_place():

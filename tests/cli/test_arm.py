@@ -24,6 +24,34 @@ def test_limits_wall_and_poses(tmp_path, capsys):
     assert found["tables"]["joints"]["joint"] == ["shoulder", "elbow"]
 
 
+def test_an_arm_without_a_name_whose_poses_are_all_alike(tmp_path, capsys, monkeypatch):
+    """One joint carries the same everywhere; the folder has the name of the file."""
+    monkeypatch.chdir(tmp_path)
+    joint = '<joint name="pan" axis="0 0 1" armature="0.01"/>'
+    mass = '<inertial pos="0.1 0 0" mass="1" diaginertia="1e-3 1e-3 1e-3"/>'
+    body = f"<body>{joint}{mass}</body>"
+    Path("mine.xml").write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    gains = ["--Kp", "10", "--Kd", "1", "--delay", "1ms"]
+    assert main(["arm", "mine.xml", *gains, "--poses", "4", "--damping", "0.1"]) == 0
+    assert "worst pose: pan=" in capsys.readouterr().out
+    assert Path("out/arm/mine/poses.png").exists()
+
+
+def test_friction_fed_forward(tmp_path, capsys):
+    gains = tmp_path / "gains.toml"
+    rows = "[[4, 50, 0.1], [1.5, 50, 0.1]]"
+    gains.write_text(f"Kp = [100, 50]\nKd = [1, 0.5]\nvelocity = 'difference'\nfriction = {rows}\n")
+    out = tmp_path / "out"
+    assert main(["arm", TWO, "--gains", str(gains), "--out", str(out)]) == 0
+    assert "limit cycle of" in capsys.readouterr().out
+    found = json.loads((out / "friction.json").read_text())
+    assert "limit cycle" in found["tables"]["cycles"]["kind"]
+    assert (out / "friction.png").exists()
+    few = ["--counts", "100", "--out", str(tmp_path / "few")]
+    assert main(["arm", TWO, "--gains", str(gains), *few]) == 0
+    assert "100 counts a turn: no limit cycle" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     "words, told",
     [
@@ -36,6 +64,10 @@ def test_limits_wall_and_poses(tmp_path, capsys):
         ([TWO, *GAINS, "--rate", "500", "--Ts", "1ms"], "give --Ts or --rate"),
         ([TWO, *GAINS, "--wall", "z"], "along which the handle can move"),
         ([TWO, "--wall", "x", "--poses", "3"], "needs gains"),
+        ([TWO, *GAINS, "--B", "2"], "give --wall"),
+        ([TWO, *GAINS, "--hand", "0.2", "1", "3"], "give --wall"),
+        ([TWO, *GAINS, "--seed", "2"], "--poses"),
+        ([TWO, *GAINS, "--counts", "4096"], "file of --gains"),
         ([TWO, *GAINS, "--velocity", "filter"], "velocity 'filter'"),
         ([TWO, *GAINS, "--dely", "1ms"], "did you mean --delay"),
         ([TWO, *GAINS, "--delay", "1mm"], "s"),

@@ -198,7 +198,36 @@ FORMED = dict(compensator=ZEROS, operator=HANDS, **OTHER)
 FILTERED = dict(
     jitter=8e-5, dropout_probability=0.1, delay=0.4 * TS, force_filter=500.0, filter_order=1
 )
+
+
+def arms(method, **common):
+    """Arms from files: planar, closed, spatial, with all that may act on them."""
+    spring = (hc.Spring(), hc.Spring(k=300.0), hc.Spring())
+    law = Profile((0.002, 0.01), (0.0, 20.0, 5.0), springs=spring)
+    clay = Clay(law, Profile((0.001,), (3.0, 8.0), "y"))
+    out = {}
+    for i, (card, plane) in enumerate(
+        (("planar_2r", None), ("five_bar", None), ("haptic_3", "zx"))
+    ):
+        arm = hc.MjcfArm(card, plane=plane, torque_limit=[3.0] * len(hc.MjcfArm(card).names))
+        n = len(arm.names)
+        kind = ("difference", "filter", "exact")[i]
+        law = hc.JointPD(
+            (4.0,) * n, (0.05,) * n, velocity=kind, cutoff=90.0 if kind == "filter" else None,
+            reference=tuple(arm.q + 0.1), friction=((0.05, 20.0, 0.001),) * n,
+            velocity_bits=12, velocity_range=30.0,
+        )  # fmt: skip
+        parts = dict(
+            arm=arm, controller=law, clay=clay, Ts=1e-3, dt=5e-4, t_max=0.06, operator=HAND,
+            muscle=WAVE, force=(1.0, 0.5), stop_when_unstable=False, render=method,
+            hardware=hc.Hardware(encoder=4096, delay=1.3e-3, dac_bits=12, jitter=2e-5),
+        )  # fmt: skip
+        out[card] = hc.Scenario(**parts | common)
+    return out
+
+
 KINDS = {
+    "held: plain arms": arms("held"), "physical: plain arms": arms("physical"),
     "fast: plain": CASES | MORE,
     "accurate: plain": {
         name: dataclasses.replace(s, integrator="accurate", dt=2e-3) for name, s in STILL.items()
@@ -319,7 +348,7 @@ def summary_of(r):
     out["crossing_time"][: len(crossed)] = [c.time for c in crossed]
     out["crossing_speed"][: len(crossed)] = [c.speed for c in crossed]
     for name in ("p", "v", "fh", "fe", "b"):
-        out[name] = getattr(r, name)[-1] if len(r.t) else np.nan
+        out[name] = getattr(r, name)[-1, :2] if len(r.t) else np.nan
     for name in out.dtype.names[-8:]:
         out[name] = r.energy[name]
     return out
@@ -411,9 +440,9 @@ def test_stale_scratch_and_an_effect_of_an_event_are_seen(monkeypatch):
     s = dataclasses.replace(KINDS["held: plain"]["plain"], t_max=0.02)
     r, drive, load = hc.simulate(s, engine="python"), hardware.drive, kick.load
 
-    def counts(m, s, t1, t2):
+    def counts(m, s, tau):
         s.steps += 1
-        drive(m, s, t1, t2)
+        drive(m, s, tau)
 
     def stale(m, s, k):
         left = k.x.u if s.i > 3 else 0.0

@@ -264,9 +264,9 @@ def test_in_a_run_torques_lie_on_levels_within_the_range():
 
 @given(st.integers(1, 30), st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(1e-4, 1e-2))
 def test_difference_is_exact_for_constant_rates(window, w1, w2, Ts):
-    at = lambda k: (1.0 + k * Ts * w1, -0.5 + k * Ts * w2)  # noqa: E731
-    found = formula.velocity_difference(-window, at(-window), 0, at(0), Ts)
-    assert found == pytest.approx((w1, w2), abs=16 * EPS / (window * Ts))
+    for start, w in ((1.0, w1), (-0.5, w2)):
+        found = formula.velocity_difference(-window, start - window * Ts * w, 0, start, Ts)
+        assert found == pytest.approx(w, abs=16 * EPS / (window * Ts))
 
 
 def test_window_divides_the_noise_of_an_encoder():
@@ -278,10 +278,7 @@ def test_window_divides_the_noise_of_an_encoder():
     for m in (1, 4, 16):
         q = [formula.encode(w * k * Ts, counts) for k in range(4000)]
         v = np.array(
-            [
-                formula.velocity_difference(k - m, (q[k - m], 0.0), k, (q[k], 0.0), Ts)[0]
-                for k in range(m, 4000)
-            ]
+            [formula.velocity_difference(k - m, q[k - m], k, q[k], Ts) for k in range(m, 4000)]
         )
         step = math.tau / counts / (m * Ts)
         np.testing.assert_allclose(v / step, np.round(v / step), atol=1e-6)
@@ -312,9 +309,9 @@ def test_difference_lags_half_its_window_in_a_run():
         run = Run(replace(s, hardware=hc.Hardware(velocity="difference", velocity_window=m)), 1)
         shown = []
         for _ in range(run.row.m.last):
-            run.advance(run.filled + 1)  # one step; the kick to its sample ended with e.w1, e.w2
+            run.advance(run.filled + 1)  # one step; the kick to its sample ended with e.w
             s_ = run.row.s
-            shown.append(((s_.e.w1, s_.e.w2), (s_.now.x.w, s_.now.y.w)))
+            shown.append((s_.e.w[:2], s_.now.w[:2]))
         true, seen = np.array([x[0] for x in shown]), np.array([x[1] for x in shown])
         late = np.array([np.mean(true[max(k - m, 0) : k + 1], axis=0) for k in range(len(true))])
         # trapezoid against the integral: second differences of the rate
@@ -649,8 +646,8 @@ def test_the_lag_of_a_velocity_is_that_of_the_page(cutoff):
     """docs/velocity_filter.md: of p = t^2/2 the estimate is t less the lag, Ts/2 + Ts a/(1 - a)."""
     Ts, y, lag = 1e-3, 0.0, 5e-4
     for k in range(1, 2001):
-        p, old = ((0.5 * (i * Ts) ** 2, 0.0) for i in (k, k - 1))
-        w, _ = formula.velocity_difference(k - 1, old, k, p, Ts)
+        p, old = (0.5 * (i * Ts) ** 2 for i in (k, k - 1))
+        w = formula.velocity_difference(k - 1, old, k, p, Ts)
         y = w if cutoff is None else formula.low_pass(y, w, cutoff, Ts)
     if cutoff is not None:
         a = math.exp(-math.tau * cutoff * Ts)

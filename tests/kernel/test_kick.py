@@ -79,7 +79,7 @@ def kick_by_laws(run, before, after):
     H, L, R = (0.5 * (before + after), before / (before + after), after / (before + after))
     formed = run.row.m.formed
     hands, links = [th or NO_HAND for th in s.operators], s.arm.links
-    q, w1, w2, g1, g2 = (state.q1, state.q2), state.w1, state.w2, state.g1, state.g2
+    q, w1, w2, g1, g2 = state.q[:2], *state.w[:2], *state.g[:2]
     u = arm.jacobian(*q, links)
     p = Links(*links[:4]).forward(q) - s.origin
     v = arm.handle_velocity(w1, w1 + w2, u)
@@ -162,7 +162,7 @@ def test_the_kick_is_what_its_laws_say(name, x, before, after):
             axis.rate = 0.0
             axis.z[: orders[i]] = [0.1 * a for a in x[10 + 4 * i :][: orders[i]]]
     before, after = before * s.dt, after * s.dt
-    state.before, state.w1, state.w2 = before, *x[:2]
+    state.before, state.w[:2] = before, x[:2]
     u, f, tau, rates, shown, states = kick_by_laws(run, before, after)
     k = state.k
     kick.by_servo(m, state, k, after)
@@ -171,7 +171,7 @@ def test_the_kick_is_what_its_laws_say(name, x, before, after):
     else:
         own = [k.x.next_rate, k.y.next_rate]
     delta = kick.shown_delta(k, 0), kick.shown_delta(k, 1)
-    found = (k.x.u, k.y.u), (k.x.net, k.y.net), (k.tau1, k.tau2)
+    found = (k.x.u, k.y.u), (k.x.net, k.y.net), (k.tau[0], k.tau[1])
     found = *found, (k.x.next_yrate, k.y.next_yrate), delta, own
     for a, b, what in zip(found, (u, f, tau, rates, shown, states), "uftrds", strict=True):
         # 1/dt = 2800 multiplies roundings of the velocity
@@ -187,7 +187,7 @@ def test_engine_does_what_the_kick_foretold(name, monkeypatch):
     def stepped(m, s, k, h, even):
         nonlocal worst
         plain(m, s, k, h, even)
-        worst = max(worst, abs(s.w1 - k.w1), abs(s.w2 - k.w2))
+        worst = max(worst, abs(s.w[0] - k.w[0]), abs(s.w[1] - k.w[1]))
 
     monkeypatch.setattr(arms, "step_engine", stepped)
     hc.simulate(NEAR[name], engine="python")
@@ -267,7 +267,7 @@ def test_a_kick_counts_half_of_the_clay_on_either_side_and_all_of_the_muscle():
     s.x.b, s.y.b = s.x.old, s.y.old = 8.0, 6.0
     kick.begin(k, 1e-3, 1e-3)
     kick.take_over(m, s, k)
-    arms.handle_at(m, k, s.q1, s.q2, 0.0, 0.0)
+    arms.handle_at(m, k, s.q[0], s.q[1], 0.0, 0.0)
     kick.load(m, s, k)
     assert (k.x.b0, k.y.b0, k.x.b1, k.y.b1) == (4.0, 3.0, 4.0, 3.0)
     assert (k.L, k.x.uh, k.y.uh) == (0.5, 2.0, 0.0)

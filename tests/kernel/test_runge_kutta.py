@@ -161,7 +161,7 @@ def test_a_stage_is_what_its_laws_say(name, x, b, held):
     row, links = Run(s, 1).row, s.arm.links
     m, z, now = row.m, row.s.a.z, row.s.a.now
     row.s.x.b = row.s.y.b = b
-    (q1, q2), (w1, w2) = (row.s.q1, row.s.q2), x[:2]
+    (q1, q2), (w1, w2) = (row.s.q[0], row.s.q[1]), x[:2]
     z.q1, z.q2, z.w1, z.w2 = q1, q2, w1, w2
     dx, dy, ex, ey, yx, yy, ydx, ydy = (0.1 * each for each in x[2:10])
     z.x.delta, z.x.rate, z.x.y, z.x.yrate = dx, ex, yx, ydx

@@ -242,8 +242,8 @@ def first_kick(run, friction, Fy, tau, w):
     m.friction, m.slip[:] = int(friction is not None), friction or (0.0, 0.0)
     for z in s.axis:
         z.Fy, z.Kn, z.n = z.old_Fy, z.old_Kn, z.old_n = Fy, 0.0, 1.0
-    s.w1, s.w2 = w
-    s.now.x.tau, s.now.y.tau = tau
+    s.w[0], s.w[1] = w
+    s.now.tau[:2] = tau
     sampled.across(m, s, k, m.dt)
     return k
 
@@ -258,14 +258,14 @@ def test_friction_and_clay_are_the_least_kinetic_energy_within_both(t, w, Fy):
 
     def kick(t):
         k = first_kick(run, None, 0.0, t, w)
-        return np.array([k.w1, k.w2])
+        return np.array([k.w[0], k.w[1]])
 
     free = kick(t)
     A = np.column_stack([kick((t[0] + 1.0, t[1])) - free, kick((t[0], t[1] + 1.0)) - free])
     u = np.reshape(first_kick(run, None, 0.0, t, w).u, (2, 2))  # of both links
     J = np.array([[u[0, 0] + u[1, 0], u[1, 0]], [u[0, 1] + u[1, 1], u[1, 1]]])
     k = first_kick(run, (0.3, 0.2), Fy, t, w)
-    after = np.array([k.w1, k.w2])
+    after = np.array([k.w[0], k.w[1]])
     # rates after the kick: free + A (friction - J' clay), of least energy w' A^-1 w
     half = np.linalg.cholesky(np.linalg.inv(A)).T
     G, most = np.column_stack((A, -A @ J.T)), np.array([0.3, 0.2, Fy + 1e-12, Fy + 1e-12])
@@ -278,7 +278,7 @@ def test_friction_and_clay_are_the_least_kinetic_energy_within_both(t, w, Fy):
             return
     np.testing.assert_allclose(after, expected, atol=1e-9 * (1.0 + np.abs(free).max()))
     if np.abs(expected).max() < 1e-13 and Fy > 1e-3 and best.optimality < 1e-12:
-        assert np.abs(k.slip1) <= 0.3 and np.abs(k.slip2) <= 0.2
+        assert np.abs(k.slip[0]) <= 0.3 and np.abs(k.slip[1]) <= 0.2
 
 
 def test_friction_beside_clay_elsewhere_is_that_without_it():

@@ -238,14 +238,14 @@ def test_what_is_no_signal_is_refused_by_name(make, field, told):
     "text, kw, field, told",
     [
         ("t,f_x,fy\n0,1,2\n", {}, "columns", "did you mean 'f_x'"),
-        ("t,fx,fy\n0,1,2\n0.1,abc,2\n", {}, "column fx", "line 3 of f.csv"),
+        ("t,fx,fy\n0,1,2\n0.1,abc,2\n", {}, "path", "line 3, column 'fx'"),
         ("t,fx,fy\n0,1\n", {}, "path", "line 2: must have 3 cells"),
-        ("t,fx,fy\n0,1,inf\n", {}, "column fy", "line 2 of f.csv"),
-        ("", {}, "path", "name its columns"),
+        ("t,fx,fy\n0,1,inf\n", {}, "path", "line 2, column 'fy'"),
+        ("", {}, "path", "empty"),
         ("t,fx,fy\n", {}, "path", "line of numbers"),
         ("t,fx,fy\n1,0,0\n0,0,0\n", {}, "samples.t[1]", "ascend"),
         ("t,fx,fy\n0,1,2\n", dict(columns=("t", "fx")), "columns", "three"),
-        ("0,1,2\n", {}, "path", "must name its columns"),
+        ("0,1,2\n", {}, "columns", "name its columns"),
     ],
 )
 def test_bad_files_are_refused_with_place_and_name(tmp_path, text, kw, field, told):
@@ -260,7 +260,8 @@ def test_columns_of_a_file_are_found_by_name(tmp_path):
     (tmp_path / "f.csv").write_text(text, encoding="utf-8", newline="")
     read = hc.Samples.csv(tmp_path / "f.csv", ("time", "force x", "force y"), outside="zero")
     assert read == hc.Samples((0.0, 0.5), ((1.0, 2.0), (3.0, 4.0)), outside="zero")
-    with pytest.raises(OSError):
+    assert read == hc.Samples.of(tmp_path / "f.csv", ("time", "force x", "force y"), outside="zero")
+    with pytest.raises(ParameterError, match="No such file"):
         hc.Samples.csv(tmp_path / "none.csv")
 
 
@@ -285,8 +286,15 @@ def test_functions_of_arrays_are_asked_once_and_others_time_by_time():
     np.testing.assert_allclose(odd(t)[:, 0], t)
 
 
-def test_a_file_in_another_encoding_is_refused(tmp_path):
+def test_a_unit_that_a_caller_states_goes_before_that_of_the_file(tmp_path):
     path = tmp_path / "force.csv"
-    path.write_bytes("t,fx,fy\n0,1,2\n".encode("utf-16"))
-    with pytest.raises(hc.ParameterError, match="UTF-8"):
-        hc.Samples.csv(path)
+    path.write_text("t,fx [N],fy_mN\n0,1,2\n")
+    read = hc.Samples.of(path, ("t", "fx", "fy"), units={"fx": "kN", "t": "ms"})
+    assert read.values == ((1000.0, 2e-3),)
+    for units, told in (
+        ({"fz": "N"}, "units = 'fz'"),
+        ({"fx": "N/m"}, "not in"),
+        ({"fx": "?"}, "fx"),
+    ):
+        with pytest.raises(ParameterError, match=told):
+            hc.Samples.of(path, ("t", "fx", "fy"), units=units)

@@ -12,7 +12,7 @@ from hapticclay.model import support
 from tests.views.test_clay_laws import CLAYS
 
 METHODS = {
-    "fast": {},
+    "fast": dict(control="continuous"),
     "accurate": dict(integrator="accurate"),
     "held": dict(control="sampled"),
     "physical": dict(control="sampled", render="physical"),
@@ -36,7 +36,10 @@ PARTS = {
     "inertia shaping": dict(inertia_shaping=True),
     "signals": dict(muscle=hc.Multisine(rms=(0.5, 0.5), high=3.0)),
     "own controller": dict(controller=hc.Controller("tests.model.test_support:still")),
+    "joint law": dict(controller=hc.JointPD((1.0, 1.0), (0.1, 0.1))),
+    "arm from a file": dict(arm=hc.MjcfArm("planar_2r", friction=(0, 0), torque_limit=(5.0, 5.0))),
 }
+BY_CONTROLLER = ("own controller", "joint law", "arm from a file")
 
 
 def still(t, q, w, f, state, params):
@@ -86,7 +89,7 @@ def clay_of(names):
 def scene_of(*names):
     """A short run with these traits, sampled where it is said or hardware needs it."""
     method = next((x for x in names if x in METHODS), None)
-    sampled = any(x in WIRED or x == "own controller" for x in names)
+    sampled = any(x in WIRED or x in BY_CONTROLLER for x in names)
     kw = dict(METHODS[method] if method else METHODS["held"] if sampled else {})
     wires = [WIRED[x] for x in names if x in WIRED]
     if wires:
@@ -96,6 +99,8 @@ def scene_of(*names):
     if any(x.name in names for x in support.LAWS):
         kw["clay"] = clay_of(names)
     kw |= dict(t_max=0.003, dt=1e-4, length=None)
+    if "arm" in kw:
+        return hc.Scenario(force=(1.0, 0.2), **(PARTS["own controller"] | kw))
     return hc.Scenario(force=(1.0, 0.2), start=(0.019, 0.0), **kw)
 
 
@@ -103,6 +108,7 @@ NAMES = [x.name for x in (*support.LAWS, *support.PARTS)]
 IMPOSSIBLE = {frozenset(x) for x in (
     ("yield by axis", "yield along the motion"),  # one or the other
     ("smooth", "yield along the motion"),  # smooth laws do not yield, and both axes must be alike
+    ("own controller", "joint law"),  # one or the other
 )}  # fmt: skip
 CELLS = [
     (a, b)

@@ -356,11 +356,13 @@ def test_command_reads_columns_and_writes_table_json_and_figure(tmp_path, capsys
     record = hc.simulate(hc.constant_cut(t_max=8.0, dt=1e-3)).save(tmp_path / "run")
     assert app.main(["fit", str(record), "--out", str(out), "--time", "5.5", "8"]) == 0
     assert "viscous: " in capsys.readouterr().out
+    two = tmp_path / "two.csv"
+    two.write_text("t,p,fx,fy\n0,1,2,3\n")
     for more, words in (
         ([str(file), "--columns", "t=time", "p=position", "f=force"], "columns.p = 'position'"),
         ([str(file), "--columns", "x=time"], "must be one of t, p, f"),
-        ([str(record), "--columns", "t=time"], "is for a CSV file"),
-        ([str(file)], "give --columns t=time p=pos f=force"),
+        ([str(record), "--columns", "t=time"], "is for a log"),
+        ([str(two)], "columns.f = 'f': must name the column of force, one of fx, fy; give --col"),
         ([*columns, "--axis", "y"], "axis = 'y': is for a record"),
         ([str(record / "scenario.toml")], "not a scenario"),
         ([str(record), "--time", "7", "3"], "must ascend"),

@@ -47,11 +47,22 @@ def test_signals_page_runs(tmp_path):
     assert "at " in out
 
 
-@pytest.mark.parametrize("page", ["materials.md", "fit.md"])
+PRINTING = "materials.md", "fit.md", "logs.md", "pair_log.md", "pair.md", "replay.md"
+
+
+@pytest.mark.parametrize("page", PRINTING)
 def test_page_says_what_its_snippet_prints(page, tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / page).read_text(), re.S)
     out = printed_by(code, tmp_path)
     assert out.splitlines() == re.findall(r"print\(.*\)  # (.*)", code) != []
+
+
+@pytest.mark.parametrize("page", ["arm", "servo_gain", "mujoco_stable", "own_arm"])
+def test_pages_of_arms_print_what_they_say(page, tmp_path):
+    text = (ROOT / "docs" / f"{page}.md").read_text()
+    code = "\n".join(re.findall(r"```python\n(.*?)```", text, re.S))
+    said = [a or b for a, b in re.findall(r"print\(.*?\)  # (.*)|^# (.*)", code, re.M)]
+    assert printed_by(code, tmp_path).splitlines() == said != []
 
 
 SYMPTOMS = ("wall_vibrates", "fast_enough", "theory_and_practice", "stick_slip") + (

@@ -66,6 +66,10 @@ def test_a_term_has_one_first_page():
     "phrase, page",
     [
         ("virtual wall vibrates", "wall_vibrates"),
+        ("MuJoCo says stable", "mujoco_stable"),
+        ("which gain", "servo_gain"),
+        ("URDF", "own_arm"),
+        ("friction compensation", "arm"),
         ("zero-order hold", "wall_vibrates"),
         ("stick-slip", "stick_slip"),
         ("time-domain passivity", "passivity"),

@@ -13,7 +13,7 @@ import hapticclay as hc
 from benchmarks import arm_integrators
 from hapticclay.arms.mechanism import Linear
 from hapticclay.theory.joint_families import Circle, Family
-from hapticclay.theory.joint_gains import Study, delay_left, joint_loop
+from hapticclay.theory.joint_gains import Study, delay_crossing, joint_loop
 from hapticclay.theory.wall_limits import stiffness_band
 from tests.oracles import joints
 
@@ -150,30 +150,88 @@ def test_published_gains_of_a_leader():
     assert found.joint == "joint7" and found.stable
 
 
-@pytest.mark.parametrize("kind", ["armature", "damping"])
-def test_sensitivities_are_slopes_of_limits(kind):
-    """Central differences of whole limits, whose error is of second order in the step."""
-    arm, column = leader(), ("armature", "damping").index(kind)
+LIMITS = {  # of joint 7 and of the whole arm, and the attribute with their slopes
+    "Kp": (lambda x: x.Kp[6, 1], lambda x: x.Kp_change[6]),
+    "Kd": (lambda x: x.Kd[6, 1], lambda x: x.Kd_change[6]),
+    "least Kd": (lambda x: x.Kd[6, 0], lambda x: -x.friction_slope_change[6]),
+    "slope": (lambda x: x.friction_slope[6], lambda x: x.friction_slope_change[6]),
+    "scale": (lambda x: x.scale, lambda x: [*x.scale_change[6], x.scale_per_delay]),
+    "Kd_scale": (
+        lambda x: x.Kd_scale[1],
+        lambda x: [*x.Kd_scale_change[1, 6], x.Kd_scale_per_delay[1]],
+    ),
+    "least Kd_scale": (
+        lambda x: x.Kd_scale[0],
+        lambda x: [*x.Kd_scale_change[0, 6], x.Kd_scale_per_delay[0]],
+    ),
+    "delay": (lambda x: x.delay_left, lambda x: [*x.delay_change[6], -1.0]),
+    "rate": (lambda x: x.slowest_rate, lambda x: [*x.rate_change[6], x.rate_per_delay]),
+}
+
+
+def around(arm, kind, share):
+    """Values of a number of joint 7 or of the delay, and weights of a derivative."""
+    if kind == "delay":
+        h = share * 2e-3
+        return [(arm, 2e-3 + i * h) for i in (0, 1, 2)], np.array([-1.5, 2.0, -0.5]) / h
+    values = np.array(getattr(arm, kind))
+    h = share * values[6]
+    sides = [tuple(values + s * h * np.eye(7)[6]) for s in (1, -1)]
+    return [(replace(arm, **{kind: x}), 2e-3) for x in sides], np.array([0.5, -0.5]) / h
+
+
+@pytest.mark.parametrize("column, kind", [(0, "armature"), (1, "damping"), (2, "delay")])
+def test_sensitivities_are_slopes_of_limits(column, kind):
+    """Differences of whole limits, of second order: a tenth of the step, a hundredth of the error.
+
+    Half of that is asked for, down to 1e-5, where the lowest rate, found to 1e-9, ends.
+    """
+    arm = leader()
     found = hc.theory.joint_limits(arm, LEADER_LAW, 2e-3, 2e-3)
-    for j in (1, 6):
-        base = np.array(getattr(arm, kind))
-        h = 1e-3 * max(base[j], 0.01)
-        sides = [
-            hc.theory.joint_limits(
-                replace(arm, **{kind: tuple(base + s * h * np.eye(7)[j])}), LEADER_LAW, 2e-3, 2e-3
-            )
-            for s in (1, -1)
-        ]
-        slope = (sides[0].Kp[j, 1] - sides[1].Kp[j, 1]) / (2 * h)
-        assert found.Kp_change[j, column] == pytest.approx(slope, rel=2e-3)
-        slope = (sides[0].scale - sides[1].scale) / (2 * h)
-        assert found.scale_change[j, column] == pytest.approx(slope, rel=2e-3, abs=1e-4)
+    errors = []
+    for share in (1e-2, 1e-3):
+        values, weights = around(arm, kind, share)
+        limits = [hc.theory.joint_limits(x, LEADER_LAW, 2e-3, delay) for x, delay in values]
+        errors.append(
+            {
+                name: sum(w * of(x) for w, x in zip(weights, limits, strict=True))
+                / slopes(found)[column]
+                - 1.0
+                for name, (of, slopes) in LIMITS.items()
+            }
+        )
+    for name, error in errors[1].items():
+        assert abs(error) < max(0.02 * abs(errors[0][name]), 1e-5), name
+
+
+@pytest.mark.parametrize("column, kind", [(0, "armature"), (1, "damping"), (2, "delay")])
+def test_sensitivities_of_a_wall(column, kind):
+    """As above, to 1e-4 at a step of 1e-3."""
+    arm = leader()
+
+    def wall(arm, delay):
+        return hc.theory.wall_limit(arm, "x", 5.0, hc.Operator(0.25, 2.0, 6.0), 2e-3, delay)
+
+    found, (values, weights) = wall(arm, 2e-3), around(arm, kind, 1e-3)
+    slope = sum(w * wall(*x).K for w, x in zip(weights, values, strict=True))
+    assert [*found.K_change[6], found.K_per_delay][column] == pytest.approx(slope, rel=1e-4)
+    assert any(x.startswith("gravity: fed forward") for x in found.assumed)
+
+
+def test_a_crossing_on_the_grid_is_not_missed():
+    """An eigenvalue on the circle is an angle of the grid: its size there is 1 to the bit."""
+    damping = np.array(leader().damping) + 1e-3 * np.eye(7)[1]
+    study = Study(leader(damping=tuple(damping)), LEADER_LAW, 2e-3, 2e-3)
+    left = delay_crossing(study.loop).change
+    assert study.remade(delay=2e-3 + left * (1.0 - 1e-6)).stable()
+    assert not study.remade(delay=2e-3 + left * (1.0 + 1e-6)).stable()
+    assert left == pytest.approx(1.3479e-3, rel=1e-4)
 
 
 def test_delay_and_rate_left_are_where_stability_ends():
     study = Study(leader(), LEADER_LAW, 2e-3, 2e-3)
     found = hc.theory.joint_limits(leader(), LEADER_LAW, 2e-3, 2e-3)
-    left = delay_left(study.loop)
+    left = delay_crossing(study.loop).change
     assert left == found.delay_left
     for share, stable in ((1 - 1e-6, True), (1 + 1e-6, False)):
         assert study.remade(delay=2e-3 + share * left).stable() is stable
@@ -185,7 +243,7 @@ def test_a_long_delay_is_found_on_the_circle():
     one = np.ones((1, 1))
     linear = Linear(one, 8.0 * one, 0 * one, 0 * one, 0 * one, np.zeros((3, 1)))
     loop = joint_loop(linear, hc.JointPD([9.0], [0.0]), 5e-3, 0.0, False)
-    left = delay_left(loop)
+    left = delay_crossing(loop).change
     # continuous: P e^{-s T}/(s (s + 8)) with a phase of -pi at |.| = 1; the hold adds Ts/2
     w = math.sqrt((-64.0 + math.sqrt(64.0**2 + 4.0 * 81.0)) / 2.0)
     assert left + 2.5e-3 == pytest.approx((math.pi / 2 - math.atan(w / 8.0)) / w, rel=1e-5)

@@ -1,0 +1,79 @@
+"""Logs of Parquet and Arrow, with the layout of LeRobot's data sets."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import needing
+from ..files import DAMAGED, parse_json, read_text
+from .array_tables import ArrayTable, Container
+
+ABOVE = 4  # folders above a file in which LeRobot keeps meta/info.json
+
+
+def parquet(field: str, path: Path, table: str = "") -> ArrayTable:
+    """A Parquet file: columns of numbers, and of lists of equal length."""
+    with needing("a Parquet log", "pyarrow", "logs"):
+        import pyarrow.parquet as pq
+
+    return _of_arrow(field, path, pq.read_table(path), "Parquet", table)
+
+
+def feather(field: str, path: Path, table: str = "") -> ArrayTable:
+    """An Arrow file."""
+    with needing("an Arrow log", "pyarrow", "logs"):
+        import pyarrow.feather as pf
+
+    return _of_arrow(field, path, pf.read_table(path), "Arrow", table)
+
+
+def _of_arrow(field: str, path: Path, found: Any, form: str, table: str) -> ArrayTable:
+    data: dict[str, Any] = {}
+    units: dict[str, str] = {}
+    for column in found.schema:
+        values = _values(found.column(column.name))
+        if values is not None:
+            data[column.name] = values
+        for key in (b"unit", b"units"):
+            if key in (column.metadata or {}):
+                units[column.name] = column.metadata[key].decode("utf-8", "replace")
+    return Container.of(field, path, form, data, units, _feature_names(path)).table(table)
+
+
+def _values(column: Any) -> np.ndarray | None:
+    """The numbers of a column, (n,) or (n, k); None for words, or lists of several lengths."""
+    import pyarrow as pa
+
+    if (
+        pa.types.is_list(column.type)
+        or pa.types.is_fixed_size_list(column.type)
+        or (pa.types.is_large_list(column.type))
+    ):
+        chunks = [chunk.flatten() for chunk in column.chunks]
+        whole = np.concatenate([np.asarray(x) for x in chunks]) if chunks else np.zeros(0)
+        n = len(column)
+        lengths = {len(x) for x in column.to_pylist() if x is not None} if n else set()
+        return whole.reshape(n, -1) if len(lengths) == 1 and whole.dtype.kind in "biuf" else None
+    values = column.to_numpy()
+    return values if values.dtype.kind in "biufmM" else None
+
+
+def _feature_names(path: Path) -> dict[str, Sequence[str]]:
+    """Names of the parts of a column, from LeRobot's meta/info.json above the file."""
+    for folder in path.resolve().parents[:ABOVE]:
+        info = folder / "meta" / "info.json"
+        if not info.is_file():
+            continue
+        with contextlib.suppress(*DAMAGED):
+            features = parse_json(read_text(info))["features"]
+            names = {k: x.get("names") for k, x in features.items()}
+            flat = {
+                k: next(iter(x.values())) if isinstance(x, dict) else x for k, x in names.items()
+            }
+            return {k: [str(y) for y in x] for k, x in flat.items() if isinstance(x, list)}
+    return {}

@@ -1,0 +1,46 @@
+cimport cython
+from .records cimport Kick, Model, State
+from ..formulas cimport cmath as math
+from . cimport hand
+from . cimport joint_friction
+from . cimport kick
+
+cdef void sense(Model m, State s) noexcept nogil
+cdef void gather(Model m, double *J, double *A) noexcept nogil
+cdef void turn(Model m, Kick k, double *rates, double *g, double h) noexcept nogil
+cdef void put_centripetal(Model m, Kick k) noexcept nogil
+cdef void place(Model m, Kick k, double *of) noexcept nogil
+cdef void handle_velocity(Model m, Kick k, double *rates) noexcept nogil
+cdef void handle_at(Model m, State s, Kick k) noexcept nogil
+cdef (double, double) place_after(Model m, State s, double after) noexcept nogil
+cdef void before_kick(Model m, State s, Kick k) noexcept nogil
+@cython.locals(change=cython.double)
+cdef void from_event(Model m, State s, Kick k) noexcept nogil
+cdef void at_event(Model m, Kick k) noexcept nogil
+cdef void move_under(Model m, State s, Kick k) noexcept nogil
+@cython.locals(x=cython.double)
+cdef void put_momentum(Model m, State s, Kick k) noexcept nogil
+@cython.locals(load=cython.double)
+cdef bint is_touched(Model m, Kick k) noexcept nogil
+cdef void drive_alone(Model m, Kick k) noexcept nogil
+@cython.locals(x=cython.double)
+cdef void drive(Model m, State s, Kick k) noexcept nogil
+@cython.locals(x=cython.double)
+cdef double damping(Model m, double *w, long i) noexcept nogil
+cdef void factor_inertia(Model m, double h) noexcept nogil
+@cython.locals(x=cython.double)
+cdef void factor(double *A, long at, long n) noexcept nogil
+cdef void solve(double *L, long of, double *x, long at, long n) noexcept nogil
+cdef void put_mobility(Model m, Kick k) noexcept nogil
+@cython.locals(x=cython.double)
+cdef double mobility(Model m, long i, long j) noexcept nogil
+cdef void eliminate(Kick k, double d) noexcept nogil
+@cython.locals(x=cython.double)
+cdef void answer(Model m, Kick k) noexcept nogil
+cdef void put_rates_after(Model m, Kick k) noexcept nogil
+cdef void sensed_handle(Model m, State s, Kick k) noexcept nogil
+cdef void prepare_sensor(Model m, State s, Kick k) noexcept nogil
+cdef double force_along_z(Model m, Kick k, double fx, double fy, double ax, double ay) noexcept nogil
+cdef void step(Model m, State s, Kick k, double h) noexcept nogil
+cdef long width(Model m) noexcept nogil
+cdef void write(Model m, State s, Kick k, double share) noexcept nogil

@@ -1,0 +1,69 @@
+"""What goes between a leader and a follower, and how late it is."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from ..arguments import part
+from ..errors import Bound, ParameterError
+
+WAYS = ("there", "back")  # leader to follower, follower to leader
+KINDS = ("position-position", "position-force", "four-channel", "waves")
+
+
+@part("link.")
+class Link:
+    """The link of a pair: what is sent at each control sample, and when it arrives.
+
+    Attributes:
+        kind: "position-position": each arm follows the other; "position-force": the follower
+            follows, the leader feels the force measured at the follower's handle; "four-channel":
+            positions and forces both ways; "waves": wave variables, with the follower's joint law
+            behind them.
+        delay: one-way delays (there, back) [s], 0 to 10; one number for both. Waves are read at
+            control samples: their delay counts as the next whole number of samples, at least one.
+        jitter: largest further delay of a packet [s], 0 to 10; the receiver waits for it.
+        loss: share of packets that is lost, 0 to 0.9; the receiver holds the last one.
+        scale: (motion, force): the follower's motion per leader's, and the leader's force per
+            follower's; > 0, at most 1e6.
+        rates: whether rates are sent with positions.
+        impedance: wave impedance of each joint [N.m.s/rad], > 0, at most 1e9; one number for all;
+            None for the follower's Kd, which matches it: then no wave is reflected.
+    """
+
+    kind: Literal["position-position", "position-force", "four-channel", "waves"] = KINDS[0]
+    delay: Annotated[float | tuple[float, float], Bound(0.0, 10.0, "s", names=WAYS)] = 0.0
+    jitter: Annotated[float, Bound(0.0, 10.0, "s")] = 0.0
+    loss: Annotated[float, Bound(0.0, 0.9)] = 0.0
+    scale: Annotated[
+        tuple[float, float], Bound(0.0, 1e6, above=True, names=("motion", "force"))
+    ] = (1.0, 1.0)
+    rates: bool = True
+    impedance: Annotated[
+        float | tuple[float, ...] | None, Bound(0.0, 1e9, "N.m.s/rad", above=True)
+    ] = None
+
+    def __post_init__(self):
+        if self.impedance is not None and self.kind != "waves":
+            raise ParameterError("link.impedance", self.impedance, "must be None without waves")
+        if self.kind == "waves" and not self.rates:
+            raise ParameterError("link.rates", self.rates, "must be True: a wave is made of rates")
+        if self.kind == "position-position" and self.scale[1] != 1.0:
+            bound = "must be 1 for position-position: the gains of the leader's law set its force"
+            raise ParameterError("link.scale.force", self.scale[1], bound)
+
+    @property
+    def delays(self) -> tuple[float, float]:
+        """Delays there and back, without jitter and loss [s]."""
+        return self.delay if isinstance(self.delay, tuple) else (self.delay, self.delay)
+
+    def further_delay(self, Ts: float) -> dict[str, float]:
+        """What jitter and loss add to the delay each way [s], by cause.
+
+        The receiver waits for the latest packet; a lost one holds the last for loss/(1 - loss)
+        samples in the mean.
+
+        Args:
+            Ts: control sample [s].
+        """
+        return {"jitter": self.jitter, "loss": Ts * self.loss / (1.0 - self.loss)}

@@ -1,0 +1,188 @@
+"""A leader and a follower: two arms, their joint laws, hands, what the follower touches, a link."""
+
+from __future__ import annotations
+
+import math
+import os
+from typing import Annotated, Any, Literal
+
+import numpy as np
+
+from ..arguments import checked, part
+from ..arms.joint_law import JointPD, checked_law
+from ..arms.mechanism import Linear
+from ..arms.mjcf_arm import MjcfArm
+from ..errors import Bound, ParameterError
+from ..formulas.constants import B_MAX
+from ..model import arm as closed_form
+from ..model.arm import Arm
+from ..model.operator import Operator
+from ..model.spring import STIFFNESS_MAX
+from . import pair_files
+from .link import Link
+from .virtual_wall import Device
+
+NOMINAL = (0.5 * math.pi, -0.5 * math.pi)  # [rad] elbow square, link 2 along x
+UNKNOWN_ROTOR = "rotor inertia (armature): part of the mass or inertia that is given"
+AXES = ("x", "y", "z")
+
+
+@part("contact.")
+class Contact:
+    """What the follower touches and never leaves: clay, a wall or an object.
+
+    Attributes:
+        K: stiffness [N/m], 0 to 1e9.
+        B: damping [N.s/m], 0 to 1e9; clay has this alone.
+        mass: mass that moves along [kg], 0 to 1e6.
+        axis: axis of the world along which it acts; None for all, and for an arm of one axis.
+    """
+
+    K: Annotated[float, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
+    B: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 0.0
+    mass: Annotated[float, Bound(0.0, 1e6, "kg")] = 0.0
+    axis: Literal["x", "y", "z"] | None = None
+
+
+@part("pair.", eq=False)
+class Pair:
+    """A leader that a hand moves, a follower that touches, and the link between them.
+
+    Both hosts sample at the same instants. What a host computes acts `delay` after the sample; what
+    depends on the other arm acts later by the link's delay.
+
+    Attributes:
+        leader: arm from a file at its pose; the two-link arm in closed form, elbow square; or a
+            device of one axis. A rotary device has kg.m^2 and N.m.s/rad in place of kg and N.s/m,
+            as have its law, hand and contact.
+        follower: likewise, with as many joints.
+        law: gains of the leader's joints, which pull it towards the follower.
+        follower_law: gains of the follower's joints; None for the leader's.
+        link: what is sent, and how late.
+        Ts: control sample of both hosts [s], 1e-6 to 1.
+        delay: from a sample to the torque computed from it [s], 0 to 10.
+        leader_operator: the hand at the leader's handle; None for none.
+        follower_clay: what the follower touches; None for free motion.
+        axes: for each joint of the follower, the number of the leader's joint that it follows, from
+            1 on, negative for the opposite sense; None for the same order.
+    """
+
+    leader: MjcfArm | Arm | Device
+    follower: MjcfArm | Arm | Device
+    law: JointPD
+    link: Link = Link()
+    follower_law: JointPD | None = None
+    Ts: Annotated[float, Bound(1e-6, 1.0, "s")] = 1e-3
+    delay: Annotated[float, Bound(0.0, 10.0, "s")] = 0.0
+    leader_operator: Operator | None = None
+    follower_clay: Contact | None = None
+    axes: Annotated[tuple[int, ...] | None, Bound(-1000, 1000)] = None
+
+    def __post_init__(self):
+        n, m = len(joint_names(self.leader)), len(joint_names(self.follower))
+        if n != m:
+            bound = f"must have {n} joints, as the leader has, not {m}"
+            raise ParameterError("pair.follower", self.follower, bound)
+        checked_law(self.law, joint_names(self.leader))
+        checked_law(self.laws[1], joint_names(self.follower))
+        if self.axes is not None and sorted(map(abs, self.axes)) != list(range(1, n + 1)):
+            bound = f"must name each of 1 to {n} once, with a sign"
+            raise ParameterError("pair.axes", self.axes, bound)
+        impedance = self.link.impedance
+        if isinstance(impedance, tuple) and len(impedance) != n:
+            bound = f"must be one number, or {n}, one for each joint"
+            raise ParameterError("link.impedance", impedance, bound)
+        if self.link.kind == "waves" and impedance is None and not min(self.laws[1].Kd) > 0.0:
+            bound = "must be given where the follower has joints without Kd"
+            raise ParameterError("link.impedance", None, bound)
+        if self.link.kind == "waves" and self.laws[1].runs == "drive":
+            bound = "must be 'host' with waves: the follower's gains act behind them"
+            raise ParameterError("law.runs", "drive", bound)
+
+    def __repr__(self) -> str:
+        names = (type(arm).__name__ for arm in self.arms)
+        return f"<Pair {' and '.join(names)}: {self.link.kind}, {1.0 / self.Ts:g} Hz>"
+
+    @property
+    def arms(self) -> tuple[Any, Any]:
+        """Leader and follower."""
+        return self.leader, self.follower
+
+    @property
+    def laws(self) -> tuple[JointPD, JointPD]:
+        """Joint laws of leader and follower."""
+        return self.law, self.follower_law or self.law
+
+    @property
+    def n(self) -> int:
+        """Number of joints of each arm."""
+        return len(self.law)
+
+    @property
+    def mapping(self) -> np.ndarray:
+        """Direction in which the follower's joints follow the leader's, shape (n, n)."""
+        out = np.zeros((self.n, self.n))
+        for i, j in enumerate(map(int, self.axes or range(1, self.n + 1))):
+            out[i, abs(j) - 1] = math.copysign(1.0, j)
+        return out
+
+    @classmethod
+    @checked
+    def load(cls, file: str | os.PathLike[str]) -> Pair:
+        """Reads a pair from a TOML or JSON file.
+
+        Tables [leader] and [follower] hold the fields of an arm: `file` for one from a file, l1,
+        l2, I1, I2 for the two-link arm, mass and damper for a device; without [follower], both
+        arms are alike. [law], [follower_law], [link], [leader_operator] and [follower_clay] hold
+        the fields of those parts; `gains` in a law names a file of gains. Names of files count from
+        the folder of the pair's file.
+
+        Args:
+            file: .toml or .json.
+
+        Raises:
+            ParameterError: the file cannot be read, or holds no pair.
+        """
+        return pair_files.read_pair(file, cls)
+
+
+def joint_names(arm: Any) -> tuple[str, ...]:
+    """Names of the joints of an arm of a pair."""
+    if isinstance(arm, MjcfArm):
+        return arm.names
+    return ("joint1", "joint2") if isinstance(arm, Arm) else ("x",)
+
+
+def linear_arm(arm: Any) -> Linear:
+    """An arm of a pair, linear about its pose."""
+    if isinstance(arm, MjcfArm):
+        return arm.linear()
+    if isinstance(arm, Arm):
+        inertia = np.array([[arm.I1 + arm.I2, arm.I2], [arm.I2, arm.I2]])
+        u1x, u1y, u2x, u2y = closed_form.jacobians(*NOMINAL, arm.links)
+        jacobian = np.array([[u1x + u2x, u2x], [u1y + u2y, u2y], [0.0, 0.0]])
+        return _plain(inertia, np.zeros((2, 2)), jacobian)
+    one, along = np.ones((1, 1)), np.array([[1.0], [0.0], [0.0]])
+    return _plain(arm.mass * one, arm.damper * one, along)
+
+
+def _plain(inertia: np.ndarray, damping: np.ndarray, jacobian: np.ndarray) -> Linear:
+    none = np.zeros_like(inertia)
+    return Linear(inertia, damping, none, none, none, jacobian)
+
+
+def compensated(arm: Any, law: JointPD) -> bool:
+    """Whether the host of an arm feeds gravity forward."""
+    if law.gravity is not None:
+        return law.gravity
+    return isinstance(arm, MjcfArm) and arm.gravity == "compensated"
+
+
+def notes_of(arm: Any) -> tuple[str, ...]:
+    """What an arm leaves open, a sentence each."""
+    return arm.notes if isinstance(arm, MjcfArm) else (UNKNOWN_ROTOR,)
+
+
+def has_handle(arm: Any) -> bool:
+    """Whether an arm has a handle."""
+    return not isinstance(arm, MjcfArm) or arm.site is not None

@@ -1,0 +1,205 @@
+"""What a log holds: columns, units, ranges, rate, gaps, and the command to go on with."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arguments import checked, named
+from ..columns.finding import candidates
+from ..columns.log import Log
+from ..columns.stamps import Stamps
+from ..display import table_of
+from ..errors import ParameterError
+from ..results import Result
+from ..units import parse_unit, si_unit
+from .even_columns import unwrapped
+from .outliers import runs_of, times
+
+FEW = 3  # places that a remark names
+STUCK = 0.02  # share of the rows, in a run at the largest or smallest value, that is suspicious
+TREATED = "identify and fit say what they do about it (docs/logs.md)"
+LEAST = 20  # rows in which columns are judged
+
+
+@named
+@dataclass(frozen=True, eq=False, repr=False)
+class LogReport(Result):
+    """What a log holds.
+
+    Attributes:
+        log: the log.
+        time: name of the column of time; "" where none or several can be meant.
+        table: name, unit, range and remark of each column.
+        stamps: the column of time; None without one.
+        warnings: what is suspicious, one sentence each.
+        commands: commands to go on with.
+    """
+
+    drawn_by = "hapticclay.views.log_plots:log_plot"
+    written_as = "columns"
+    printed = {"columns": ()}
+
+    log: Log
+    time: str
+    table: dict[str, list[Any]]
+    stamps: Stamps | None
+    warnings: tuple[str, ...]
+    commands: tuple[str, ...]
+
+    def headline(self) -> str:
+        """Name, format, rows and rate, in one line."""
+        parts = [f"{self.log.path.name}: {self.log.table.form}", f"{self.log.rows} rows"]
+        if self.stamps is not None and self.stamps.step > 0.0:
+            parts.append(f"{self.stamps.duration:.6g} s at {self.stamps.rate:.6g} Hz")
+        return ", ".join(parts)
+
+    def tables(self) -> dict[str, dict[str, Any]]:
+        """The columns, and the stamps of time."""
+        stamps = {} if self.stamps is None else {"time": _stamps_table(self.stamps)}
+        return {"columns": self.table, **stamps}
+
+    def remarks(self) -> list[str]:
+        """Stamps of time, notes of the reader, warnings and commands."""
+        lines = [self.headline()]
+        if self.stamps is not None:
+            table = _stamps_table(self.stamps)
+            lines.append("time: " + ", ".join(f"{k} {v[0]:.6g}" for k, v in table.items()))
+        lines += [f"note: {x}" for x in self.log.table.notes]
+        lines += [f"warning: {x}" for x in self.warnings]
+        return [*lines, *(f"go on with: {x}" for x in self.commands)]
+
+
+def _stamps_table(stamps: Stamps) -> dict[str, list[float]]:
+    return {
+        "step [s]": [stamps.step],
+        "jitter [s]": [stamps.jitter],
+        "even [%]": [100.0 * stamps.even],
+        "gaps": [len(stamps.gaps)],
+        "repeated": [len(stamps.repeats)],
+        "backward": [len(stamps.backward)],
+    }
+
+
+@checked
+def log_report(log: Log) -> LogReport:
+    """What a log holds, with what is suspicious in it.
+
+    Args:
+        log: the log.
+    """
+    found = candidates(log, "time")
+    time = found[0] if found else ""
+    stamps, warnings = None, []
+    if time:
+        stamps, warnings = _stamps(log, time)
+    if stamps is not None:
+        warnings += [_beside(log, stamps, other) for other in found[1:]]
+    if stamps is not None and stamps.even < 1.0:
+        share = 100.0 * (1.0 - stamps.even)
+        warnings.append(f"{share:.3g} % of the steps are off by more than 5 %: {TREATED}")
+    rows = []
+    for place, head in enumerate(log.table.heads):
+        size, unit, faults = _unit(log, place)
+        x = log.table.loose_numbers(place)
+        kept = x[np.isfinite(x)] * size
+        low, high = (float(kept.min()), float(kept.max())) if len(kept) else (math.nan, math.nan)
+        rows.append((head.text, unit, low, high, "; ".join([*faults, *_remarks(x)])))
+    table = table_of(("column", "unit", "lowest", "highest", "remarks"), rows)
+    return LogReport(log, time, table, stamps, tuple(warnings), tuple(_commands(log, time)))
+
+
+def _stamps(log: Log, time: str) -> tuple[Stamps | None, list[str]]:
+    """The stamps of a log, and what is suspicious in them."""
+    try:
+        stamps = Stamps(log.values(time, ("s",)))
+    except ParameterError as error:
+        return None, [f"{time} is no time: {error.bound}"]
+    t, out = stamps.t, []
+    if len(gaps := stamps.gaps):
+        longest = float(np.max(stamps.steps))
+        out.append(f"{len(gaps)} gaps, the longest {longest:.4g} s, at t = {times(t[gaps])} s")
+    if len(again := stamps.repeats):
+        out.append(f"{len(again)} stamps repeat the one before, at t = {times(t[again])} s")
+    if len(back := stamps.backward):
+        out.append(f"{len(back)} stamps go back, at t = {times(t[back])} s")
+    if stamps.step > 0.0 and not 1.0 <= stamps.rate <= 1e5:
+        out.append(f"a rate of {stamps.rate:.3g} Hz: is the time in seconds?")
+    return stamps, out
+
+
+def _beside(log: Log, stamps: Stamps, other: str) -> str:
+    """How another clock runs beside that of the stamps."""
+    x = log.table.loose_numbers(log.place(other)) * log.size(log.place(other))[0]
+    good = np.isfinite(x)
+    if np.count_nonzero(good) < LEAST or np.ptp(x[good]) == 0.0:
+        return f"{other} is no clock"
+    rate, start = np.polyfit(stamps.t[good], x[good], 1)
+    rest = x[good] - start - rate * stamps.t[good]
+    return (
+        f"a second clock, {other}: it runs {1e6 * (rate - 1.0):+.0f} ppm fast beside the first, "
+        f"with a deviation of {np.std(rest):.2g} s; the first is used"
+    )
+
+
+def _unit(log: Log, place: int) -> tuple[float, str, list[str]]:
+    """Size of the unit of a column, the unit in words, and what is wrong with it."""
+    head = log.table.heads[place]
+    try:
+        size, powers = log.size(place)
+    except ParameterError as error:
+        return 1.0, head.unit, [error.bound.partition("; ")[2] or error.bound]
+    if powers is None:
+        words = [text for _, text in head.last_words() if parse_unit(text)]
+        return 1.0, f"{words[0]}, by its name?" if words else "none: SI", []
+    si = si_unit(powers)
+    return size, si if size == 1.0 else f"{head.unit or 'stated'}, shown in {si}", []
+
+
+def _remarks(x: np.ndarray) -> list[str]:
+    """What is suspicious in a column."""
+    good = np.isfinite(x)
+    if not good.any():
+        return ["no numbers"]
+    out = []
+    if missing := int(np.count_nonzero(~good)):
+        out.append(f"{missing} missing")
+    if (span := float(np.ptp(x[good]))) == 0.0:
+        return [*out, "constant"]
+    if len(x) < LEAST:
+        return out
+    ends = [np.isfinite(x) & (x == edge) for edge in (x[good].min(), x[good].max())]
+    stuck = sum(b - a for end in ends for a, b in runs_of(end) if b - a > FEW)
+    if stuck > STUCK * len(x) and len(np.unique(x[good])) > LEAST:
+        out.append("limited?")
+    if len(at := unwrapped(x[good])[2]):
+        return [*out, f"begins again {len(at)} times: an encoder that wraps"]
+    steps = np.abs(np.diff(x[good]))
+    if np.count_nonzero(steps > 0.5 * span) in range(1, max(len(x) // 50, 2)):
+        out.append(f"{np.count_nonzero(steps > 0.5 * span)} jumps of more than half the range")
+    return out
+
+
+def _commands(log: Log, time: str) -> list[str]:
+    """Commands that the columns suit."""
+    found = {x: candidates(log, x) for x in ("force", "position", "command")}
+    file = shlex.quote(str(log.path))
+    if not time or not found["position"]:
+        return []
+    place = found["position"][0]
+    out = []
+    for meaning, what in (("command", "G"), ("force", "S")):
+        inputs = [x for x in found[meaning] if x != place]
+        if inputs:
+            pairs = {"t": time, "input": inputs[0], "output": place}
+            words = " ".join(shlex.quote(f"{key}={name}") for key, name in pairs.items())
+            out.append(f"hapticclay identify {file} --what {what} --columns {words}")
+    if forces := [x for x in found["force"] if x != place]:
+        pairs = {"t": time, "p": place, "f": forces[0]}
+        words = " ".join(shlex.quote(f"{key}={name}") for key, name in pairs.items())
+        out.append(f"hapticclay fit {file} --columns {words}")
+    return out

@@ -1,0 +1,201 @@
+"""A log of a leader and its follower, one axis each: positions, torques, force on the follower."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..arguments import checked, named
+from ..columns.log import open_log
+from ..display import brief
+from ..errors import ParameterError, array_of, choice
+from ..files import MOST_TABLE, read_bytes
+from .measurement import LARGEST_VALUE, LEAST_ROWS, _check_sampling
+
+COLUMNS = {  # columns of a log and their contents
+    "t": "time [s]",
+    "leader": "position of the leader [rad]",
+    "follower": "position of the follower [rad]",
+    "leader_torque": "torque of the leader's motor [N.m]",
+    "follower_torque": "torque of the follower's motor [N.m]",
+    "force": "torque of the follower on what it touches [N.m]",
+}
+UNITS = {"t": ("s",), "leader": ("rad",), "follower": ("rad",)} | {
+    name: ("N.m",) for name in ("leader_torque", "follower_torque", "force")
+}
+SPELLINGS = {  # of a column's name in lower case without its sign
+    "t": ("t", "time"),
+    "leader": ("leader", "master", "x_m", "q_m", "x_l", "q_l"),
+    "follower": ("follower", "slave", "x_s", "q_s", "x_f", "q_f"),
+    "leader_torque": ("leader_torque", "tau_rm", "tau_m", "tau_l"),
+    "follower_torque": ("follower_torque", "tau_rs", "tau_s", "tau_f"),
+    "force": ("force", "f_e", "fe", "tau_e"),
+}
+OPTIONAL = ("leader_torque", "force")
+LABEL = re.compile(r"[^()]*\(([^()]*)\)\s*(.*)")  # "Lever positions (rad) master, slave"
+
+
+@named
+@dataclass(frozen=True, eq=False)
+class PairLog:
+    """A measured leader and its follower, one axis each, evenly sampled.
+
+    Torques count along the positions: a torque of 1 N.m pushes its side forward.
+
+    Attributes:
+        t: time [s], (n,), n >= 100; no step differs from the mean one by more than 5 %.
+        leader: position of the leader [rad], (n,).
+        follower: position of the follower [rad], (n,).
+        follower_torque: torque of the follower's motor [N.m], (n,).
+        leader_torque: torque of the leader's motor [N.m], (n,); None if it was not logged.
+        force: torque of the follower on what it touches [N.m], (n,); None without a sensor.
+        name: name in titles and files.
+
+    Raises:
+        ParameterError: a column is not such an array, is too short or not finite; the motion is
+            constant; the sampling is uneven.
+    """
+
+    def __repr__(self) -> str:
+        return brief(self)
+
+    t: np.ndarray
+    leader: np.ndarray
+    follower: np.ndarray
+    follower_torque: np.ndarray
+    leader_torque: np.ndarray | None = None
+    force: np.ndarray | None = None
+    name: str = "pair"
+
+    def __post_init__(self):
+        for column in COLUMNS:
+            value = getattr(self, column)
+            if value is not None or column not in OPTIONAL:
+                object.__setattr__(self, column, _column(column, value, self.t))
+        _check_sampling(self.t)
+        for column in ("leader", "follower", "follower_torque"):
+            value = getattr(self, column)
+            if np.ptp(value) == 0.0:
+                raise ParameterError(column, float(value[0]), "must change; it is constant")
+
+    @property
+    def Ts(self) -> float:
+        """Mean step [s]."""
+        return float(self.t[-1] - self.t[0]) / (len(self.t) - 1)
+
+    @classmethod
+    @checked
+    def load(cls, path: str | Path, columns: Mapping[str, str] | None = None) -> PairLog:
+        """Reads a log: text, a binary format, or a scope of Simulink in a MATLAB file.
+
+        A column is found by its name: leader or master, follower or slave, tau_rm and tau_rs for
+        the torques, F_e for the force, and `COLUMNS`. A minus ahead of a name means that the column
+        holds the negative, as "-tau_rm" in a plot of forces against each other.
+
+        Args:
+            path: the file.
+            columns: names in the file of t, leader, follower, leader_torque, follower_torque and
+                force, with a minus for a column that holds the negative.
+
+        Raises:
+            ParameterError: the file cannot be read, a column is missing, or as `PairLog`.
+        """
+        for key in dict(columns or {}):
+            choice("columns", key, tuple(COLUMNS))
+        file = Path(path)
+        try:
+            table = (file.suffix.lower() == ".mat" and _scope(file)) or _sheet(file, columns or {})
+        except OSError as error:
+            bound = f"must be a readable file ({error.strerror})"
+            raise ParameterError("path", str(path), bound) from None
+        return cls(**_chosen(file, table, columns or {}), name=file.stem)
+
+
+def _column(name: str, value: Any, t: Any) -> np.ndarray:
+    x = array_of(name, value, "must be an array of numbers")
+    if x.ndim != 1 or len(x) < LEAST_ROWS:
+        bound = f"must be one column of {LEAST_ROWS} samples or more"
+        raise ParameterError(name, f"shape {x.shape}", bound)
+    if len(x) != len(t):
+        raise ParameterError(name, f"{len(x)} samples", f"must be as long as t, {len(t)} samples")
+    if not np.all(np.abs(x) <= LARGEST_VALUE):
+        row = int(np.argmin(np.abs(x) <= LARGEST_VALUE))
+        bound = f"must be a finite number within +- {LARGEST_VALUE:g}"
+        raise ParameterError(f"{name}[{row}]", float(x[row]), bound)
+    return x
+
+
+# ---- files ---------------------------------------------------------------------------------------
+
+
+def _chosen(
+    file: Path, table: Mapping[str, np.ndarray], columns: Mapping[str, str]
+) -> dict[str, np.ndarray]:
+    """Columns of a log from those of a file, each with its sign."""
+    plain = {_plain(name): name for name in table}
+    out = {}
+    for key in COLUMNS:
+        words = (columns[key],) if key in columns else SPELLINGS[key]
+        found = next((w for w in words if _plain(w) in plain), None)
+        if found is None and key in columns:
+            choice(f"columns.{key}", columns[key], tuple(table))
+        if found is None and key not in OPTIONAL:
+            bound = f"must have the {COLUMNS[key]}; name its column {key}=NAME of"
+            raise ParameterError("columns", str(file), f"{bound} {', '.join(table)}")
+        if found is not None:
+            own = plain[_plain(found)]
+            negative = found.startswith("-") if key in columns else own.startswith("-")
+            out[key] = -table[own] if negative else table[own]
+    return out
+
+
+def _plain(name: str) -> str:
+    return name.strip().lstrip("-").strip().lower()
+
+
+def _sheet(file: Path, columns: Mapping[str, str]) -> dict[str, np.ndarray]:
+    """The columns of a CSV file that a log has, by name without its unit."""
+    log = open_log("path", file)
+    wanted = {_plain(w): key for key, words in SPELLINGS.items() for w in words}
+    wanted |= {_plain(w): key for key, w in columns.items()}
+    found = {}
+    for i, head in enumerate(log.table.heads):
+        if _plain(head.name) in wanted:
+            size, _ = log.size(i, UNITS[wanted[_plain(head.name)]])
+            found[head.name] = size * log.table.numbers(i)
+    return found
+
+
+def _scope(file: Path) -> dict[str, np.ndarray]:
+    """The columns of a scope of Simulink by the names in its labels; none for other files."""
+    from scipy.io import loadmat
+
+    read_bytes(file, MOST_TABLE)  # refuses what is too large
+    try:
+        with warnings.catch_warnings(action="ignore"):  # of names that stand twice
+            data = loadmat(file, simplify_cells=True)
+    except OSError:
+        raise
+    except Exception:  # noqa: BLE001  # whatever SciPy raises on another file
+        return {}
+    scopes = [x for x in data.values() if isinstance(x, dict) and {"time", "signals"} <= x.keys()]
+    tables = [_signals(x) for x in scopes if np.size(x["time"]) >= LEAST_ROWS]
+    return max(tables, key=len, default={})  # a file may hold smaller ones, such as a reference
+
+
+def _signals(scope: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    out = {"time": np.asarray(scope["time"], dtype=float).ravel()}
+    signals = scope["signals"]
+    for i, signal in enumerate([signals] if isinstance(signals, dict) else signals, 1):
+        values = np.asarray(signal["values"], dtype=float).reshape(len(out["time"]), -1)
+        label = LABEL.fullmatch(str(signal.get("label", "")).strip())
+        names = [x.strip() for x in label[2].split(",") if x.strip()] if label else []
+        for j, column in enumerate(values.T):
+            out[names[j] if j < len(names) else f"signal {i}.{j + 1}"] = column
+    return out

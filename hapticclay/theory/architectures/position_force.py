@@ -1,0 +1,28 @@
+"""Position-force: the follower follows, the leader feels what the follower's handle pushes with.
+
+    tau_l = -phi T' F_f,  tau_f = Kp (mu T q_l - q_f) + Kd (mu T w_l - w_f)
+
+F_f is the measured torque of the follower on what it touches, phi scales force. The leader has no
+law of its own: its gains take no part. After Lawrence, Stability and Transparency in Bilateral
+Teleoperation, IEEE Trans. Robotics and Automation 9(5), 1993: the two-channel case C1, C2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...scene.pair import Pair
+from .control import Control, without_states
+from .position_position import references
+
+
+def controls(pair: Pair) -> tuple[Control, Control]:
+    """Controls of leader and follower."""
+    one = np.eye(pair.n)
+    return without_states(one, references(pair)[0]), without_states(one, reflected(pair))
+
+
+def reflected(pair: Pair) -> np.ndarray:
+    """Torque on the leader per (q, v, F) of the follower: the force that it pushes with."""
+    none = np.zeros((pair.n, 2 * pair.n))
+    return np.hstack([none, -pair.link.scale[1] * pair.mapping.T])

@@ -1,0 +1,159 @@
+"""From a pair to the linear loop of its theory."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..arms.joint_law import JointPD
+from ..arms.mechanism import Linear
+from ..arms.mjcf_arm import MjcfArm
+from ..errors import ParameterError
+from ..model.operator import NO_HAND
+from ..scene import pair as pairs
+from ..scene.pair import Contact, Pair
+from .architectures import ARCHITECTURES
+from .joint_gains import IGNORED, joint_loop
+from .joint_loop import JointLoop
+from .joint_walls import held_arm
+from .linear_loop import whole_samples
+from .pair_end import End, Load
+from .pair_loop import PairLoop
+
+STILL = 1e-9  # [m] least motion of the handle per joint rate
+
+
+class Build:
+    """A pair as linear ends, remade with other delays, gains and friction.
+
+    Attributes:
+        pair: the pair.
+        architecture: what its link makes of it.
+    """
+
+    def __init__(self, pair: Pair):
+        self.pair, self.architecture = pair, ARCHITECTURES[pair.link.kind]
+        self._arms = _leader_arm(pair), _follower_arm(pair)
+
+    @cached_property
+    def delays(self) -> tuple[float, float]:
+        """Delays of the link there and back, with jitter and loss [s]."""
+        link, Ts = self.pair.link, self.pair.Ts
+        more = sum(link.further_delay(Ts).values())
+        there, back = link.delays
+        return there + more, back + more
+
+    def loop(
+        self,
+        delays: tuple[float, float] | None = None,
+        gain: float = 1.0,
+        friction: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> PairLoop:
+        """The loop with delays of the link [s], a factor of all Kp, and slopes of the friction.
+
+        None stands for the pair's own.
+        """
+        pair = _scaled(self.pair, gain) if gain != 1.0 else self.pair
+        controls = self.architecture.controls(pair)
+        late = [self.samples(x) for x in (self.delays if delays is None else delays)]
+        shares = late[1][1], late[0][1]  # what arrives at the leader comes by the way back
+        ends = []
+        for i, (linear, load) in enumerate(self._arms):
+            loop = self._joint_loop(pair, i, linear, None if friction is None else friction[i])
+            ends.append(End(loop, load, controls[i], shares[i] * pair.Ts))
+        return PairLoop(ends[0], ends[1], late[0][0], late[1][0])
+
+    def samples(self, delay: float) -> tuple[int, float]:
+        """Whole samples of a delay of the link, and the share of one."""
+        whole, share = whole_samples(delay, self.pair.Ts)
+        if not self.architecture.whole:
+            return whole, share
+        return max(1, whole + (share > 0.0)), 0.0
+
+    def _joint_loop(
+        self, pair: Pair, i: int, linear: Linear, slopes: np.ndarray | None
+    ) -> JointLoop:
+        law, arm = pair.laws[i], pair.arms[i]
+        none = np.zeros(pair.n)
+        gains = (none, none) if i == 0 and not self.architecture.leader_law else None
+        known = pairs.compensated(arm, law)
+        loop = joint_loop(linear, law, pair.Ts, pair.delay, known, gains)
+        if slopes is None:
+            return loop
+        return loop.feeding(np.diag(none), np.diag(np.array(law.slopes) - slopes))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Joints of leader and follower."""
+        leader, follower = map(pairs.joint_names, self.pair.arms)
+        return (*leader, *follower)
+
+    def assumed(self) -> tuple[str, ...]:
+        """What the verdict rests on, a sentence each."""
+        pair, out = self.pair, []
+        for name, arm in zip(("leader", "follower"), pair.arms, strict=True):
+            out += [f"{name}: {note}" for note in pairs.notes_of(arm)]
+        if pair.leader is pair.follower:
+            out = [f"both arms: {note}" for note in pairs.notes_of(pair.leader)]
+        if pair.link.jitter or pair.link.loss:
+            out.append("jitter and loss: as the constant delay that they come to")
+        return (*out, IGNORED)
+
+
+def _scaled(pair: Pair, gain: float) -> Pair:
+    """The pair with a factor on Kp of both laws."""
+
+    def stiffer(law: JointPD) -> JointPD:
+        return replace(law, Kp=tuple(gain * x for x in law.Kp))
+
+    laws = [stiffer(law) for law in pair.laws]
+    return replace(pair, law=laws[0], follower_law=laws[1])
+
+
+def _leader_arm(pair: Pair) -> tuple[Linear, Load]:
+    """The leader with the hand at its handle."""
+    linear = pairs.linear_arm(pair.leader)
+    if pair.leader_operator is None:
+        return linear, _load(linear.jacobian[:0], NO_HAND.mass, NO_HAND.damper, NO_HAND.spring)
+    _check_handle(pair.leader)
+    hand = pair.leader_operator
+    load = _load(linear.jacobian, hand.mass, hand.damper, hand.spring)
+    return held_arm(linear, hand), load
+
+
+def _follower_arm(pair: Pair) -> tuple[Linear, Load]:
+    """The follower with what it touches at its handle."""
+    linear, contact = pairs.linear_arm(pair.follower), pair.follower_clay
+    if contact is None:
+        return linear, _load(linear.jacobian[:0], 0.0, 0.0, 0.0)
+    _check_handle(pair.follower)
+    load = _load(_touched(linear, contact), contact.mass, contact.B, contact.K)
+    return linear._replace(
+        inertia=linear.inertia + load.inertia,
+        damping=linear.damping + load.damping,
+        stiffness=linear.stiffness + load.stiffness,
+    ), load
+
+
+def _touched(linear: Linear, contact: Contact) -> np.ndarray:
+    """Rows of the Jacobian along which a contact acts."""
+    if contact.axis is None:
+        return linear.jacobian
+    along = linear.jacobian[pairs.AXES.index(contact.axis)]
+    if not np.abs(along).max() > STILL:
+        bound = "must be one along which the follower's handle can move"
+        raise ParameterError("contact.axis", contact.axis, bound)
+    return along[None]
+
+
+def _load(rows: np.ndarray, mass: float, damper: float, spring: float) -> Load:
+    square = rows.T @ rows
+    return Load(mass * square, damper * square, spring * square)
+
+
+def _check_handle(arm: Any) -> None:
+    if isinstance(arm, MjcfArm):
+        arm.check_handle()

@@ -1,0 +1,215 @@
+"""At which delays of its link a pair is stable, without states for messages on their way.
+
+What goes around is H(z) = H_l H_f, and with N samples there and back an eigenvalue z of the pair is
+where an eigenvalue of H is z^N. So it lies on the unit circle where an eigenvalue of H has size 1,
+and N = arg/theta. With N growing it leaves the circle where that size falls with theta, and enters
+where it rises: the number of unstable eigenvalues at any N follows from that at the least one. Rest
+(z = 1) is crossed where steady motion loses its resistance, which is linear in N. Where an
+eigenvalue of H is larger than 1 at z = -1, more and more eigenvalues of the pair come up there.
+"""
+
+from __future__ import annotations
+
+import cmath
+import itertools
+import math
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from . import joint_crossings
+from .joint_loop import AT_REST, MOST_STATES, ROUNDING, near_resonances
+from .pair_loop import PairLoop
+
+SLOWEST = 1e-4  # [rad] least angle of the search
+TURN = 1e-6  # of an angle: of differences
+EVEN, BY_FACTORS = 300, 300  # angles of the search
+REAL = 1e-9  # imaginary part over size of an eigenvalue that counts as real
+AXIS = 1e-6  # of a sample: how long an eigenvalue on the negative axis is one
+NO_SIZE = 1e-300
+AROUND = 9  # angles around an edge of another loop
+TOPS, REFINED = 16, 30  # eigenvalues that are refined, and rounds of it
+
+
+class Edge(NamedTuple):
+    """A number of samples there and back at which eigenvalues cross the circle.
+
+    Attributes:
+        samples: N, a real number.
+        theta: their angle [rad]; 0 for steady motion.
+        change: of the number of unstable eigenvalues.
+    """
+
+    samples: float
+    theta: float
+    change: int
+
+
+class Delays:
+    """A pair at all whole delays of its link.
+
+    Attributes:
+        loop: the pair with the least of them, one sample more than it was given where its steady
+            motion meets no resistance without delay.
+        least: samples there and back in it.
+    """
+
+    def __init__(self, loop: PairLoop):
+        self.loop = loop.between(loop.there + 1, loop.back) if loop.free else loop
+        self.least = self.loop.there + self.loop.back
+
+    @cached_property
+    def unstable(self) -> int:
+        """Unstable eigenvalues at the least delay."""
+        return int(np.sum(np.abs(self.loop.eigenvalues) > 1.0 + ROUNDING))
+
+    @cached_property
+    def angles(self) -> np.ndarray:
+        """Angles of the search."""
+        even = np.linspace(0.0, math.pi, EVEN + 1)[1:]
+        found = [even, np.geomspace(SLOWEST, 1.0, BY_FACTORS)]
+        if self.loop.states <= MOST_STATES // 3:
+            found.append(near_resonances(self.loop.eigenvalues))
+            found.append(near_resonances(self.loop.open_poles()))
+        every = np.concatenate(found)
+        return np.unique(every[(every >= SLOWEST) & (every <= math.pi)])
+
+    @cached_property
+    def _crossings(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Angles at which an eigenvalue of H has size 1, its argument, and how its size moves."""
+        theta, x = joint_crossings.zeros(self.loop.around, self.angles, _log_size)
+        slope = np.array([self._slope(*each) for each in zip(theta, x, strict=True)])
+        return theta, np.angle(x), slope
+
+    def _slope(self, theta: float, x: complex) -> float:
+        sides = []
+        for turn in (1.0 - TURN, 1.0 + TURN):
+            values = np.linalg.eigvals(self.loop.around(np.array([turn * theta])))[0]
+            sides.append(abs(values[np.argmin(np.abs(values - x))]))
+        return sides[1] - sides[0]
+
+    def edges(self, most: float) -> list[Edge]:
+        """Edges above the least delay, up to a number of samples there and back, sorted."""
+        out = [edge for edge in self._of_steady_motion() if edge.samples <= most]
+        out += self._at_nyquist(most)
+        for theta, argument, slope in zip(*self._crossings, strict=True):
+            turn = 2.0 * math.pi
+            first = math.ceil((self.least * theta - argument) / turn - 1e-12)
+            last = math.floor((most * theta - argument) / turn)
+            change = 2 if slope < 0.0 else -2
+            samples = [float((argument + turn * k) / theta) for k in range(first, last + 1)]
+            out += [Edge(x, float(theta), change) for x in samples]
+        return sorted(out)
+
+    def _at_nyquist(self, most: float) -> list[Edge]:
+        """Where eigenvalues come up at z = -1, outside the circle: on the axis, then as pairs."""
+        values = np.linalg.eigvals(self.loop.around(np.array([math.pi])))[0]
+        out = []
+        for x in values[np.abs(values) > 1.0]:
+            argument = float(np.angle(x)) / math.pi
+            if on_axis := abs(x.imag) <= REAL * abs(x):
+                argument = round(argument)
+            first = math.floor((self.least - argument) / 2.0) + 1
+            for k in range(first, math.floor((most - argument) / 2.0) + 1):
+                at = argument + 2.0 * k
+                sides = (at - AXIS, at + AXIS) if on_axis else (at, at)
+                out += [Edge(side, math.pi, 1) for side in sides]
+            if on_axis and (self.least - argument) % 2 == 0:
+                out.append(Edge(self.least + AXIS, math.pi, 1))
+        return out
+
+    def _of_steady_motion(self) -> list[Edge]:
+        """Where steady motion loses or finds its resistance."""
+        if not self.loop.structural:
+            return []
+        here = self.loop.drag()
+        later = self.loop.between(self.loop.there + 1, self.loop.back).drag()
+        values = np.linalg.eigvals(np.linalg.pinv(here) @ (here - later))
+        real = values[(np.abs(values.imag) <= REAL * np.abs(values)) & (values.real > REAL)]
+        return [self._steady_edge(1.0 / x) for x in real.real.tolist()]
+
+    def _steady_edge(self, more: float) -> Edge:
+        """The edge a number of samples beyond the least."""
+        loop = self.loop.between(self.loop.there + more, self.loop.back)
+        return Edge(self.least + more, 0.0, loop.steady_trend())
+
+    def count(self, samples: float) -> int:
+        """Unstable eigenvalues at a number of samples there and back."""
+        return self.unstable + sum(edge.change for edge in self.edges(samples))
+
+    def first(self, most: float) -> Edge | None:
+        """The edge at which the pair, stable at the least delay, turns unstable; None for none."""
+        return next((edge for edge in self.edges(most) if edge.change > 0), None)
+
+    def near(self, edge: Edge) -> Edge:
+        """The edge of this loop nearest to one of another loop."""
+        if edge.theta == 0.0:
+            found = self._of_steady_motion() or [edge]
+            return min(found, key=lambda x: abs(x.samples - edge.samples))
+        angles = np.unique(np.minimum(edge.theta * np.linspace(0.9, 1.1, AROUND), math.pi))
+        theta, x = joint_crossings.zeros(self.loop.around, angles, _log_size)
+        if not len(theta):
+            return edge
+        turns = np.round((edge.samples * theta - np.angle(x)) / (2.0 * math.pi))
+        samples = (np.angle(x) + 2.0 * math.pi * turns) / theta
+        i = int(np.abs(samples - edge.samples).argmin())
+        return Edge(float(samples[i]), float(theta[i]), edge.change)
+
+    def largest(self, samples: float) -> complex:
+        """The largest eigenvalue at a large number of samples there and back.
+
+        With many samples eigenvalues lie near |z| = |eigenvalue of H|^(1/N), dense along the
+        circle: where the phase of z^N fits. The largest, and those on the real axis, are refined by
+        z = (eigenvalue of H)^(1/N).
+        """
+        starts = sorted(self._starts(samples), key=lambda x: -abs(x[1]))[:TOPS]
+        found = [_refined(self.loop, *start, samples) for start in starts]
+        found += self._on_axis(samples)
+        return max((z for z in found if abs(z - 1.0) > AT_REST), key=abs, default=0j)
+
+    def _starts(self, samples: float) -> list[tuple[complex, complex, int]]:
+        """Points z of the circle, eigenvalues of H there, and turns of z^N."""
+        values = joint_crossings.branches(np.linalg.eigvals(self.loop.around(self.angles)))
+        out = []
+        for branch in values.T:
+            turns = (samples * self.angles - np.unwrap(np.angle(branch))) / (2.0 * math.pi)
+            for i, (a, b) in enumerate(itertools.pairwise(turns.tolist())):
+                for k in range(math.ceil(a), math.floor(b) + 1):
+                    theta = float(np.interp(k, (a, b), self.angles[i : i + 2]))
+                    out.append((cmath.exp(1j * theta), complex(branch[i]), k))
+        return out
+
+    def _on_axis(self, samples: float) -> list[complex]:
+        """Real eigenvalues between 0.7 and 1.3."""
+        off = np.geomspace(AT_REST, 0.3, BY_FACTORS // 4)
+        found: list[complex] = []
+        for z in (1.0 - off, 1.0 + off):
+            values = np.linalg.eigvals(self.loop.around(-1j * np.log(z.astype(complex))))
+            values = joint_crossings.branches(values)
+            gap = _log_size(values) - samples * np.log(z)[:, None]
+            real = (np.abs(values.imag) <= REAL * np.abs(values)) & (values.real > 0.0)
+            i, branch = np.nonzero((gap[:-1] * gap[1:] < 0.0) & real[:-1] & real[1:])
+            starts = zip(z[i].tolist(), values[i, branch].tolist(), strict=True)
+            found += [_refined(self.loop, at, x, 0, samples) for at, x in starts]
+        return found
+
+
+def _refined(loop: PairLoop, z: complex, x: complex, turns: int, samples: float) -> complex:
+    """The eigenvalue near z, where x is an eigenvalue of H, with some turns of z^N."""
+    for _ in range(REFINED):
+        values = np.linalg.eigvals(loop.around(np.array([-1j * cmath.log(z)])))[0]
+        x = complex(values[np.argmin(np.abs(values - x))])
+        argument = cmath.phase(x)
+        extra = round((samples * cmath.phase(z) - argument) / (2.0 * math.pi)) if turns else 0
+        before, z = (
+            z,
+            cmath.exp((math.log(abs(x)) + 1j * (argument + 2.0 * math.pi * extra)) / samples),
+        )
+        if abs(z - before) <= 1e-14:
+            break
+    return z
+
+
+def _log_size(values: np.ndarray) -> np.ndarray:
+    return np.log(np.maximum(np.abs(values), NO_SIZE))

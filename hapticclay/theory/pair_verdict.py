@@ -1,0 +1,360 @@
+"""How much delay, gain and friction feed-forward a leader and a follower carry."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..arguments import checked, named
+from ..results import Result, Tables
+from ..scene.pair import Pair
+from . import joint_crossings, roots
+from .joint_families import NEAR
+from .joint_loop import MOST_STATES, grid
+from .pair_build import Build
+from .pair_delays import SLOWEST, Delays, Edge
+from .pair_loop import PairLoop
+
+LATEST = 2.0  # [s] largest one-way delay that is looked for
+LARGE = 500  # states of a map whose eigenvalues are not worth their time
+ROUNDS = 12  # of the share of a sample that a delay has
+HIGHEST = 64.0  # factor of all Kp up to which gains are tried
+EXACT = 1e-4  # relative width within which that factor is found
+COARSE = 1e-2  # the same for a map that is LARGE
+STEADY = 1e-6  # [Hz] of a motion that does not oscillate
+OPPOSED, COMMON = "arms opposed", "common motion"
+
+
+@named
+@dataclass(frozen=True, repr=False, eq=False)
+class PairLimits(Result):
+    """What a pair of arms carries at its pose, all joints of both arms coupled.
+
+    Attributes:
+        kind: kind of the link.
+        names: joints of the leader, shape (n,).
+        stable: whether the pair is stable as it is.
+        radius: largest eigenvalue of the map over a sample, without those of rest: below 1 if
+            stable. With more than 1,200 states, that found nearest to the circle or beyond it.
+        structural: directions in which the free pair rests anywhere, whose eigenvalues are 1.
+        delay: largest one-way delay of the link, both ways alike, from none on [s]; 0 if the pair
+            is unstable without delay; inf for more than 2 s.
+        present: one-way delay of the link, the mean of both ways, with jitter and loss [s].
+        frequency: of the motion that turns unstable first, or is unstable now [Hz].
+        joint: joint that moves most in it.
+        mode: that motion in words.
+        gain: largest factor of all Kp of both arms, from the present ones on; inf for more than 64;
+            0 if the pair is unstable.
+        slope: largest slope of a friction fed forward at one joint of both arms, Fc k + Fv, with
+            none at the others [N.m.s/rad], shape (n,).
+        law_slope: slopes of the leader's law [N.m.s/rad], shape (n,).
+        friction_fraction: largest share of the law's friction that may be fed forward; inf if it
+            feeds none, or any.
+        budget: what the torque from the other arm is late by, cause by cause, one way [s].
+        Ts: control sample [s].
+        assumed: what the verdict rests on, and what it leaves out, a sentence each.
+    """
+
+    drawn_by = "hapticclay.views.pair_plots:limits_plot"
+    written_as = "pair"
+    printed = {"joints": (), "budget": ()}
+    formats = {"radius": ".8g"}
+
+    kind: str
+    names: tuple[str, ...]
+    stable: bool
+    radius: float
+    structural: int
+    delay: float
+    present: float
+    frequency: float
+    joint: str
+    mode: str
+    gain: float
+    slope: np.ndarray
+    law_slope: np.ndarray
+    friction_fraction: float
+    budget: Mapping[str, float]
+    Ts: float
+    assumed: tuple[str, ...] = ()
+
+    @property
+    def delay_left(self) -> float:
+        """Delay that the link may have besides the present one [s]; 0 if the pair is unstable."""
+        return max(0.0, self.delay - self.present) if self.stable else 0.0
+
+    def headline(self) -> str:
+        """The verdict in one line."""
+        at = f"{self.kind}, {1.0 / self.Ts:.4g} Hz, link {1e3 * self.present:.3g} ms"
+        verdict = "stable" if self.stable else f"unstable (radius {self.radius:.6g})"
+        return f"{verdict} at {at}: {self._delay_words()}; {self.mode}"
+
+    def _delay_words(self) -> str:
+        if math.isinf(self.delay):
+            return "any delay of the link"
+        if self.delay == 0.0:
+            return "no delay of the link is stable"
+        return f"one-way delay up to {1e3 * self.delay:.3g} ms"
+
+    def remarks(self) -> Sequence[str]:
+        """What to change first, and what the verdict rests on."""
+        return [self.headline(), f"first to change: {self.advice()}", *self.assumed]
+
+    def advice(self) -> str:
+        """The change that gains most, or that brings an unstable pair back."""
+        if 0.0 < self.friction_fraction < 1.0:
+            over = self.names[int(np.argmax(self.law_slope - self.slope))]
+            return (
+                f"friction feed-forward ({over} most), to {self.friction_fraction:.0%} of it or "
+                "less: an undamped common motion, which Kp and Kd cannot touch"
+            )
+        cause, late = max(self.budget.items(), key=lambda x: x[1])
+        lateness = f"{cause} ({1e3 * late:.3g} ms each way"
+        if self.stable and math.isinf(self.delay):
+            return "nothing: no delay of the link is too long"
+        if self.stable:
+            return f"{lateness}; {1e3 * self.delay_left:.3g} ms are left)"
+        if self.delay > 0.0:
+            return f"{lateness}; the link may have {1e3 * self.delay:.3g} ms)"
+        return f"gains and rate: unstable without any delay of the link; {lateness})"
+
+    def tables(self) -> Tables:
+        """Friction of each joint, lateness by cause, and the whole pair."""
+        joints: dict[str, Any] = {
+            "joint": self.names,
+            "friction slope [N.m.s/rad]": self.law_slope,
+            "largest slope [N.m.s/rad]": self.slope,
+        }
+        budget: dict[str, Any] = {
+            "cause": [*self.budget, "all"],
+            "late [ms]": [1e3 * x for x in (*self.budget.values(), sum(self.budget.values()))],
+        }
+        pair: dict[str, Any] = {
+            "stable": self.stable,
+            "radius": self.radius,
+            "structural": self.structural,
+            "delay [s]": self.delay,
+            "delay left [s]": self.delay_left,
+            "frequency [Hz]": self.frequency,
+            "joint": self.joint,
+            "mode": self.mode,
+            "largest factor of all Kp": self.gain,
+            "largest share of friction": self.friction_fraction,
+        }
+        return {"joints": joints, "budget": budget, "pair": {k: [v] for k, v in pair.items()}}
+
+
+@checked
+def pair_limits(pair: Pair) -> PairLimits:
+    """Whether a leader and a follower are stable, and how much delay, gain and friction they carry.
+
+    Both arms are linear about their poses, with hand and contact; torques are held between samples.
+    With messages on their way as states the map over a sample is exact; where they are many,
+    eigenvalues are counted on the unit circle instead. Eigenvalues of rest (z = 1), which a free
+    pair has by its structure, are no verdict.
+
+    Args:
+        pair: two arms, their laws and the link between them.
+
+    Raises:
+        ParameterError: an arm has no handle for its hand or contact.
+    """
+    study = Study(pair)
+    z, joint, mode = study.motion()
+    frequency = abs(cmath.phase(z)) / (2.0 * math.pi * pair.Ts)
+    slope, fraction = study.friction()
+    return PairLimits(
+        pair.link.kind,
+        study.build.names[: pair.n],
+        study.stable,
+        study.radius,
+        study.loop.structural,
+        study.delay(),
+        study.present,
+        frequency,
+        joint,
+        ", ".join([mode, *([f"{frequency:.3g} Hz"] if frequency > STEADY else []), joint]),
+        study.gain(),
+        slope,
+        np.array(pair.law.slopes),
+        fraction,
+        study.budget(),
+        pair.Ts,
+        study.build.assumed(),
+    )
+
+
+class Study:
+    """A pair, its loop, and what is asked of it."""
+
+    def __init__(self, pair: Pair):
+        self.pair, self.build = pair, Build(pair)
+        self.loop = self.build.loop()
+        self.present = 0.5 * sum(self.build.delays)
+
+    # ---- the verdict
+
+    @cached_property
+    def worst(self) -> complex:
+        """The largest eigenvalue."""
+        if self.loop.states <= MOST_STATES:
+            return complex(self.loop.eigenvalues[0])
+        return self._delays(1.0).largest(self.loop.there + self.loop.back)
+
+    @cached_property
+    def radius(self) -> float:
+        """Its size."""
+        return abs(self.worst)
+
+    @cached_property
+    def stable(self) -> bool:
+        """Whether the pair is stable."""
+        return self.holds(1.0)
+
+    def holds(self, gain: float) -> bool:
+        """Whether it is stable with a factor of all Kp."""
+        if self.loop.states <= LARGE:
+            return self.build.loop(gain=gain).stable()
+        return self._delays(gain).count(self.loop.there + self.loop.back) == 0
+
+    def _delays(self, gain: float) -> Delays:
+        """The pair at all whole delays of its link, with the shares of its own."""
+        shares = [self.build.samples(x)[1] * self.pair.Ts for x in self.build.delays]
+        return Delays(self.build.loop((shares[0], shares[1]), gain))
+
+    def gain(self) -> float:
+        """Largest factor of all Kp."""
+        if not self.stable:
+            return 0.0
+        low = 1.0
+        while self.holds(2.0 * low):
+            low *= 2.0
+            if low >= HIGHEST:
+                return math.inf
+        exact = EXACT if self.loop.states <= LARGE else COARSE
+        return roots.bisect(self.holds, low, 2.0 * low, exact)[0]
+
+    # ---- delay
+
+    @cached_property
+    def edge(self) -> tuple[Delays, Edge] | None:
+        """The least delay at which the pair turns unstable; None for none, or if it always is."""
+        found = self.without
+        edge = None if found.unstable else found.first(2.0 * LATEST / self.pair.Ts)
+        if edge is None:
+            return None
+        if self.build.architecture.whole:
+            return found, edge
+        for _ in range(ROUNDS):
+            share = self._late(found, edge) % self.pair.Ts
+            found = Delays(self.build.loop((share, share)))
+            before, edge = edge, found.near(edge)
+            if abs(edge.samples - before.samples) <= 1e-9 * before.samples:
+                break
+        return found, edge
+
+    @cached_property
+    def without(self) -> Delays:
+        """The pair without delay of the link."""
+        return Delays(self.build.loop((0.0, 0.0)))
+
+    def _late(self, found: Delays, edge: Edge) -> float:
+        """One-way delay of an edge [s]."""
+        return 0.5 * edge.samples * self.pair.Ts + found.loop.leader.share
+
+    def delay(self) -> float:
+        """Largest one-way delay [s]."""
+        if self.edge is None:
+            return 0.0 if self.without.unstable else math.inf
+        late = self._late(*self.edge)
+        if self.build.architecture.whole:
+            return (math.ceil(late / self.pair.Ts) - 1.0) * self.pair.Ts
+        return late
+
+    # ---- the motion that turns unstable
+
+    def motion(self) -> tuple[complex, str, str]:
+        """An eigenvalue, the joint that moves most, and how both arms move in it."""
+        if self.stable and self.edge is not None:
+            found, edge = self.edge
+            half = 0.5 * edge.samples
+            loop, z = found.loop.between(half, half), cmath.exp(1j * edge.theta)
+        else:
+            loop, z = self.loop, self.worst
+        leader, follower = loop.shape(z)
+        n, T = self.pair.n, self.pair.mapping
+        energy = [
+            np.abs(q) * np.sqrt(np.diag(end.loop.inertia))
+            for q, end in zip((leader, follower), loop.ends, strict=True)
+        ]
+        most = int(np.concatenate(energy).argmax())
+        i = most - n if most >= n else int(np.abs(T[:, most]).argmax())
+        along = (np.conj((T @ leader)[i]) * follower[i]).real
+        return z, self.build.names[most], COMMON if along > 0.0 else OPPOSED
+
+    # ---- friction that is fed forward
+
+    def friction(self) -> tuple[np.ndarray, float]:
+        """Largest slope at each joint of both arms, and largest share of the laws' friction."""
+        n, none = self.pair.n, np.zeros(self.pair.n)
+        loop = self.build.loop(friction=(none, none))
+        if not self._is_stable(loop):
+            return none, 0.0
+        angles = grid(loop)
+        angles = angles[angles >= SLOWEST]  # below, rounding hides the imaginary part
+        rates, steady = loop.responses(angles)[1], loop.drift()
+        partner = np.abs(self.pair.mapping).argmax(0)
+
+        def largest(weights: np.ndarray) -> float:
+            """Largest factor of slopes at some joints of both arms."""
+            used = np.flatnonzero(weights)
+            if not len(used):
+                return math.inf
+            at, gains = np.ix_(used, used), weights[used][:, None]
+
+            def response(theta: np.ndarray) -> np.ndarray:
+                found = rates if theta is angles else loop.responses(theta)[1]
+                return gains * found[:, at[0], at[1]]
+
+            crossed = [-x.change for x in joint_crossings.crossings(response, angles)]
+            every = crossed + _steady(gains * steady[at])
+            return min([x for x in every if x > 0.0], default=math.inf)
+
+        unit = np.eye(2 * n)
+        slope = np.array([largest(unit[j] + unit[n + partner[j]]) for j in range(n)])
+        return slope, largest(np.concatenate([law.slopes for law in self.pair.laws]))
+
+    def _is_stable(self, loop: PairLoop) -> bool:
+        if loop.states <= LARGE:
+            return loop.stable()
+        least = self.build.loop((loop.follower.share, loop.leader.share), friction=(0.0, 0.0))
+        return Delays(least).count(loop.there + loop.back) == 0
+
+    # ---- where the time goes
+
+    def budget(self) -> dict[str, float]:
+        """What the torque from the other arm is late by, one way, by cause [s]."""
+        pair, link = self.pair, self.pair.link
+        causes = {
+            "hold (Ts/2)": 0.5 * pair.Ts,
+            "computation": pair.delay,
+            "network": 0.5 * sum(link.delays),
+            **link.further_delay(pair.Ts),
+        }
+        if self.build.architecture.whole:
+            read = [self.build.samples(x)[0] * pair.Ts - x for x in self.build.delays]
+            causes["wait for a sample"] = 0.5 * sum(read)
+        return {cause: late for cause, late in causes.items() if late > 0.0}
+
+
+def _steady(matrix: np.ndarray) -> list[float]:
+    """Factors at which steady motion has no resistance."""
+    values = np.linalg.eigvals(matrix)
+    real = values[(np.abs(values.imag) <= NEAR * np.abs(values)) & (values.real > 0.0)]
+    return (1.0 / real.real).tolist()

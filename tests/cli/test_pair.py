@@ -1,0 +1,85 @@
+"""`hapticclay pair`: the verdict, the files, and what it refuses in one line."""
+
+import json
+
+import pytest
+
+from hapticclay.cli.app import main
+
+PAIR = """
+[leader]
+mass = 6.0
+damper = 0.1
+[law]
+Kp = [400.0]
+Kd = [50.0]
+[link]
+delay = "10 ms"
+[follower_clay]
+K = 50.0
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "pair.toml"
+    path.write_text(PAIR)
+    return str(path)
+
+
+def test_verdict_map_and_architectures(file, tmp_path, capsys):
+    words = ["pair", file, "--compare", "--map", "delay-gain", "--cells", "3", "3"]
+    words += ["--feel", "x"]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    text = capsys.readouterr().out
+    for told in ("stable at position-position", "first to change: network", "waves", "factor of"):
+        assert told in text
+    assert {x.name for x in (tmp_path / "out").iterdir()} == {
+        f"{name}.{kind}"
+        for name in ("pair", "architectures", "delay_gain", "transparency")
+        for kind in ("json", "png")
+    }
+    found = json.loads((tmp_path / "out" / "pair.json").read_text())
+    assert found["tables"]["pair"]["stable"] == [True]
+
+
+def test_options_replace_what_the_file_says(file, tmp_path, capsys):
+    words = ["pair", file, "--delay", "0.4", "--Ts", "2ms", "--kind", "four-channel"]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    assert "unstable" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "words, told",
+    [
+        (["nothing.toml"], "can be read"),
+        (["{}", "--delay", "1", "2", "3"], "2 numbers (there, back)"),
+        (["{}", "--kind", "wave"], "did you mean 'waves'"),
+        (["{}", "--cells", "3", "3"], "give --map"),
+        (["{}", "--map", "gain"], "delay-gain"),
+        (["{}", "--dely", "1ms"], "did you mean --delay"),
+    ],
+)
+def test_refused_in_one_line(words, told, file, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["pair", *(word.format(file) for word in words)]) == 2
+    error = capsys.readouterr().err
+    assert told in error and error.count("\n") == 1
+    assert [x.name for x in tmp_path.iterdir()] == ["pair.toml"]
+
+
+@pytest.mark.parametrize(
+    "text, told",
+    [
+        ("x = 1\n" + PAIR, "x"),
+        (PAIR.replace("[law]", "[lw]"), "lw"),
+        (PAIR.replace("mass", "mas"), "mass"),
+        (PAIR + "[leader_operator]\nmas = 1\n", "mass"),
+    ],
+)
+def test_a_file_that_is_no_pair(text, told, tmp_path, capsys):
+    path = tmp_path / "pair.toml"
+    path.write_text(text)
+    assert main(["pair", str(path), "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert told in error and error.count("\n") == 1

@@ -1,0 +1,305 @@
+"""Logs in binary formats: the same numbers from each, or a line that says why not."""
+
+import json
+import zipfile
+
+import h5py
+import numpy as np
+import openpyxl
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from scipy.io import netcdf_file, savemat
+
+import hapticclay as hc
+
+N = 150
+T = 0.25 * np.arange(N)  # exact in any format below
+FORCE, PLACE = np.arange(N) % 7 * 0.5, np.arange(N) % 5 * 0.25
+NUMBERS = {"t": T, "force": FORCE, "pos": 1e3 * PLACE}  # s, N, mm
+UNITS = {"t": "s", "force": "N", "pos": "mm"}
+
+
+def parquet(path):
+    fields = [pa.field(k, pa.float64(), metadata={"unit": u}) for k, u in UNITS.items()]
+    pq.write_table(
+        pa.table([pa.array(x) for x in NUMBERS.values()], schema=pa.schema(fields)), path
+    )
+
+
+def arrow(path):
+    import pyarrow.feather as pf
+
+    pf.write_feather(pa.table({**NUMBERS, "note": ["a"] * N}), path)
+
+
+def matlab(path):
+    savemat(path, {**NUMBERS, "Ts": 0.25, "about": "rig 3"})
+
+
+def matlab_rows(path):
+    savemat(path, {k: x[None, :] for k, x in NUMBERS.items()})
+
+
+def matlab_structure(path):
+    savemat(path, {"log": {"data": NUMBERS, "gain": np.eye(3)}})
+
+
+def matlab_4(path):
+    savemat(path, NUMBERS, format="4")
+
+
+def simulink(path):
+    signals = np.array(
+        [(x, k) for k, x in NUMBERS.items() if k != "t"], [("values", object), ("label", object)]
+    )
+    savemat(path, {"ScopeData": {"time": T, "signals": signals, "blockName": "Scope"}})
+
+
+def matlab_73(path):
+    """As MATLAB writes it: a block of text before HDF5, arrays with rows and columns exchanged."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, x in NUMBERS.items():
+            file[f"log/{name}"] = x[None, :]
+            file[f"log/{name}"].attrs["MATLAB_class"] = np.bytes_("double")
+        file["name"] = np.frombuffer(b"r\0i\0g\0", np.uint16)
+        file["name"].attrs["MATLAB_class"] = np.bytes_("char")
+    with open(path, "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(128))
+
+
+def hdf5(path):
+    with h5py.File(path, "w") as file:
+        for name, x in NUMBERS.items():
+            file[f"rig/{name}"] = x
+            file[f"rig/{name}"].attrs["units"] = UNITS[name]
+        file["note"] = "rig 3"
+
+
+def hdf5_records(path):
+    with h5py.File(path, "w") as file:
+        file["log"] = np.rec.fromarrays(list(NUMBERS.values()), names=list(NUMBERS))
+
+
+def netcdf3(path):
+    with netcdf_file(path, "w") as file:
+        file.createDimension("time", N)
+        for name, x in NUMBERS.items():
+            column = file.createVariable(name, "d", ("time",))
+            column[:] = x
+            column.units = UNITS[name]
+
+
+def netcdf4(path):
+    import xarray as xr
+
+    made = {k: ("time", x, {"units": UNITS[k]}) for k, x in NUMBERS.items()}
+    xr.Dataset(made).to_netcdf(path, engine="h5netcdf")
+
+
+def numpy_records(path):
+    np.save(path, np.rec.fromarrays(list(NUMBERS.values()), names=list(NUMBERS)))
+
+
+def numpy_arrays(path):
+    np.savez_compressed(path, **NUMBERS, note="rig 3")
+
+
+def excel(path):
+    book = openpyxl.Workbook()
+    book.active.title = "about"
+    book.active.append(["rig 3"])
+    sheet = book.create_sheet("data")
+    sheet.append(["Rig 3, test 5"])
+    sheet.append(list(NUMBERS))
+    sheet.append(list(UNITS.values()))
+    for row in np.column_stack(list(NUMBERS.values())).tolist():
+        sheet.append(row)
+    book.save(path)
+
+
+def mcap_json(path):
+    from mcap.writer import Writer
+
+    with open(path, "wb") as file:
+        writer = Writer(file)
+        writer.start()
+        words = {k: {"description": f"it [{u}]"} for k, u in UNITS.items()}
+        schema = writer.register_schema(
+            "Row", "jsonschema", json.dumps({"properties": words}).encode()
+        )
+        channel = writer.register_channel("/rig", "json", schema)
+        for i, row in enumerate(np.column_stack(list(NUMBERS.values())).tolist()):
+            data = json.dumps(dict(zip(NUMBERS, row, strict=True))).encode()
+            writer.add_message(channel, int(1e9 * row[0]), data, int(1e9 * row[0]), i)
+        writer.finish()
+
+
+WITH_UNITS = {
+    "a.parquet": parquet, "a.h5": hdf5, "a.nc": netcdf3, "b.nc": netcdf4, "a.xlsx": excel,
+    "a.mcap": mcap_json,
+}  # fmt: skip
+WITHOUT = {
+    "a.arrow": arrow, "a.mat": matlab, "rows.mat": matlab_rows, "structure.mat": matlab_structure,
+    "four.mat": matlab_4, "scope.mat": simulink, "new.mat": matlab_73, "records.h5": hdf5_records,
+    "a.npy": numpy_records, "a.npz": numpy_arrays,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [*WITH_UNITS, *WITHOUT])
+def test_a_format_gives_the_numbers_that_were_written(name, tmp_path):
+    (WITH_UNITS | WITHOUT)[name](tmp_path / name)
+    units = {"units": {"pos": "mm"}} if name in WITHOUT else {}
+    log = hc.Log.read(tmp_path / name)
+    names = {k: next(x for x in log.names if x.split(".")[-1] == k) for k in ("force", "pos")}
+    if name in WITHOUT:
+        units = {"units": {names["pos"]: "mm"}}
+    columns = {"input": names["force"], "output": names["pos"]}
+    data = hc.studies.Measurement.load(tmp_path / name, columns, **units)
+    np.testing.assert_array_equal(data.t, T)
+    np.testing.assert_array_equal(data.input, FORCE)
+    np.testing.assert_allclose(data.output, PLACE, rtol=4e-16)  # one product
+    assert hc.studies.log_report(log).text()
+
+
+@pytest.mark.parametrize("name", [*WITH_UNITS, *WITHOUT])
+def test_a_damaged_file_is_refused_in_a_line(name, tmp_path):
+    path = tmp_path / name
+    (WITH_UNITS | WITHOUT)[name](path)
+    whole = path.read_bytes()
+    rng = np.random.default_rng(0)
+    for kept in (20, len(whole) // 3, len(whole) - 9):
+        path.write_bytes(whole[:kept])
+        try:
+            hc.Log.read(path)
+        except hc.ParameterError as error:
+            assert "\n" not in str(error) and len(str(error)) < 400
+    if name.endswith((".mat", ".arrow")):  # their libraries trust the lengths within a file
+        return
+    for _ in range(8):
+        data = np.frombuffer(whole, np.uint8).copy()
+        data[rng.integers(12, len(data), 12)] ^= rng.integers(1, 255, 12).astype(np.uint8)
+        path.write_bytes(data.tobytes())
+        try:
+            hc.Log.read(path)
+        except hc.ParameterError as error:
+            assert "\n" not in str(error) and len(str(error)) < 400
+
+
+def test_lerobots_layout(tmp_path):
+    """Lists for each row, names of their parts beside the data, episodes one after another."""
+    file = tmp_path / "data" / "chunk-000" / "file-000.parquet"
+    file.parent.mkdir(parents=True)
+    state = np.column_stack((FORCE, PLACE)).astype(np.float32)
+    columns = {
+        "observation.state": pa.FixedSizeListArray.from_arrays(pa.array(state.ravel()), 2),
+        "action": pa.array(state[:, ::-1].tolist()),
+        "timestamp": np.tile(T[:75], 2),
+        "episode_index": np.repeat([4, 7], 75),
+    }
+    pq.write_table(pa.table(columns), file)
+    features = {
+        "observation.state": {"names": {"motors": ["pan", "lift"]}},
+        "action": {"names": None},
+    }
+    (tmp_path / "meta").mkdir()
+    (tmp_path / "meta" / "info.json").write_text(json.dumps({"features": features}))
+    log = hc.Log.read(file, where={"episode_index": 7})
+    assert log.rows == 75
+    assert {"observation.state_pan", "observation.state_lift", "action[0]", "action[1]"} < {
+        *log.names
+    }
+    np.testing.assert_array_equal(log.values("observation.state_lift"), PLACE[75:])
+    np.testing.assert_array_equal(log.values("action[0]"), PLACE[75:])
+    with pytest.raises(hc.ParameterError, match="4, 7"):
+        hc.Log.read(file, where={"episode_index": 1})
+    assert hc.studies.log_report(hc.Log.read(file)).stamps.backward.tolist() == [75]
+
+
+@pytest.mark.parametrize("ros1", [True, False])
+def test_bags_of_ros(ros1, tmp_path):
+    """Two topics with clocks of their own, and names of joints."""
+    from rosbags.rosbag1 import Writer as Writer1
+    from rosbags.rosbag2 import StoragePlugin
+    from rosbags.rosbag2 import Writer as Writer2
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+    types = store.types
+    start = 1_700_000_000_000_000_000
+    path = tmp_path / ("a.bag" if ros1 else "a")
+    writer = Writer1(path) if ros1 else Writer2(path, version=9, storage_plugin=StoragePlugin.MCAP)
+
+    def header(stamp):
+        time = types["builtin_interfaces/msg/Time"](stamp // 10**9, stamp % 10**9)
+        kind = types["std_msgs/msg/Header"]
+        return kind(seq=0, stamp=time, frame_id="") if ros1 else kind(stamp=time, frame_id="")
+
+    with writer as bag:
+        kinds = {
+            "/joints": "sensor_msgs/msg/JointState",
+            "/wrench": "geometry_msgs/msg/WrenchStamped",
+        }
+        ways = {k: bag.add_connection(k, x, typestore=store) for k, x in kinds.items()}
+        for i in range(N):
+            stamp = start + 250_000_000 * i
+            joints = types[kinds["/joints"]](
+                header(stamp), ["a", "b"], np.array([PLACE[i], 1.0]), np.zeros(2), np.zeros(0)
+            )
+            force = types["geometry_msgs/msg/Vector3"](0.5 * i, 0.0, 0.0)
+            zero = types["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
+            wrench = types[kinds["/wrench"]](
+                header(stamp), types["geometry_msgs/msg/Wrench"](force, zero)
+            )
+            pack = store.serialize_ros1 if ros1 else store.serialize_cdr
+            bag.write(ways["/joints"], stamp + 1000, pack(joints, kinds["/joints"]))
+            if i % 2 == 0:
+                bag.write(ways["/wrench"], stamp + 2000, pack(wrench, kinds["/wrench"]))
+    file = path if ros1 else next(path.glob("*.mcap"))
+    for place in {path, file}:
+        log = hc.Log.read(place)
+        np.testing.assert_allclose(
+            log.values("stamp"), 0.25 * np.arange(len(T) - 1) - 1e-6, atol=2e-9
+        )
+        np.testing.assert_array_equal(log.values("/joints.position.a"), PLACE[: N - 1])
+        # of every second row, interpolated between: the same line, after nine digits of a stamp
+        wrench = log.values("/wrench.wrench.force.x")
+        np.testing.assert_allclose(wrench, 0.5 * np.arange(N - 1), atol=1e-6)
+    log = hc.Log.read(file, table="/wrench")
+    assert log.rows == N // 2
+    with pytest.raises(hc.ParameterError, match="one of /joints, /wrench"):
+        hc.Log.read(file, table="/pose")
+
+
+def test_our_own_exports_are_read_with_their_units(tmp_path):
+    record = hc.simulate(hc.constant_cut(t_max=0.05))
+    for kind in ("nc", "parquet", "csv", "mcap", "mat"):
+        log = hc.Log.read(record.export(tmp_path / f"cut.{kind}"))
+        name = next(x for x in ("fh_x", "fh.x") if x in log.names)
+        np.testing.assert_array_equal(log.values(name, ("N",)), record.fh[:, 0])
+        place = log.place(name)
+        assert log.table.heads[place].unit == "N", kind
+        (time,) = {"t", "time"} & {*log.names}
+        np.testing.assert_array_equal(log.values(time, ("s",)), record.t)
+
+
+def test_what_is_no_log_is_refused_in_a_line(tmp_path):
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as file:
+        file.writestr("a.txt", "t,x\n0,1\n")
+    (tmp_path / "a.csv.gz").write_bytes(b"\x1f\x8b\x08\0\0\0\0\0")
+    (tmp_path / "a.xls").write_bytes(b"\xd0\xcf\x11\xe0" + bytes(100))
+    np.save(tmp_path / "words.npy", np.array(["a", "b"]))
+    np.save(tmp_path / "objects.npy", np.array([{}, []], dtype=object), allow_pickle=True)
+    savemat(tmp_path / "scalars.mat", {"a": 1.0, "b": "text"})
+    (tmp_path / "text.mat").write_text("t,x\n0,1\n")
+    for name, said in (
+        ("a.zip", "unpack"), ("a.csv.gz", "gunzip"), ("a.xls", ".xlsx"), ("words.npy", "columns"),
+        ("objects.npy", "damaged"), ("scalars.mat", "columns of numbers"), ("text.mat", "damaged"),
+        (".", "folder"),
+    ):  # fmt: skip
+        with pytest.raises(hc.ParameterError, match=said) as error:
+            hc.Log.read(tmp_path / name)
+        assert len(str(error.value)) < 400
+    matlab(tmp_path / "a.mat")
+    with pytest.raises(hc.ParameterError, match="table = 'rig': must be one of t, force, pos"):
+        hc.Log.read(tmp_path / "a.mat", table="rig")
