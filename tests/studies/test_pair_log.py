@@ -161,6 +161,24 @@ def test_a_scope_of_simulink_is_read_with_its_signs(tmp_path):
         np.testing.assert_array_equal(getattr(read, name), getattr(log, name))
 
 
+def test_a_scope_in_degrees_is_turned_into_radians(tmp_path):
+    t = 1e-3 * np.arange(200.0)
+    one = {"label": "p (deg) leader, follower", "values": np.outer(t, [90.0, 180.0])}
+    two = {"label": "u (mNm) tau_s", "values": t[:, None]}
+    savemat(tmp_path / "log.mat", {"s": {"time": t, "signals": [one, two]}})
+    read = hc.studies.PairLog.load(tmp_path / "log.mat")
+    np.testing.assert_allclose(read.follower, math.pi * t, rtol=1e-15)
+    np.testing.assert_allclose(read.follower_torque, 1e-3 * t, rtol=1e-15)
+
+
+def test_a_scope_in_another_quantity_is_refused(tmp_path):
+    t = 1e-3 * np.arange(200.0)
+    signal = {"label": "p (mm) leader, follower, tau_s", "values": np.outer(t, [1.0, 2.0, 3.0])}
+    savemat(tmp_path / "log.mat", {"s": {"time": t, "signals": signal}})
+    with pytest.raises(hc.ParameterError, match=r"leader \[mm\]"):
+        hc.studies.PairLog.load(tmp_path / "log.mat")
+
+
 def test_a_csv_file_is_read_with_units_and_names(tmp_path):
     log = synthetic(n=200)
     head = "time [ms],master [deg],slave [deg],u1 [mN.m],tau_rs [N.m],F_e [N.m]"
