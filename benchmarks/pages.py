@@ -18,6 +18,7 @@ from typing import Any
 from hapticclay import files
 
 from . import (
+    arms,
     common,
     diagrams,
     extremes,
@@ -40,6 +41,7 @@ PARTS: dict[str, Any] = {
     "hits": hits,
     "stiffness": stiffness,
     "extremes": extremes,
+    "arms": arms,
     "throughput": throughput,
     "parts": parts,
     "scaling": scaling,
@@ -51,6 +53,7 @@ TITLES = {
     "hits": "Hits on clay of any stiffness",
     "stiffness": "Stiff clay",
     "extremes": "Stiff and extreme scenes",
+    "arms": "Gain limits of arms in runs",
     "throughput": "Throughput",
     "parts": "What each part costs",
     "scaling": "Scaling of a sweep",
@@ -59,8 +62,8 @@ LIMITATIONS = (
     "Run times are those of one machine, named below, with other programs on it: compare numbers "
     "within a table, not with those of another machine. Run times leave out imports, and the "
     "compilation of SciPy's right-hand sides.",
-    "All jobs are the planar arm of the paper in clay. Another arm, contact geometry or a larger "
-    "model was not measured.",
+    "All jobs but the gain limits of arms are of the planar arm in clay. Contact geometry "
+    "or a larger model was not measured.",
     "The programs for the other packages are ours, written from the same equations "
     "(`benchmarks/peers`). Their authors might tune them better; a corrected program is welcome.",
     "Settings are a ladder of steps or tolerances. The best setting between two of them may be "

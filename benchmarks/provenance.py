@@ -1,7 +1,7 @@
 """Which code a page's figures were measured on, and whether that code is still the one that ships.
 
 Figures of run time and error depend on how a run advances and on what a scene is, so a page is
-stale once `formulas`, `model`, `kernel`, the runs of `simulation` or a model in `mjcf/` compute
+stale once `formulas`, `model`, `arms`, `kernel`, runs of `simulation` or a model in `mjcf/` compute
 something else. Comments, docstrings and layout of Python files compute nothing and do not count.
 """
 
@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
-ROOMS = "formulas/*", "kernel/*", "model/*"
+ROOMS = "formulas/*", "kernel/*", "model/*", "arms/*"
 RUNS = "many", "monitor", "one_run", "run", "vectored"  # of simulation
 FILES = (*(f"{room}.{kind}" for room in ROOMS for kind in ("py", "pxd", "pyx")),
          *(f"simulation/{name}.py" for name in RUNS))  # fmt: skip
-MEASURED = (*(f"hapticclay/{file}" for file in FILES), "mjcf/*")
+MEASURED = (*(f"hapticclay/{file}" for file in FILES), "mjcf/*", "mjcf/arms/*")
 UNKNOWN = "unknown"  # commit of a copy without history
 
 

@@ -49,6 +49,9 @@ def result(name):
         ),
         "Fitted": lambda: hc.studies.fit_flow(columns()),
         "IdentifiedPair": lambda: hc.studies.identify_pair(pair()),
+        "Replayed": lambda: hc.studies.replay(
+            hc.Scenario(), hc.studies.Recording([0.0, 0.1], f=np.ones((2, 2)))
+        ),
         "Band": lambda: hc.studies.gain_band(
             hc.theory.Loop("x"), hc.studies.Hands.around(HAND, 0.5), [10.0, 90.0],
             hc.studies.Draw(5),
@@ -66,7 +69,7 @@ def result(name):
 
 NAMES = (
     "ZWidth", "Impedance", "MeasuredImpedance", "DeviceMBK", "ArmMBK", "Identified", "Fitted",
-    "IdentifiedPair", "Band", "Instability", "Design", "Lab", "StaircaseRun",
+    "IdentifiedPair", "Replayed", "Band", "Instability", "Design", "Lab", "StaircaseRun",
 )  # fmt: skip
 
 

@@ -142,9 +142,11 @@ def run_table(record: Record, paced: bool = False) -> str:
     if not s.clay and abs(s.force[1]) > abs(s.force[0]):
         ways = "y"
     pieces = [(way, piece[way]) for way in ways for piece in record.regions(way)]
-    lines = [_stretch_table(s.clay, pieces[:MOST_ROWS]), ""]
-    if len(pieces) > MOST_ROWS:
-        lines.insert(1, f"... and {len(pieces) - MOST_ROWS} more stretches")
+    lines = [] if s.is_closed_form else [_joint_table(record), ""]
+    if s.is_closed_form or s.clay is not None:
+        lines += [_stretch_table(s.clay, pieces[:MOST_ROWS]), ""]
+    if len(pieces) > MOST_ROWS and (s.is_closed_form or s.clay is not None):
+        lines.insert(len(lines) - 1, f"... and {len(pieces) - MOST_ROWS} more stretches")
     lines += _crossing_lines(record) + _stop_lines(record)
     if (
         isinstance(s.muscle, Multisine) and len(record.t) >= 32
@@ -162,6 +164,25 @@ def run_table(record: Record, paced: bool = False) -> str:
     lines += _energy_lines(record)
     lines.append(_pace_line(record, paced))
     return "\n".join(lines)
+
+
+def _joint_table(record: Record) -> str:
+    """What the joints of an arm from a file did."""
+    from ..scene.joint_numbers import references, torque_limits
+
+    s, some = record.scenario, len(record.t) > 0
+    pulled, limits = references(s), torque_limits(s)
+    table: dict[str, Any] = {"joint": s.joints}
+    if some:
+        table["start [rad]"], table["end [rad]"] = record.q[0].tolist(), record.q[-1].tolist()
+    if pulled is not None:
+        table["reference [rad]"] = pulled.tolist()
+    if some:
+        table["largest rate [rad/s]"] = abs(record.qd).max(axis=0).tolist()
+        table["largest torque [N.m]"] = abs(record.tau).max(axis=0).tolist()
+    if any(map(math.isfinite, limits)):
+        table["limit [N.m]"] = [x if math.isfinite(x) else math.nan for x in limits]
+    return text_table(table, dict.fromkeys(table, "z.4g"))
 
 
 def _pace_line(record: Record, paced: bool) -> str:

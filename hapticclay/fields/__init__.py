@@ -94,6 +94,7 @@ class Part(Node):
         data, kind = dict(value), self._usual(classes)
         if type(old) in classes.values():
             kind = type(old)
+        kind = _class_with(data, kind, [x for x in self.kinds if x in classes.values()])
         if KIND in data and not any(KIND in nodes_of(k) for k in classes.values()):
             kind = classes[choice(join_names(path, KIND), data.pop(KIND), tuple(classes))]
         if kind is None:
@@ -132,6 +133,15 @@ class Part(Node):
             for field in leaves(kind, path, default if type(default) is kind else UNSET):
                 about = f"of {name}: {field.about}" if len(classes) > 1 else field.about
                 yield field._replace(about=about)
+
+
+def _class_with(data: Mapping[str, Any], kind: Any, named: Sequence[type]) -> Any:
+    """The class that plain data without a kind is of: another named one, if that alone fits."""
+    names = set(data)
+    if kind is None or KIND in names or names <= {*nodes_of(kind)}:
+        return kind
+    fits = [x for x in named if names <= {*nodes_of(x)}]
+    return fits[0] if len(fits) == 1 else kind
 
 
 # ---- the node of a type hint ---------------------------------------------------------------------

@@ -7,14 +7,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..kernel.engine import warnings_caught
 from ..simulation.simulation_batch import SimulationBatch
-from ..simulation.stepwise import COLUMNS, Simulation
+from ..simulation.stepwise import COLUMNS, Alone, Simulation, make_steps
 from .columns import Value, clipped, columns_of, observed, replaced, value_of
 from .draws import Truth, draw
 from .task import Command, Handle, Memory, Task
 
 PLACES = tuple(COLUMNS[name] for name in ("p", "v", "fh", "fe"))
 Ends = Sequence[tuple[float, float]]  # of the quantities of an observation
+# the sample, in how many samples each motor was strained, whether the run has ended; or columns
+Measured = tuple[Any, Any, Any]
 
 
 class Period(NamedTuple):
@@ -31,23 +34,24 @@ class One:
 
     def __init__(self, scenarios: Sequence[Any], engine: str):
         self.run = Simulation(scenarios[0], engine=engine, recorded=False, monitored=False)
-        self.gain: Any = None
 
     def reset(self, which: Sequence[int], scenarios: Sequence[Any]) -> None:
         self.run.reset(scenarios[0])
-        self.gain = None
 
     def advance(self, n: int, command: Command, live: Any) -> None:
         """Makes n steps under a command."""
-        if command.gain != self.gain:
-            self.run.set(gain=command.gain)
-            self.gain = command.gain
-        self.run.advance(n, force=command.force)
+        with Alone(self.run) as run:
+            if run.outcome is not None:
+                return
+            if command.gain is not None and command.gain != run.scenario.gain:
+                run.change_gain(command.gain)
+            if command.force != run.scenario.force:
+                run.change_force(command.force)
+            make_steps(run, n)
 
-    def measured(self, n: int, k: int) -> tuple[Any, Any, Any]:
-        """The sample, torques reached in k of n samples, and whether the run has ended."""
-        run = self.run
-        return run.numbers(), run.torque_reached(n, k), run.outcome is not None
+    def measured(self, n: int, limits: tuple[float, float]) -> Measured:
+        with Alone(self.run) as run:
+            return run.numbers_ahead(), run.strained(n, limits), run.outcome is not None
 
     def observation(self, values: Iterable[Value], ends: Ends) -> np.ndarray:
         """Values, clipped to their ends, as float32."""
@@ -74,14 +78,16 @@ class Many:
 
     def advance(self, n: int, command: Command, live: np.ndarray) -> None:
         """Makes n steps of the live runs under a command."""
-        if live.any():
+        with Alone(self.run) as runs, warnings_caught():
+            which = np.flatnonzero(live & ~runs.over)
             if command.gain is not None:
-                self.run.set(live, gain=np.stack(command.gain, axis=1)[live])
-            self.run.advance(n, force=np.stack(command.force, axis=1), mask=live)
+                runs.set_gain(which, np.stack(command.gain, axis=1)[which])
+            runs.push(which, np.stack(command.force, axis=1)[which])
+            runs.advance(which, n, shows=True)
 
-    def measured(self, n: int, k: int) -> tuple[Any, Any, Any]:
-        run = self.run
-        return run.numbers().T, run.torque_reached(n, k).T, run.ended
+    def measured(self, n: int, limits: tuple[float, float]) -> Measured:
+        with Alone(self.run) as runs, warnings_caught():
+            return runs.show().T.copy(), runs.strained(n, limits).T, runs.over.copy()
 
     def observation(self, values: Iterable[Value], ends: Ends) -> np.ndarray:
         low, high = np.array(ends).T
@@ -129,8 +135,8 @@ class Episodes:
         self.handle = self._handle(self._runs)
 
     def _handle(self, runs: One | Many) -> Handle:
-        x, torques, over = runs.measured(self.task.steps, self.task.strained_samples)
-        return self.task.handle([(x[i], x[i + 1]) for i in PLACES], torques, over)
+        x, strained, over = runs.measured(self.task.steps, self.task.strain_limits)
+        return self.task.handle([(x[i], x[i + 1]) for i in PLACES], strained, over)
 
     def observe(self) -> np.ndarray:
         """Present observations, clipped to their bounds, float32."""

@@ -74,9 +74,10 @@ class Task:
         return self.steps * DT
 
     @property
-    def strained_samples(self) -> int:
-        """Samples of a control period in which a torque must be reached to count."""
-        return round(self.share * self.steps)
+    def strain_limits(self) -> tuple[float, float]:
+        """Torques of shoulder and elbow beyond which a motor is strained [N.m]."""
+        shoulder, elbow = TORQUE_LIMIT
+        return self.strain * shoulder, self.strain * elbow
 
     @property
     def observations(self) -> tuple[Quantity, ...]:
@@ -103,15 +104,15 @@ class Task:
         """Reward of a control period; updates the memory."""
         raise NotImplementedError
 
-    def handle(self, sample: Sequence[Pair], torques: Sequence[Value], over: Value) -> Handle:
-        """The handle in a sample, with the torques reached in `strained_samples`.
+    def handle(self, sample: Sequence[Pair], strained: Sequence[Value], over: Value) -> Handle:
+        """The handle in a sample; `strained`: samples of the period in which each motor was.
 
         A run counts as diverged if it is over (for example out of reach), if it is faster than
         SPEED_LIMIT, or if a motor needed a torque that no stable run of the task needs.
         """
         p, v, fh, fe = sample
-        shoulder, elbow = TORQUE_LIMIT
-        calm = (torques[0] < self.strain * shoulder) & (torques[1] < self.strain * elbow)
+        least = round(self.share * self.steps)
+        calm = (strained[0] < least) & (strained[1] < least)
         slow = v[0] * v[0] + v[1] * v[1] <= SPEED_LIMIT * SPEED_LIMIT
         return Handle(p, v, fh, fe, over | negated(calm & slow))
 

@@ -259,7 +259,8 @@ def mode_of(given: str | AutoresetMode) -> AutoresetMode:
 def _masked(info: Memory, mask: np.ndarray) -> dict[str, Any]:
     """Info in the form of Gymnasium: arrays, with masks of the copies that have a value."""
     found: dict[str, Any] = {}
+    every = mask.all()
     for name, x in info.items():
-        found[name] = np.where(mask, x, np.zeros_like(x))
+        found[name] = x.copy() if every else np.where(mask, x, np.zeros_like(x))
         found[f"_{name}"] = mask.copy()
     return found

@@ -85,7 +85,7 @@ def put_machine(m, s, px, py):
             memory.copied4(z.z, a.z)
         z.place, z.tool = p, p
     for j in range(m.joints):
-        now.w[j], now.past[j] = s.w[j], hardware.encoded(m, s.q[j])
+        now.w[j], now.past[j] = s.w[j], hardware.encoded(m, j, s.q[j])
     now.due = now.due_then = math.inf
     sampled.put_times(m, now, 0)
     if m.window > 0:
@@ -103,7 +103,7 @@ def fill_angles(m, s):
         n = j - m.window
         ring[width * j] = 1.0 * n
         for i in range(m.joints):
-            ring[width * j + 1 + i] = hardware.encoded(m, s.q[i] + n * m.Ts * s.w[i])
+            ring[width * j + 1 + i] = hardware.encoded(m, i, s.q[i] + n * m.Ts * s.w[i])
 
 
 def change(m, s):

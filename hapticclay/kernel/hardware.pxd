@@ -10,7 +10,7 @@ cdef bint is_lost(Model m, long long k) noexcept nogil
 cdef double noise(Model m, long long k, long i) noexcept nogil
 cdef double measured(Model m, State s, long i, double f) noexcept nogil
 cdef double converted(Model m, double f) noexcept nogil
-cdef double encoded(Model m, double q) noexcept nogil
+cdef double encoded(Model m, long i, double q) noexcept nogil
 cdef void differenced(Model m, State s, double *q, double *w) noexcept nogil
 cdef void note_angles(Model m, State s) noexcept nogil
 cdef void drive(Model m, State s, double *tau) noexcept nogil

@@ -49,9 +49,9 @@ def converted(m, f):
 # ---- joints --------------------------------------------------------------------------------------
 
 
-def encoded(m, q):
-    """A joint angle as its encoder reads it [rad]."""
-    return law.encode(q, m.encoder)
+def encoded(m, i, q):
+    """The angle of a joint as its encoder reads it [rad]."""
+    return law.encode(q, m.counts[i])
 
 
 def differenced(m, s, q, w):
@@ -72,7 +72,7 @@ def note_angles(m, s):
     ring, row = m.angles, (m.joints + 1) * s.now.oldest
     ring[row] = 1.0 * s.now.k
     for i in range(m.joints):
-        ring[row + 1 + i] = encoded(m, s.q[i])
+        ring[row + 1 + i] = encoded(m, i, s.q[i])
 
 
 # ---- torques -------------------------------------------------------------------------------------

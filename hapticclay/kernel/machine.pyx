@@ -78,6 +78,24 @@ def peek(size_t models, size_t states, size_t which, Py_ssize_t n, size_t spare,
                 out[18 * k + 16], out[18 * k + 17] = m[k].rendered[3 * at], m[k].rendered[3 * at + 1]
 
 
+def strained(
+    size_t models, size_t states, size_t which, Py_ssize_t n, long long rows, double shoulder,
+    double elbow, size_t out,
+):
+    """Counts in how many of the last rows each motor is at its limit; out: two numbers by row."""
+    cdef Model_s *m = <Model_s *>models
+    cdef State_s *s = <State_s *>states
+    cdef const long long *w = <const long long *>which
+    cdef long long *found = <long long *>out
+    cdef Py_ssize_t j
+    cdef long long k
+    with nogil:
+        for j in range(n):
+            k = w[j]
+            found[2 * k] = loop.kernel_watch_strained(&m[k], &s[k], rows, 0, shoulder)
+            found[2 * k + 1] = loop.kernel_watch_strained(&m[k], &s[k], rows, 1, elbow)
+
+
 def finish(size_t models, size_t states, size_t outs, Py_ssize_t n, size_t starts, long room):
     """Makes runs from start to end without their samples; starts: p and v, four numbers by row."""
     cdef Model_s *m = <Model_s *>models

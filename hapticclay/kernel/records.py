@@ -234,7 +234,8 @@ class Model:
     chance: whole
     chances: floats  # four numbers a sample
     chance_first: whole
-    encoder: whole  # counts per turn, 0 for none
+    encoder: whole  # joints have encoders
+    counts: whole[12]  # per turn
     window: whole  # samples of the difference, 0 for exact rates
     cutoff: real  # of the low-pass after it [Hz], 0 for none
     angles: floats  # ring of past angles

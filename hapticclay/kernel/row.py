@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -207,6 +208,10 @@ class Row:
         if self.caller is not None:
             self.caller.check()
 
+    def strained(self, n: int, limits: Sequence[float]) -> list[int]:
+        """How many of the last n rows have |tau| of each motor at its limit or above."""
+        return [watch.strained(self.m, self.s, n, i, limit) for i, limit in enumerate(limits)]
+
     def is_quiet(self, first: int, n: int) -> bool:
         """Whether the monitor can have nothing to report on rows, nor had it before."""
         watch.look(self.m, self.s, first, n)
@@ -246,7 +251,11 @@ class NativeRow(Row):
         self.s = layout.view_of(records.State, self.states)
         self.addresses = self.models.ctypes.data, self.states.ctypes.data
         self.rooms, self.which = np.zeros(1, np.int64), np.zeros(1, np.int64)
+        self.shown, self.counts = np.zeros(SHOWN), np.zeros(2, np.int64)
         self.call = *self.addresses, self.which.ctypes.data, 1
+        # finding an address takes as long as a step
+        self.rooms_at, self.counts_at = self.rooms.ctypes.data, self.counts.ctypes.data
+        self.shown_at = self.spare.ctypes.data, self.shown.ctypes.data
         self._start(scenario, mover, buffers)
 
     def model_of(self, m: Any) -> Any:
@@ -284,12 +293,16 @@ class NativeRow(Row):
 
     def advance(self, room: int) -> None:
         self.rooms[0] = room
-        self.machine.advance(*self.call, self.rooms.ctypes.data, False)
+        self.machine.advance(*self.call, self.rooms_at, False)
 
     def peek(self) -> np.ndarray:
-        shown, n = np.zeros(SHOWN), self.s.row
-        self.machine.peek(*self.call, self.spare.ctypes.data, shown.ctypes.data)
-        return np.append(shown, self.extra_at(n)) if self.m.general else shown
+        n = self.s.row
+        self.machine.peek(*self.call, *self.shown_at)
+        return np.append(self.shown, self.extra_at(n)) if self.m.general else self.shown.copy()
+
+    def strained(self, n: int, limits: Sequence[float]) -> list[int]:
+        self.machine.strained(*self.call, n, *limits, self.counts_at)
+        return self.counts.tolist()
 
     def is_quiet(self, first: int, n: int) -> bool:
         return self.machine.look(*self.addresses, first, n)

@@ -185,7 +185,7 @@ def respond(m, s, k, fx, fy):
     """Response of the controller to a sample that is not lost."""
     q, w = s.angles, s.rates
     for i in range(m.joints):
-        q[i] = hardware.encoded(m, s.q[i])
+        q[i] = hardware.encoded(m, i, s.q[i])
     if m.window > 0:
         hardware.differenced(m, s, q, w)
     if m.own:

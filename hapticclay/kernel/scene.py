@@ -246,7 +246,8 @@ def put_memory(m: Any, s: Scenario) -> None:
 
 def put_hardware(m: Any, arrays: dict[str, np.ndarray], s: Scenario, io: Any) -> None:
     """The hardware between computer and arm."""
-    m.encoder = int(io.encoder or 0)
+    counts = io.encoder if isinstance(io.encoder, tuple) else (io.encoder or 0,) * m.joints
+    m.encoder, m.counts[: m.joints] = int(any(counts)), map(int, counts)
     if io.jitter > 0.0 or io.dropout_probability > 0.0 or io.force_noise > 0.0:
         n = min(int(s.t_max / m.Ts), NOISE_AHEAD) + 8
         m.chance, arrays["chances"] = 1, devices.SampleNoise(io).table(0, n).ravel()

@@ -33,6 +33,16 @@ def look(m, s, first, n):
         first += 1
 
 
+def strained(m, s, n, motor, limit):
+    """How many of the last n rows have |tau| of a motor at a limit or above; NaN counts too."""
+    row, found, j = m.rows, 0, max(s.row - n, 0)
+    while j < s.row:
+        if not abs(row[ROW * j + 8 + motor]) < limit:
+            found += 1
+        j += 1
+    return found
+
+
 def is_quiet(m, w, at):
     """Whether a row can have nothing to report."""
     row, seen = m.rows, w.seen

@@ -39,7 +39,8 @@ class Hardware:
             that samples keep their order.
         dropout_probability: probability that a sample is lost, 0 to 0.99; the torque is then held
             for one more.
-        encoder: counts per turn of each joint, 4 to 2^40; None measures angles exactly.
+        encoder: counts per turn of each joint, 4 to 2^40, one number or one for each joint; None
+            measures angles exactly.
         velocity: of the joints: "exact" (a tachometer) or "difference" of measured angles.
         velocity_window: samples that the difference spans, 1 to 10000.
         velocity_filter: first-order low-pass behind the difference [Hz]; None for none.
@@ -62,7 +63,7 @@ class Hardware:
 
     jitter: Annotated[float, Bound(0.0, 1.0, "s")] = 0.0
     dropout_probability: Annotated[float, Bound(0.0, 0.99)] = 0.0
-    encoder: Annotated[int | None, Bound(4, 2**40)] = None
+    encoder: Annotated[int | tuple[int, ...] | None, Bound(4, 2**40)] = None
     velocity: Literal["exact", "difference"] = "exact"
     velocity_window: Annotated[int, Bound(1, 10_000)] = 1
     velocity_filter: Annotated[float | None, Bound(0.0, 1e6, "Hz", above=True)] = None
@@ -82,6 +83,11 @@ class Hardware:
     seed: Seed = 0
 
     def __post_init__(self):
+        if isinstance(self.encoder, tuple):
+            if not self.encoder or any(x != int(x) for x in self.encoder):
+                bound = "must be whole numbers, one for each joint"
+                raise ParameterError("hardware.encoder", self.encoder, bound)
+            object.__setattr__(self, "encoder", tuple(map(int, self.encoder)))
         if self.velocity == "exact" and (
             self.velocity_filter is not None or self.velocity_window != 1
         ):
@@ -196,14 +202,14 @@ def _trait(name: str, has: Any, words: Any, theory: str = LEFT_OUT, **refuses: R
 
 
 def _field_trait(name: str, field: str, unit: str = "", theory: str = LEFT_OUT) -> Trait:
-    """The trait of a part that is one number, 0 or None without it."""
+    """The trait of a part that is a number, or one for each joint, 0 or None without it."""
     form = f"{field.replace('_', ' ')} {{}}"
-    return _trait(
-        name,
-        lambda x: bool(getattr(x, field)),
-        lambda x: Quantity.of_scene(form, (getattr(x, field),), unit),
-        theory,
-    )
+
+    def words(x: Any) -> Any:
+        value = getattr(x, field)
+        return Quantity.of_scene(form, value if isinstance(value, tuple) else (value,), unit)
+
+    return _trait(name, lambda x: bool(getattr(x, field)), words, theory)
 
 
 def hardware_words(scenario: Any) -> str:

@@ -28,6 +28,7 @@ ABOUT = {
     True: f"Bare devices, each with a virtual wall; the run is a push at {1e3 * PUSHED:g} mm/s.",
     False: "Controllers, each in its own scenario; the run is that of the scenario.",
 }
+UNDER = "Controllers, each run under the recording {}, which lies beside them."
 NOTES = {
     True: "Stable and passive stiffness are exact for the linear wall with its own B, M, Ts and "
     "delay; only the Z-width by runs includes friction and encoder. The dynamic range is the mean "
@@ -46,7 +47,7 @@ def comparison_page(found: Comparison) -> str:
     rows = zip(*found.tables()["side by side"].values(), strict=True)
     context = {
         "names": [x.name for x in found],
-        "about": ABOUT[walls],
+        "about": UNDER.format(found[0].replayed.name) if found[0].replayed else ABOUT[walls],
         "notes": NOTES[walls] + hands,
         "numbers": {name: list(map(cell_text, row)) for name, *row in rows},
         "pictures": [

@@ -78,6 +78,9 @@ def simulate_within(
 ) -> Record:
     """Runs a scenario with the integrator and the step that keep a requested error."""
     asked, unit = parse_error(error)
+    if not scenario.is_closed_form:
+        bound = "must be None with an arm from a file: compare a run with one at half its dt"
+        raise ParameterError("error", error, bound)
     if unit == "s" and not _has_border(scenario):
         bound = "must be in m, as in '1e-6 m': this scene has no border whose crossing has a time"
         raise ParameterError("error", error, bound)

@@ -8,7 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from ..arms.joint_law import JointPD
+from ..model.operator import NO_HAND
 from ..scene.scenario import Scenario
+from ..theory.joint_gains import joint_loop
+from ..theory.joint_walls import held_arm
 from .monitor import LIMITS, OFTEN, STILL, WHILE, Outcome, at_rest
 
 FASTEST = 200.0  # [rad/s or m/s] beyond any joint of an arm
@@ -60,10 +64,15 @@ class Swings:
 
 
 class JointMonitor:
-    """Judges rows of joint positions, rates and torques; the interface of `StabilityMonitor`."""
+    """Judges rows of joint positions, rates and torques; the interface of `StabilityMonitor`.
+
+    Under a muscle force that varies, growth counts only where the loop at the arm's pose is
+    unstable by theory: joints may swing as they are driven.
+    """
 
     def __init__(self, scenario: Scenario, monitored: bool = True):
-        self.scenario, self.monitored = scenario, monitored
+        self.scenario = scenario
+        self.monitored = monitored and not (scenario.driven and is_stable_at_start(scenario))
         arm: Any = scenario.arm
         self.names, self.ranges = arm.names, arm.ranges
         self.limits = np.array(arm.torque_limit)
@@ -159,3 +168,15 @@ class JointMonitor:
             cause, advice = "a motor stays in its limit", "raise torque_limit, or lower the force"
             return replace(outcome, code="saturated", cause=cause, advice=advice)
         return outcome
+
+
+def is_stable_at_start(scenario: Scenario) -> bool:
+    """Whether the loop of the joints is stable at the arm's pose; so is one that is not known."""
+    arm: Any = scenario.arm
+    law, hand = scenario.controller, scenario.operators[0]
+    if not isinstance(law, JointPD):
+        return True
+    linear = held_arm(arm.linear(), hand or NO_HAND)
+    delay = scenario.hardware.delay if scenario.hardware else 0.0
+    compensated = arm.gravity == "compensated" if law.gravity is None else law.gravity
+    return joint_loop(linear, law, scenario.Ts or scenario.dt, delay, compensated).stable()

@@ -302,7 +302,7 @@ class Outcome:
             "unresolved" (one sample takes too many steps); "interrupted" (on request of progress).
         time: simulated time of the end, or of the verdict on an unstable run that went on [s].
         step: index of the last good sample.
-        axis: the unstable axis, "" if none.
+        axis: the unstable axis, or joint of an arm from a file, "" if none.
         cause: what happened, in words.
         advice: what to change, in words.
     """
@@ -315,7 +315,7 @@ class Outcome:
     advice: str = ""
 
     def __str__(self) -> str:
-        where = f": {self.axis} axis" if self.axis else ""
+        where = f": {self.axis}{' axis' * (self.axis in AXES)}" if self.axis else ""
         return f"{self.code}{where} at {self.time:.4f} s" + (
             f" ({self.cause})" if self.cause else ""
         )

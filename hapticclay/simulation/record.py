@@ -526,7 +526,7 @@ def port_energy(record: Record) -> np.ndarray:
     """
     power = record.fh * record.v
     steps = 0.5 * np.diff(record.t)[:, None] * (power[1:] + power[:-1])
-    return np.concatenate((np.zeros((1, 2)), np.cumsum(steps, axis=0)))
+    return np.concatenate((np.zeros((1, power.shape[1])), np.cumsum(steps, axis=0)))
 
 
 @checked

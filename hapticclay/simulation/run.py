@@ -466,6 +466,10 @@ class Run:
         """Rows as the monitor takes them, shape (12, n), or joint positions, rates and torques."""
         return np.ascontiguousarray((extra if self.row.m.general else made[:, :12]).T)
 
+    def strained(self, n: int, limits: Sequence[float]) -> list[int]:
+        """How many of the last n rows not judged have |tau| of each motor at its limit or above."""
+        return self.row.strained(n, limits)
+
     def is_diverging(self) -> bool:
         """Whether the monitor would find the run unstable by now."""
         watch, n = copy.deepcopy(self.watch), self.filled
@@ -608,6 +612,8 @@ class Run:
         }
         out |= {name: float(x) for name, (x, is_there) in parts.items() if is_there}
         out["residual"] -= out.get("friction", 0.0) + out.get("joint_dampers", 0.0)
+        if m.general:  # it starts at rest; its weight has no zero of energy
+            out["throughput"] = float(w.through)
         return out
 
 

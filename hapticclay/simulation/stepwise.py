@@ -277,11 +277,7 @@ class Simulation:
                     numbers_of("torque", torque, run.scenario.joints, -MOST, MOST, unit="N.m")
                 )
             self._state, begin = None, time.perf_counter()
-            goal = run.i + n
-            with warnings_caught():
-                if not run.advance_unprepared(n):
-                    run.pause = goal
-                    run.go(None)
+            make_steps(run, n)
             self._wall += time.perf_counter() - begin
 
     def reset(self, scenario: Scenario | None = None) -> None:
@@ -377,6 +373,15 @@ class Simulation:
     def _take_over(self, torque: tuple[float, ...]) -> None:
         self._torque = torque
         self._run.take_over(Controller(lambda *measured: (self._torque, ())))
+
+
+def make_steps(run: Run, n: int) -> None:
+    """Makes n steps of a run that has not ended, fewer if it ends."""
+    goal = run.i + n
+    with warnings_caught():
+        if not run.advance_unprepared(n):
+            run.pause = goal
+            run.go(None)
 
 
 class Alone:

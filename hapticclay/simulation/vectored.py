@@ -27,7 +27,7 @@ class VectoredRuns:
         runs: the runs.
         over: which have ended, shape (n,).
         given: the scenario that each began with.
-        shown: the present samples, shape (n, SHOWN), where `is_shown`.
+        shown: the present samples, shape (n, SHOWN), of the runs in `is_shown`, shape (n,).
     """
 
     def __init__(self, scenarios: Sequence[Scenario], engine: str, workers: int, monitored: bool):
@@ -36,8 +36,10 @@ class VectoredRuns:
         self.given = list(scenarios)
         self.force, self.gain = np.zeros((2, n, 2))
         self.looked_at, self.diverging = np.full(n, -np.inf), np.zeros(n, bool)
-        self.shown, self.is_shown = np.zeros((n, SHOWN)), False
+        self.shown, self.is_shown = np.zeros((n, SHOWN)), np.zeros(n, bool)
         self.times, self.rooms = np.zeros(n), np.zeros(n, np.int64)
+        self.prepares = np.zeros(n, bool)  # which cannot advance together
+        self.takes_gain = np.zeros(n, bool)  # whose gains are nothing but two numbers of the model
         self.movers = [mover.Movers() for _ in range(workers)]
         self.pool: ThreadPoolExecutor | None = None
         native = engine == "native"
@@ -72,7 +74,8 @@ class VectoredRuns:
         if self.engine == "native":
             self.kept[k] = [x.of(s) for x in self.movers]
             self.engines[:, k] = [x.row.ctypes.data for x in self.kept[k]]
-        self.is_shown = False
+        self.prepares[k], self.is_shown[k] = run.prepares, False
+        self.takes_gain[k] = scene.takes_gain(run.row.m)
 
     def _sync(self, k: int) -> Run:
         """The run, whose scenario has the present force and gain."""
@@ -107,21 +110,21 @@ class VectoredRuns:
         run = self._sync(k)
         run.change(change(run.scenario))
         run.row.m.drops_events = 1
-        self.changed[k], self.is_shown = True, False
+        self.changed[k], self.is_shown[k] = True, False
 
     def set_gain(self, which: np.ndarray, gain: np.ndarray) -> None:
         """Continues with other gains, in runs that have not ended."""
         other = (gain != self.gain[which]).any(axis=1) & ~self.over[which]
         which, gain = which[other], gain[other]
         self.gain[which], self.changed[which] = gain, True
-        for k, K in zip(which.tolist(), gain.tolist(), strict=True):
-            row = self.runs[k].row
-            if scene.takes_gain(row.m):
-                row.m.axis[0].K, row.m.axis[1].K = K
-            else:
-                self._sync(k)
-                row.m.drops_events = 1
-        self.is_shown = self.is_shown and not len(which)
+        self.is_shown[which] = False
+        plain = self.takes_gain[which]
+        if len(self.models):
+            self.models["axis"]["K"][which[plain], :2] = gain[plain]
+            which = which[~plain]
+        for k in which.tolist():
+            self._sync(k)
+            self.runs[k].row.m.drops_events = 1
 
     # ---- steps
 
@@ -131,7 +134,7 @@ class VectoredRuns:
         which, force = which[other], force[other]
         if not len(which):
             return
-        self.force[which], self.is_shown = force, False
+        self.force[which], self.is_shown[which] = force, False
         steady = force.copy()
         for j, k in enumerate(which.tolist()):
             muscle = self.given[k].muscle
@@ -144,21 +147,20 @@ class VectoredRuns:
             for k, f in zip(which.tolist(), steady.tolist(), strict=True):
                 self.runs[k].push_evenly((0.0, *f, 0.0, 0.0))
 
-    def advance(self, which: np.ndarray, n: int) -> None:
-        """Makes steps of runs that have not ended."""
+    def advance(self, which: np.ndarray, n: int, shows: bool = False) -> None:
+        """Makes steps of runs that have not ended; `shows`: their samples will be asked for."""
         if not len(which):
             return
-        self.is_shown = False
+        self.is_shown[which] = False
         alone, together = self._split(which)
         for k in alone.tolist():
             self._one(k, n)
-        self._draw(together, n)
-        self._together(together, n)
+        self._draw(together, n + shows)
+        self._together(together, n, shows)
 
     def _split(self, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Runs that advance one by one, in Python or with something to prepare, and the others."""
-        native = self.engine == "native"
-        alone = np.array([not native or self.runs[k].prepares for k in which.tolist()], bool)
+        alone = self.prepares[which] if self.engine == "native" else np.ones(len(which), bool)
         return which[alone], which[~alone]
 
     def _draw(self, which: np.ndarray, n: int) -> None:
@@ -175,31 +177,40 @@ class VectoredRuns:
         if run.outcome is not None:
             self._end(k, run)
 
-    def _together(self, which: np.ndarray, n: int) -> None:
-        """Advances rows in one call of each thread."""
+    def _together(self, which: np.ndarray, n: int, shows: bool) -> None:
+        """Advances rows in one call of each thread, which may show them in the same turn."""
         if not len(which):
             return
-        states, left = self.states, which
+        states, left, work = self.states, which, self._show if shows else self._advance
         goal = states["i"] + n
         while len(left):
             part = max(1, self.workers * PART // len(left))
             more = np.minimum(goal[left] - states["i"][left], part)
             self.rooms[left] = np.minimum(states["row"][left] + more, CHUNK - 1)
-            self._call(self._advance, left)
+            self._call(work, left)
+            if shows:
+                self._put_force(left)
             done = (states["code"][left] != path.OPEN) | (states["row"][left] >= CHUNK - 1)
             for k in left[done].tolist():
                 self._settle(k)
             left = left[~self.over[left]]
             left = left[states["i"][left] < goal[left]]
+        self.is_shown[which] = shows
         self.times[which] = np.where(self.over[which], self.times[which], states["t"][which])
 
+    def _at(self, which: np.ndarray) -> tuple[int, int, int, int]:
+        """Rows as compiled code takes them."""
+        return self.models.ctypes.data, self.states.ctypes.data, which.ctypes.data, len(which)
+
     def _advance(self, thread: int, which: np.ndarray) -> None:
-        at = self.models.ctypes.data, self.states.ctypes.data, which.ctypes.data, len(which)
-        machine().advance(*at, self.rooms.ctypes.data, self.monitored)
+        machine().advance(*self._at(which), self.rooms.ctypes.data, self.monitored)
+
+    def _show(self, thread: int, which: np.ndarray) -> None:
+        self._advance(thread, which)
+        self._peek(thread, which)
 
     def _peek(self, thread: int, which: np.ndarray) -> None:
-        at = self.models.ctypes.data, self.states.ctypes.data, which.ctypes.data, len(which)
-        machine().peek(*at, self.spares[thread].ctypes.data, self.shown.ctypes.data)
+        machine().peek(*self._at(which), self.spares[thread].ctypes.data, self.shown.ctypes.data)
 
     def _call(self, work: Callable[[int, np.ndarray], None], which: np.ndarray) -> None:
         """Does work for rows, a part of them in each thread; raises once all is done."""
@@ -210,8 +221,9 @@ class VectoredRuns:
             work(0, parts[0])
             return
         self.pool = self.pool or ThreadPoolExecutor(self.workers)
-        futures = [self.pool.submit(work, i, part) for i, part in enumerate(parts)]
+        futures = [self.pool.submit(work, i, part) for i, part in enumerate(parts) if i]
         try:
+            work(0, parts[0])
             wait(futures)
         finally:
             for x in futures:
@@ -235,29 +247,39 @@ class VectoredRuns:
 
     def show(self) -> np.ndarray:
         """The present samples, shape (n, SHOWN)."""
-        if not self.is_shown:
-            alone, together = self._split(np.flatnonzero(~self.over))
+        stale = np.flatnonzero(~(self.over | self.is_shown))
+        if len(stale):
+            alone, together = self._split(stale)
             for k in alone.tolist():
                 self.shown[k] = self.runs[k].ahead()
             if len(together):
                 self._draw(together, 1)
                 self._call(self._peek, together)
                 self._put_force(together)
-            self.is_shown = True
+            self.is_shown[stale] = True
         return self.shown
 
     def _put_force(self, which: np.ndarray) -> None:
         """Puts the force of clay that is not recorded beside the samples shown."""
-        m, shown = self.models[which], self.shown
-        plain = m["records_clay_force"] == 0
-        at = which[plain & (m["rotated"] == 0)]
+        m, shown = self.models, self.shown
+        which = which[m["records_clay_force"][which] == 0]
+        rotated = m["rotated"][which] == 1
+        at = which[~rotated]
         shown[at, ROW:] = shown[at, 12:14] * shown[at, 4:6]
-        for k in which[plain & (m["rotated"] == 1)].tolist():
+        for k in which[rotated].tolist():
             self.runs[k].put_force(shown[k])
 
     def torque_reached(self, n: int, k: int) -> np.ndarray:
         """As `Run.torque_reached`, shape (runs, 2)."""
         return np.array([run.torque_reached(n, k) for run in self.runs])
+
+    def strained(self, n: int, limits: Sequence[float]) -> np.ndarray:
+        """As `Run.strained`, shape (runs, 2)."""
+        if not len(self.models):
+            return np.array([run.strained(n, limits) for run in self.runs])
+        which, found = np.arange(len(self.runs)), np.zeros((len(self.runs), 2), np.int64)
+        machine().strained(*self._at(which), n, *limits, found.ctypes.data)
+        return found
 
     def look(self) -> np.ndarray:
         """Whether the motion of each run is unstable by now, evaluated again after LOOK."""

@@ -32,6 +32,9 @@ from .population import Hands as Hands
 from .population import gain_band as gain_band
 from .probability import Probability as Probability
 from .removal import removed as removed
+from .replay import Recording as Recording
+from .replay import Replayed as Replayed
+from .replay import replay as replay
 from .robustness import Cost as Cost
 from .robustness import Instability as Instability
 from .robustness import RiskMap as RiskMap

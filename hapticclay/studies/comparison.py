@@ -26,6 +26,7 @@ from ..theory.gain_limits import gain_limit
 from ..theory.impedance import Impedance, loop_response, wall_response
 from ..theory.loops import TIMING, Loop
 from ..theory.mbk import dynamic_range, least_mass
+from .replay import Drive, Recording, Replayed, beside, driven
 from .zwidth import ZRegion, zwidth
 
 MOST_COMPARED = 5  # the number of distinct curve styles
@@ -54,6 +55,7 @@ class Compared:
         settings: every field by dotted name.
         record: its run.
         region: for a wall, the stiffness and damping that its device renders stably, by runs.
+        replayed: the run beside the recording that drove it; None for a run of its own.
     """
 
     name: str
@@ -63,6 +65,7 @@ class Compared:
     settings: dict[str, Any]
     record: Record
     region: ZRegion | None = None
+    replayed: Replayed | None = None
 
     @property
     def wall(self) -> VirtualWall:
@@ -144,6 +147,8 @@ def compare_files(
     paths: Sequence[str | os.PathLike[str]],
     axis: str = "x",
     progress: Callable[[Iterable], Iterable] = iter,
+    recording: Recording | None = None,
+    drive: Drive = "force",
 ) -> Comparison:
     """Loads, judges and runs controllers (scenario files) or bare devices (files of walls).
 
@@ -151,10 +156,13 @@ def compare_files(
         paths: two to MOST_COMPARED different files of one kind.
         axis: axis of the arm, for scenarios.
         progress: wraps the iterable of the files.
+        recording: a recorded force or motion under which scenarios run, each beside it; None for
+            the scenarios as they are.
+        drive: what of the recording drives them.
 
     Raises:
-        ParameterError: fewer or more files, one of them twice, files of both kinds, or one that
-            cannot be read.
+        ParameterError: fewer or more files, one of them twice, files of both kinds, one that
+            cannot be read, or a recording for walls.
     """
     for p in paths:
         if not isinstance(p, str | os.PathLike):
@@ -171,9 +179,13 @@ def compare_files(
         raise ParameterError("files", given, bound)
     stems = [Path(p).stem for p in paths]
     names = stems if len(set(stems)) == len(stems) else [str(p) for p in paths]
-    judge = compared_wall if kinds == {True} else compared_scenario
     pairs = progress(list(zip(paths, names, strict=True)))
-    return Comparison(tuple(judge(p, n, axis) for p, n in pairs))
+    if kinds == {True}:
+        if recording is not None:
+            bound = "is for scenarios: leave it out with walls"
+            raise ParameterError("recording", recording.name, bound)
+        return Comparison(tuple(compared_wall(p, n) for p, n in pairs))
+    return Comparison(tuple(compared_scenario(p, n, axis, recording, drive) for p, n in pairs))
 
 
 def is_wall_file(path: str | os.PathLike[str]) -> bool:
@@ -184,8 +196,14 @@ def is_wall_file(path: str | os.PathLike[str]) -> bool:
     )
 
 
-def compared_scenario(path: str | os.PathLike[str], name: str, axis: str) -> Compared:
-    """Judges and runs the controller of a scenario file.
+def compared_scenario(
+    path: str | os.PathLike[str],
+    name: str,
+    axis: str,
+    recording: Recording | None = None,
+    drive: Drive = "force",
+) -> Compared:
+    """Judges and runs the controller of a scenario file, under a recording if there is one.
 
     Margins, worst hand, passivity and steady damper are computed in continuous time without delay;
     the gain limit is computed with the scenario's own sampling and delay.
@@ -193,7 +211,8 @@ def compared_scenario(path: str | os.PathLike[str], name: str, axis: str) -> Com
     scenario = Scenario.load(path)
     loop = Loop.of(scenario, axis)
     plain = replace(loop, **TIMING)
-    record, error = run_and_error(scenario)
+    record, error = run_and_error(driven(scenario, recording, drive) if recording else scenario)
+    replayed = beside(record, recording, drive) if recording else None
     alone = replace(plain, operator=None)
     m = stability_margins.margins(plain)
     Z = loop_response(alone, np.array([SLOW])).Z[0]
@@ -213,11 +232,12 @@ def compared_scenario(path: str | os.PathLike[str], name: str, axis: str) -> Com
         "least mass in free motion [kg]": least_mass(replace(loop, b=0.0, k=0.0), LEAST_DECAY)[0],
     }
     settings = _by_dotted_name(plain_data(scenario, left_out=[]))
-    found = Compared(name, scenario, loop, numbers, settings, record)
-    return replace(found, numbers=numbers | _felt_numbers(found) | _run_numbers(record, error))
+    found = Compared(name, scenario, loop, numbers, settings, record, None, replayed)
+    of_run = _run_numbers(record, error) | (_off_numbers(replayed) if replayed else {})
+    return replace(found, numbers=numbers | _felt_numbers(found) | of_run)
 
 
-def compared_wall(path: str | os.PathLike[str], name: str, axis: str = "x") -> Compared:
+def compared_wall(path: str | os.PathLike[str], name: str) -> Compared:
     """Judges and runs the wall of a file."""
     wall = VirtualWall.load(path)
     record, error = run_and_error(wall.scenario(PUSHED_TIME, push=PUSHED))
@@ -287,6 +307,14 @@ def _run_numbers(record: Record, error: float) -> dict[str, float]:
         "change of position at half the step [m]": error,
         "engine steps": float(record.steps),
         "run time [s]": record.wall_time,
+    }
+
+
+def _off_numbers(replayed: Replayed) -> dict[str, float]:
+    """How far a run is from its recording."""
+    return {
+        "off the recorded motion, rms [mm]": 1e3 * replayed.off,
+        "off the recorded force, rms [N]": replayed.force_off,
     }
 
 

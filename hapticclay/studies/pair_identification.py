@@ -40,6 +40,11 @@ ELASTIC = 0.9  # square of the correlation from which on a contact is a spring
 AXIS_STEP = 1e-3  # of differences, where friction stops and starts the axis
 ROUNDS = 12  # of that fit
 INERTIAL = 0.25  # of the torque: below it, friction's errors are read as inertia
+PUSHED = 0.5  # of the error that a free follower may leave unexplained
+PUSHED_TOLD = (
+    "the follower moves otherwise than its motor pushes it: a hand or a load may act there; "
+    "inertia and friction are not identified"
+)
 MISFIT = 0.02  # of a torque that a law leaves, above which a warning is given
 
 
@@ -169,11 +174,17 @@ def identify_pair(
     numbers += more
     simulated, axis = np.zeros(0), None
     if _is_free(log):
-        axis, found, simulated = _mechanics(log, law, level)
-        numbers += _axis_numbers(found)
-        warnings += _weak_inertia(log, axis)
+        axis, found, simulated = _mechanics(log, law, fit, level)
+        left = float(np.std(simulated - (log.leader - log.follower)))
+        if left > PUSHED * float(np.std(log.leader - log.follower)):
+            axis, simulated = None, np.zeros(0)
+            warnings.append(PUSHED_TOLD)
+        else:
+            numbers += _axis_numbers(found)
+            warnings += _weak_inertia(log, axis)
     else:
         numbers += _contact(log, law, band, level)
+        numbers += _felt(architecture, numbers)
         warnings.append("the follower touches something: inertia and friction are not identified")
     if log.force is None:
         warnings.append("no force on the follower was logged: it is taken as free")
@@ -228,24 +239,33 @@ def _is_free(log: PairLog) -> bool:
     return log.force is None or float(np.std(log.force)) < FREE * float(np.std(log.follower_torque))
 
 
-def _mechanics(log: PairLog, law: PairLaw, level: float) -> tuple[Axis, BlockFit, np.ndarray]:
+def _mechanics(
+    log: PairLog, law: PairLaw, of_law: BlockFit, level: float
+) -> tuple[Axis, BlockFit, np.ndarray]:
     """Inertia and friction of a free follower; the error of the one that they make."""
-    target = delayed(log.t, log.leader, law.link).tolist()
     first = max(3, round(0.03 / log.Ts))
     speed = float(np.polyfit(log.t[:first] - log.t[0], log.follower[:first], 1)[0])
     begin = float(log.follower[0]), speed
     after = log.t >= log.t[0] + SETTLED
 
-    def moved(axis: Axis) -> np.ndarray:
+    def moved(axis: Axis, law: PairLaw) -> np.ndarray:
+        target = delayed(log.t, log.leader, law.link).tolist()
         starts = lambda: law.start(log.Ts, target[0] - begin[0])  # noqa: E731
         return follow(axis, target, starts, begin, log.Ts, law.late)
 
-    def rest(x: np.ndarray) -> np.ndarray:
-        return (moved(Axis(*x.tolist())) - log.follower)[after]
+    def rest(x: np.ndarray, law: PairLaw = law) -> np.ndarray:
+        return (moved(Axis(*x.tolist()), law) - log.follower)[after]
 
     found = block_fit(rest, _axis_guess(log), level, AXIS_STEP, ROUNDS)
-    axis = Axis(*found.values.tolist())
-    return axis, found, log.leader - moved(axis)
+    axis, covariance = Axis(*found.values.tolist()), of_law.covariance[:4, :4]
+    if np.isfinite(covariance).all():
+        steps = np.sqrt(np.diag(covariance))
+        pairs = zip(law._fields[:4], steps.tolist(), strict=True)
+        laws = [law._replace(**{name: getattr(law, name) + h}) for name, h in pairs]
+        slopes = [rest(found.values, x) - found.rest for x in laws]
+        scaled = covariance / np.outer(steps, steps)
+        found = found.given(np.column_stack(slopes), scaled)
+    return axis, found, log.leader - moved(axis, law)
 
 
 def _weak_inertia(log: PairLog, axis: Axis) -> list[str]:
@@ -293,19 +313,43 @@ def _axis_numbers(fit: BlockFit) -> list[PairNumber]:
 
 
 def _contact(log: PairLog, law: PairLaw, band: float, level: float) -> list[PairNumber]:
-    """Stiffness of what the follower pushes, and the stiffness that the leader's motor shows."""
+    """Stiffness of what the follower pushes, by sensor and motor, and what the leader shows."""
     assert log.force is not None
-    k = _slope(log, log.follower, log.force, band, level)
-    if k is None:
+    pairs = (
+        ("contact stiffness", log.follower, log.force),
+        ("contact stiffness, motor", log.follower, log.follower_torque),
+        ("felt, measured", log.leader, log.leader_torque),
+    )
+    fits = {
+        name: _slope(log, x, -y if x is log.leader else y, band, level)
+        for name, x, y in pairs
+        if y is not None
+    }
+    found = {n: _number(n, "N.m/rad", fit, 0) for n, fit in fits.items() if fit is not None}
+    return list(found.values()) if "contact stiffness" in found else []
+
+
+def _felt(architecture: str, numbers: list[PairNumber]) -> list[PairNumber]:
+    """The stiffness that the leader's motor should show: of what pushes it, over its motion.
+
+    With k by the sensor and K by the motor, the follower is behind by K q/P. So F/q_l is
+    k P/(K + P), and u/q_l is K P/(K + P).
+    """
+    by_name = {x.name: x for x in numbers}
+    k, K = by_name.get("contact stiffness"), by_name.get("contact stiffness, motor")
+    if k is None or K is None or architecture == "unknown":
         return []
-    numbers = [_number("contact stiffness", "N.m/rad", k, 0)]
-    P, K = law.P, float(k.values[0])
-    low, high = (P * x / (P + x) for x in (K - k.half[0], K + k.half[0]))
-    numbers.append(PairNumber("felt, k P/(k + P)", "N.m/rad", P * K / (P + K), low, high))
-    if log.leader_torque is not None:
-        felt = _slope(log, log.leader, -log.leader_torque, band, level)
-        numbers += [_number("felt, measured", "N.m/rad", felt, 0)] if felt else []
-    return numbers
+    P, pushed = by_name["P"].value, K if architecture == "position-position" else k
+    name = "felt, K P/(K + P)" if pushed is K else "felt, k P/(K + P)"
+    value, low, high = (
+        by_name["force scale"].value * x if pushed is k else x
+        for x in (
+            pushed.value * P / (K.value + P),
+            pushed.low * P / ((K.low if pushed is K else K.high) + P),
+            pushed.high * P / ((K.high if pushed is K else K.low) + P),
+        )
+    )
+    return [PairNumber(name, "N.m/rad", value, low, high)]
 
 
 def _slope(

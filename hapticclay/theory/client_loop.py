@@ -19,10 +19,10 @@ import numpy as np
 from ..arguments import checked
 from ..display import brief
 from ..errors import Bound, ParameterError, number
-from ..model.controller import matrix_exponential
 from ..model.operator import NO_HAND
 from ..scene.scenario import Scenario
 from . import linear_loop, roots
+from .joint_loop import JointLoop
 
 STIFFEST = 1e9  # [N/m] end of the search for a limit
 SCANNED = 240  # values of K in the search, spaced evenly in log K
@@ -30,7 +30,6 @@ SOFTEST = 1e-3  # [N/m] start of the search
 AT_REST = 1e-6  # modes this near to z = 1 are rigid motion of the handle, which may have no spring
 ROUNDING = 1e-12  # of an eigenvalue
 PERIODS = 199  # in the search for the longest one
-LONGEST_QUEUE = 500  # samples of delay
 
 
 @dataclass(frozen=True)
@@ -76,33 +75,9 @@ class Handle:
 
 def client_map(handle: Handle, K: float, B: float, Ts: float, delay: float) -> np.ndarray:
     """State matrix of the sampled loop, x(k+1) = A x(k): position, velocity, delayed forces."""
-    whole, part = linear_loop.whole_samples(delay, Ts)
-    if whole > LONGEST_QUEUE:
-        raise ParameterError("delay", delay, f"must be {LONGEST_QUEUE} samples at most")
-    first, old = _held(handle, part * Ts)
-    rest, new = _held(handle, (1.0 - part) * Ts)
-    n = 4 + whole + 1
-    A = np.zeros((n, n))
-    A[:4, :4] = rest @ first
-    law = np.zeros(n)
-    law[:2], law[2:4] = -K * handle.normal, -B * handle.normal
-    queue = [law, *np.eye(n)[4:]]  # forces of this sample, of the one before, ...
-    A[:4] += np.outer(new, queue[whole]) + np.outer(rest @ old, queue[whole + 1])
-    for j in range(whole + 1):
-        A[4 + j] = queue[j]
-    return A
-
-
-def _held(handle: Handle, t: float) -> tuple[np.ndarray, np.ndarray]:
-    """Transition of position and velocity over a time, and the response to a held normal force."""
-    inverse = np.linalg.inv(handle.inertia)
-    a = np.zeros((5, 5))
-    a[:2, 2:4] = np.eye(2)
-    a[2:4, :2] = -inverse * handle.stiffness
-    a[2:4, 2:4] = -inverse * handle.damping
-    a[2:4, 4] = inverse @ handle.normal
-    e = matrix_exponential(a * t)
-    return e[:4, :4], e[:4, 4]
+    along = np.outer(handle.normal, handle.normal)
+    hand = np.diag(handle.damping), np.diag(handle.stiffness)
+    return JointLoop(handle.inertia, *hand, K * along, B * along, Ts, delay).map()
 
 
 def holds(handle: Handle, K: float, B: float, Ts: float, delay: float) -> bool:

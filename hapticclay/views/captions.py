@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..arms.joint_law import JointPD
 from ..model.arm import PAPER
 from ..model.compensator import PRINTED
 from ..model.controller import SERVO
@@ -49,11 +50,15 @@ def scenario_parts(s: Scenario) -> list[str]:
         return f"({x[0]:.3g}, {x[1]:.3g})"
 
     how = f"K = {pair(s.gain)}" if s.controller is None else "own controller"
+    if isinstance(s.controller, JointPD):
+        how = s.controller.words
     out = [f"{s.name}: {how}"]
-    if s.muscle is None:
+    if s.muscle is None and (s.is_closed_form or any(s.force)):
         out.append(f"u$_h$ = {pair(s.force)} N")
     if s.clay:
         out += [clay_text(x.text(MOST_KINDS)) for x in s.clay.words]
+    if not s.is_closed_form:
+        return out + ["hand at the handle"] * any(s.operators)
     printed = {"arm": PAPER, "servo": SERVO, "compensator": (PRINTED, PRINTED)}
     own = {"arm": s.arm, "servo": s.servo, "compensator": s.compensators}
     out += [f"another {name}" for name, part in own.items() if part != printed[name]]

@@ -18,8 +18,9 @@ from ..theory.gain_limits import gain_limit
 from ..theory.loops import TIMING
 from . import figure as shown
 from .impedance_plots import parts_panels
+from .palette import BLACK
 from .panels import add_legend, curve_look, hollow, label_axes, level, plain_ticks, positive, single
-from .style import figure_style
+from .style import figure_style, stroke
 from .wall_plots import regions_plot
 
 CLAY_DAMPINGS = np.geomspace(1.0, 3000.0, 61)  # of the line of gain limits [N.s/m]
@@ -42,6 +43,8 @@ def compare_figures(found: Comparison) -> dict[str, tuple[str, shown.Figure]]:
             "velocity": ("Velocity over position", velocity_overlay),
             "stability": ("Gain limit over the damping of the clay", gain_overlay),
         }
+        if found[0].replayed and found[0].replayed.recorded_p is not None:
+            first = {"recording": ("Beside the recorded motion", recording_overlay), **first}
         last = {"transparency": ("Share of the clay in the hand's force", transparency_overlay)}
     return {
         name: (title, shown.Figure(partial(plot, found)))
@@ -78,6 +81,26 @@ def velocity_overlay(found: Comparison) -> Figure:
         return 100.0 * file.record.p[:, i], file.record.v[:, i]
 
     return _overlay(found, velocity, f"position {axis} [cm]", f"velocity v$_{axis}$ [m/s]")
+
+
+@figure_style()
+def recording_overlay(found: Comparison) -> Figure:
+    """Plots the motion of each run over time, and the recorded one."""
+    axis = found[0].loop.axis if found[0].loop else "x"
+    i = AXES.index(axis)
+
+    def motion(file: Compared) -> tuple[np.ndarray, np.ndarray]:
+        assert file.replayed is not None
+        return file.replayed.t, 1e3 * file.replayed.p[:, i]
+
+    figure = _overlay(found, motion, "time [s]", f"position {axis} [mm]")
+    longest = max((x.replayed for x in found if x.replayed), key=lambda x: len(x.t))
+    if longest.recorded_p is not None:
+        look = {"color": BLACK, "lw": stroke(0.8), "zorder": 3}
+        figure.axes[0].plot(longest.t, 1e3 * longest.recorded_p[:, i], label="recorded", **look)
+    figure.legends[0].remove()
+    add_legend(figure, 3)
+    return figure
 
 
 @figure_style()

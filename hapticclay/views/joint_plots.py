@@ -13,7 +13,7 @@ from ..theory.fed_friction import FrictionCycle
 from ..theory.joint_gains import JointLimits
 from ..theory.joint_poses import OverPoses
 from ..theory.joint_walls import WallLimit
-from .palette import BLACK, BLUE, VERMILION
+from .palette import BLACK, BLUE, LIGHT_GREY, VERMILION
 from .panels import curve_look, hollow, label_axes, level, set_title, single
 from .style import figure_size, figure_style, points, stroke
 
@@ -78,37 +78,48 @@ def friction_plot(found: FrictionCycle) -> Figure:
         if np.isfinite(growth[j]).any():
             ax.plot(found.line_rate[j], growth[j], **curve_look(j), label=name)
     rates = 2.0 * math.pi * found.first_frequency * found.first_amplitude
+    rates = np.where(np.isnan(rates), found.rate, rates)  # of a drift
     for kind, rate in zip(found.kind, rates, strict=True):
-        face = {"mfc": BLACK} if kind == "limit cycle" else {}
+        face = {} if kind == "threshold" else {"mfc": BLACK}
         ax.plot(rate, 0.0, **(hollow(BLACK, size=5.0) | face))
     level(ax)
-    ax.set(xscale="log", ylim=(-1.5 * most, 1.2 * most))
+    ends = found.line_rate.min(), found.line_rate.max()
+    ax.set(xscale="log", xlim=ends, ylim=(-1.5 * most, 1.2 * most))
     label_axes(ax, "largest rate of the joint [rad/s]", "growth [1/s]")
     if ax.get_legend_handles_labels()[0]:
         ax.legend()
-    set_title(ax, "motion under friction fed forward", "full dots: limit cycles; open: thresholds")
+    set_title(
+        ax, "motion under friction fed forward", "full dots: what it tends to; open: thresholds"
+    )
     return figure
 
 
 @figure_style(axes_grid=False)
 def poses_plot(found: OverPoses) -> Figure:
-    """Plots the largest factor of all gains where the handle is, the worst pose marked."""
+    """Plots the largest factor of all gains where the handle is, the worst pose marked.
+
+    Poses without one are grey; if there is none anywhere, the radius takes its place.
+    """
+    values, label = found.scale, "largest factor of all Kp"
+    if not np.isfinite(values).any():
+        values, label = found.radius, "radius: below 1 the loop is stable"
+    known = np.isfinite(values)
     figure = Figure(figsize=figure_size(2, 4.0))
     left, right = figure.add_gridspec(1, 2, width_ratios=(1.3, 1.0))
     space = figure.add_subplot(left, projection="3d")
-    marks = space.scatter(*found.p.T, c=found.scale, cmap="viridis")  # type: ignore[misc]
+    if not known.all():
+        space.scatter(*found.p[~known].T, color=LIGHT_GREY)
+    marks = space.scatter(*found.p[known].T, c=values[known], cmap="viridis")  # type: ignore[misc]
     space.scatter(*found.p[found.worst], s=90, facecolors="none", edgecolors=VERMILION)
     space.view_init(ELEVATION, AZIMUTH)
     space.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
     for axis in (space.xaxis, space.yaxis, space.zaxis):
         axis.set_major_locator(MaxNLocator(4))
-    figure.colorbar(marks, ax=space, shrink=0.6, pad=0.16, label="largest factor of all Kp")
+    figure.colorbar(marks, ax=space, shrink=0.6, pad=0.16, label=label)
     share = figure.add_subplot(right)
-    finite = found.scale[np.isfinite(found.scale)]
-    if len(finite):
-        ends = finite.min() * (1.0 - SPREAD), finite.max() * (1.0 + SPREAD)
-        share.hist(finite, bins=24, range=ends, color=BLUE, alpha=0.6)
+    ends = values[known].min() * (1.0 - SPREAD), values[known].max() * (1.0 + SPREAD)
+    share.hist(values[known], bins=24, range=ends, color=BLUE, alpha=0.6)
     share.axvline(1.0, color=VERMILION, lw=stroke(1.2))
-    share.set(xlabel="largest factor of all Kp", ylabel="poses")
+    share.set(xlabel=label, ylabel="poses")
     set_title(share, f"{len(found.q)} poses", "the worst is circled")
     return figure

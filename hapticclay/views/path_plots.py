@@ -19,7 +19,7 @@ from .panels import add_legend, draw_path, map_axes, set_title
 from .run_axes import MOST_BORDERS
 from .style import figure_style, map_size, points, stroke
 
-BEYOND = 1e4  # [cm], past every path
+BEYOND = 1e5  # [cm or mm], past every path
 PICTURE_SIZE = 400  # pixels of a picture of other clay, along x and along y
 
 
@@ -38,7 +38,7 @@ def path_plot(record: Record) -> Figure:
     wider = max(0.0, 0.5 * (room - (high - low)[0]))  # axes as wide as the title over them
     low[0], high[0] = low[0] - wider, high[0] + wider
     if record.scenario.clay:
-        _clay_map(ax, record.scenario.clay, low, high)
+        clay_map(ax, record.scenario.clay, low, high)
     draw_path(ax, p, "handle")
     map_axes(ax, low, high)
     add_legend(figure)
@@ -46,17 +46,17 @@ def path_plot(record: Record) -> Figure:
     return figure
 
 
-def _clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
-    """Shades each region of the clay and labels its resistance."""
+def clay_map(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray, scale: float = 100.0) -> None:
+    """Shades each region of the clay and labels its resistance; `scale` units are a metre."""
     for block in clay.blocks:
         (x0, x1), (y0, y1) = block.x, block.y
-        _shade(ax, 100.0 * x0, 100.0 * x1, 100.0 * y0, 100.0 * y1, 1.0)
-    edges = [sorted({-BEYOND, BEYOND, *(100.0 * x for x in e)}) for e in clay.edges]
+        _shade(ax, scale * x0, scale * x1, scale * y0, scale * y1, 1.0)
+    edges = [sorted({-BEYOND, BEYOND, *(scale * x for x in e)}) for e in clay.edges]
     if "place" in clay.varies or max(map(len, edges)) > MOST_BORDERS:
-        _clay_image(ax, clay, low, high)
+        _clay_image(ax, clay, low, high, scale)
         return
     for (x0, x1), (y0, y1) in itertools.product(*map(itertools.pairwise, edges)):
-        middle = 0.005 * (x0 + x1), 0.005 * (y0 + y1)
+        middle = 0.5 * (x0 + x1) / scale, 0.5 * (y0 + y1) / scale
         share = float(clay_share(clay, *middle))
         if not share:
             continue
@@ -75,10 +75,10 @@ def _shade(ax: Axes, x0: float, x1: float, y0: float, y1: float, share: float) -
     ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, **look))
 
 
-def _clay_image(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray) -> None:
-    """Shades clay of many cells with an image [cm]."""
+def _clay_image(ax: Axes, clay: Clay, low: np.ndarray, high: np.ndarray, scale: float) -> None:
+    """Shades clay of many cells with an image."""
     x, y = (np.linspace(low[i], high[i], PICTURE_SIZE + 1) for i in (0, 1))
-    middle = 0.005 * (x[1:] + x[:-1]), 0.005 * (y[1:] + y[:-1])
+    middle = 0.5 * (x[1:] + x[:-1]) / scale, 0.5 * (y[1:] + y[:-1]) / scale
     share = clay_share(clay, middle[0], middle[1][:, None])
     colors = np.concatenate((clay_color(share), CLAY_ALPHA * (share > 0.0)[..., None]), axis=2)
     ax.imshow(colors, extent=(x[0], x[-1], y[0], y[-1]), origin="lower", zorder=0)

@@ -11,10 +11,13 @@ from matplotlib.figure import Figure
 from ..arguments import checked
 from ..errors import ParameterError
 from ..simulation.record import Record, port_energy
-from . import path_plots, run_axes, run_figures, run_plots
-from .palette import BLUE, GREEN, ORANGE, VERMILION
+from . import arm_plots, path_plots, run_axes, run_figures, run_plots
+from .palette import BLUE, GREEN, ORANGE, PURPLE, VERMILION
 from .panels import add_legend, set_title, single
+from .run_axes import spread
 from .style import figure_style, stroke
+
+MOST_STORED = 2000  # samples at which the energy of an arm from a file is computed
 
 
 class RecordPlots:
@@ -31,11 +34,17 @@ class RecordPlots:
         self.record = record
 
     def __call__(self) -> Figure:
-        """The main figure that `hapticclay run` draws: velocity, in a maneuver the force."""
+        """The main figure that `hapticclay run` draws: velocity, in a maneuver the force.
+
+        Of an arm from a file: its joints.
+        """
+        if not self.record.scenario.is_closed_form:
+            return self.joints()
         return self.velocity() if self.record.scenario.muscle is None else self.force()
 
     def __repr__(self) -> str:
-        return f"<plots of {self.record!r}: plot(), .velocity(), .force(), .path(), .energy()>"
+        names = "velocity", "force", "path", "joints", "handle", "energy"
+        return f"<plots of {self.record!r}: plot(), {', '.join(f'.{x}()' for x in names)}>"
 
     def all(self) -> dict[str, Figure]:
         """The figures that `hapticclay run` draws, by file name."""
@@ -69,7 +78,18 @@ class RecordPlots:
 
     def path(self) -> Figure:
         """The path of the handle over a map of the clay (Figs. 7, 9)."""
-        return _with_picture(path_plots.path_plot(self._sampled()))
+        record = self._sampled()
+        if not record.scenario.is_closed_form:
+            return _with_picture(arm_plots.arm_path_plot(record))
+        return _with_picture(path_plots.path_plot(record))
+
+    def joints(self) -> Figure:
+        """Position, rate and torque of each joint over time, with reference and limits."""
+        return _with_picture(arm_plots.joints_plot(self._sampled()))
+
+    def handle(self) -> Figure:
+        """Position, velocity and forces of the handle over time."""
+        return _with_picture(arm_plots.handle_plot(self._sampled()))
 
     def energy(self) -> Figure:
         """Energy over time: supplied by hand and motors, absorbed by the clay, and kinetic.
@@ -95,27 +115,42 @@ def energies(record: Record) -> dict[str, np.ndarray]:
         steps = 0.5 * np.diff(record.t) * (power[1:] + power[:-1])
         return np.concatenate(([0.0], np.cumsum(steps)))
 
-    I1, I2 = record.scenario.arm.links[2:4]
-    rates = record.qd[:, 0], record.qd.sum(axis=1)  # of the links
-    return {
+    out = {
         "hand": port_energy(record).sum(axis=1),
         "motors": work((record.tau * record.qd).sum(axis=1)),
         "clay": work((record.fe * record.v).sum(axis=1)),
-        "kinetic": 0.5 * (I1 * rates[0] ** 2 + I2 * rates[1] ** 2),
     }
+    if not record.scenario.is_closed_form:
+        arm: Any = record.scenario.arm
+        lost = np.array(arm.damping) * record.qd**2 + np.array(arm.friction) * np.abs(record.qd)
+        return out | {"joints": work(lost.sum(axis=1)), "stored": _stored(record)}
+    I1, I2 = record.scenario.arm.links[2:4]
+    rates = record.qd[:, 0], record.qd.sum(axis=1)  # of the links
+    return out | {"kinetic": 0.5 * (I1 * rates[0] ** 2 + I2 * rates[1] ** 2)}
+
+
+def _stored(record: Record) -> np.ndarray:
+    """Energy of motion, weight and springs that an arm from a file has gained [J]."""
+    mechanism: Any = record.scenario.arm.mechanism  # type: ignore[union-attr]
+    shown = spread(np.arange(len(record.t)), MOST_STORED)
+    found = np.array([mechanism.energy(record.q[k], record.qd[k]) for k in shown])
+    return np.interp(record.t, record.t[shown], found - found[0])
 
 
 @figure_style()
 def energy_plot(record: Record) -> Figure:
     """Plots `energies` over time, and as dots the run's own energy balance.
 
-    Energy is conserved: without friction, hand + motors = clay + kinetic energy gained.
+    Energy is conserved: without friction, hand + motors = clay + kinetic energy gained; of an arm
+    from a file, hand + motors = clay + joints + stored.
     """
     looks = {
         "hand": (GREEN, "-", "put in by the hand"),
         "motors": (ORANGE, "-", "put in by the motors"),
         "clay": (BLUE, "-", "taken by the clay"),
         "kinetic": (VERMILION, "--", "kinetic, of the arm"),
+        "joints": (PURPLE, "-", "taken by the joints' dampers and friction"),
+        "stored": (VERMILION, "--", "of the arm: motion, weight, springs"),
     }
     figure, ax = single(3.6)
     for name, values in energies(record).items():
@@ -136,7 +171,10 @@ def _added_up(record: Record) -> dict[str, float]:
     if not {"muscle", "hand_damper", "hand_stored", "motors", "clay"} <= set(e):
         return {}
     hand = e["muscle"] - e["hand_damper"] - e["hand_stored"]
-    return {"hand": hand, "motors": e["motors"], "clay": e.get("rendered_clay", e["clay"])}
+    out = {"hand": hand, "motors": e["motors"], "clay": e.get("rendered_clay", e["clay"])}
+    if getattr(record.scenario.controller, "runs", "host") == "drive":
+        del out["motors"]  # the balance has the drives' springs as stored energy
+    return out
 
 
 def _with_picture(figure: Figure) -> Figure:

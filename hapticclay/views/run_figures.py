@@ -13,8 +13,10 @@ from matplotlib.figure import Figure
 from ..model.cells import Profile
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
+from ..simulation.columns import COLUMNS, parts_of
 from ..simulation.record import Record
 from . import figure as shown
+from .arm_plots import arm_path_plot, handle_plot, joints_plot
 from .flow_plots import force_velocity_plot
 from .path_plots import ground_of, ground_plot, path_plot
 from .run_axes import is_viscous, main_axis
@@ -30,8 +32,23 @@ def shown_axes(s: Scenario) -> str:
     return "xy" if _clay_along_both_axes(s) else main_axis(s)
 
 
+def _bare(s: Scenario) -> bool:
+    """Whether the arm is one from a file, without clay: `handle` shows its velocity and force."""
+    return s.clay is None and not s.is_closed_form
+
+
+def _joints(record: Record) -> Figure | None:
+    return None if record.scenario.is_closed_form or not len(record.t) else joints_plot(record)
+
+
+def _handle(record: Record) -> Figure | None:
+    return None if record.scenario.is_closed_form or not len(record.t) else handle_plot(record)
+
+
 def _velocity(record: Record) -> Figure | None:
     s = record.scenario
+    if _bare(s):
+        return None
     if s.muscle is not None and s.clay is None:
         return None
     return velocity_plot(record, shown_axes(s))
@@ -39,6 +56,8 @@ def _velocity(record: Record) -> Figure | None:
 
 def _force(record: Record) -> Figure | None:
     s = record.scenario
+    if _bare(s):
+        return None
     if s.muscle is not None or not is_viscous(s):
         return maneuver_plot([record], main_axis(s))
     return None if _clay_along_both_axes(s) else force_ratio_plot(record, main_axis(s))
@@ -47,6 +66,8 @@ def _force(record: Record) -> Figure | None:
 def _path(record: Record) -> Figure | None:
     """The path, if the handle may leave a straight line: driven, or in clay of an image."""
     s = record.scenario
+    if not s.is_closed_form:
+        return arm_path_plot(record) if len(record.t) else None
     if s.clay is None or record.ground is not None:  # which shows the path
         return None
     image = any(not isinstance(law, Profile) for law in s.clay.laws)
@@ -55,7 +76,7 @@ def _path(record: Record) -> Figure | None:
 
 def _force_position(record: Record) -> Figure | None:
     s = record.scenario
-    applies = s.muscle is not None or record.ground is not None
+    applies = (s.muscle is not None or record.ground is not None) and not _bare(s)
     return maneuver_plot([record], main_axis(s), "position") if applies else None
 
 
@@ -101,6 +122,8 @@ class RunFigure(NamedTuple):
 
 
 FIGURES = {
+    "joints": RunFigure(_joints, ("q", "qd", "tau")),
+    "handle": RunFigure(_handle, ("p", "v", "fh", "fe")),
     "velocity": RunFigure(_velocity, ("p", "v"), _stretches),
     "force": RunFigure(_force, ("p", "v", "fh", "fe", "b")),
     "path": RunFigure(_path, ("p",)),
@@ -109,7 +132,6 @@ FIGURES = {
     "ground": RunFigure(_ground, ("p",), _cells),
 }
 """The figures of a run by file name. To add a plot to `hapticclay run`, add an entry."""
-COLUMN_UNITS = {"p": "m", "v": "m/s", "fh": "N", "fe": "N", "b": "N.s/m"}
 
 
 def record_figures(record: Record) -> dict[str, shown.Figure]:
@@ -126,9 +148,9 @@ def run_tables(record: Record, figure: str) -> dict[str, dict[str, Any]]:
     """Returns the numbers that a figure of FIGURES shows."""
     samples: dict[str, Any] = {"time [s]": record.t}
     for part in FIGURES[figure].columns:
-        for i, axis in enumerate(AXES):
+        for i, axis in enumerate(parts_of(part, record.scenario)):
             name = axis if part == "p" else f"{part}_{axis}"
-            samples[f"{name} [{COLUMN_UNITS[part]}]"] = getattr(record, part)[:, i]
+            samples[f"{name} [{COLUMNS[part].unit}]"] = getattr(record, part)[:, i]
     return {"samples": samples, **FIGURES[figure].tables(record)}
 
 

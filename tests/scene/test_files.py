@@ -788,3 +788,22 @@ def test_a_pipe_is_refused_not_waited_for(tmp_path):
     for load, file in ((hc.Scenario.load, "a.toml"), (hc.Record.load, "record.npz")):
         with pytest.raises(ParameterError, match="not a regular file"):
             load(tmp_path / file)
+
+
+def test_plain_data_is_of_the_class_that_has_its_names():
+    """Without a kind: an arm from a file has `file`, a law of joints has gains."""
+    data = {"arm": {"file": "planar_2r"}, "controller": {"Kp": [1.0, 2.0], "Kd": [0.1, 0.1]}}
+    s = hc.Scenario.of({**data, "Ts": "2 ms"})
+    assert s.arm.names == ("shoulder", "elbow") and s.controller.Kp == (1.0, 2.0)
+    assert hc.Scenario.of({"arm": {"l1": 0.3}}).arm == hc.Arm(l1=0.3)
+    with pytest.raises(hc.ParameterError, match="no such field"):
+        hc.Scenario.of({"arm": {"l1": 0.3, "file": "planar_2r"}})
+
+
+def test_a_scene_of_an_arm_from_a_file_returns_from_its_file(tmp_path):
+    arm = hc.MjcfArm("leader_7", armature={"joint3": 0.2}, pose={"joint4": 0.5})
+    law = hc.JointPD((1.0,) * 7, (0.1,) * 7, friction=[(0.1, 2.0, 0.0)] * 7)
+    s = hc.Scenario(arm=arm, controller=law, Ts=2e-3, operator=hc.Operator())
+    t = hc.Scenario.load(s.save(tmp_path / "arm.toml"))
+    assert t.controller == law and t.arm.armature == arm.armature and t.arm.pose == arm.pose
+    assert np.array_equal(t.arm.mass_matrix(), arm.mass_matrix())

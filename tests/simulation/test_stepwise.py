@@ -430,6 +430,35 @@ def test_the_torque_that_k_samples_reach_is_the_kth_largest(many):
         assert not np.any(sim.torque_reached(8, 9))  # 9 of 8 samples reach nothing
 
 
+@fast
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_strained_samples_are_those_whose_torque_is_at_a_limit(engine):
+    s = hc.constant_cut(gain=(2.0, 2.0), start=(0.06, 0.0), t_max=0.1)
+    torque = np.abs(hc.simulate(s).tau[:101])
+    limits = np.quantile(torque, (0.3, 0.8), axis=0)[[0, 1], [0, 1]]  # a sample may be just at one
+    with hc.SimulationBatch([s, s], engine=engine) as batch, hc.Simulation(s, engine=engine) as sim:
+        batch.advance(100)
+        sim.advance(100)
+        for n in (1, 40, 1000):
+            expected = np.count_nonzero(torque[:100][-n:] >= limits, axis=0).tolist()
+            assert sim._run.strained(n, limits.tolist()) == expected
+            assert batch._run.strained(n, limits.tolist()).tolist() == [expected] * 2
+        assert 0 < min(expected) and max(expected) < 100
+
+
+@fast
+def test_what_a_batch_shows_in_the_turn_of_its_steps_is_what_it_shows_later():
+    """Also where a run ends within it, or its samples fill their buffer."""
+    scenes = [hc.constant_cut(t_max=0.5), hc.free(t_max=3.0), hc.constant_cut(gain=(30.0, 0.5))]
+    now, later = (hc.SimulationBatch(scenes, engine="native") for _ in range(2))
+    for n in (1, 300, 1500, 4000):
+        for batch, shows in ((now, True), (later, False)):
+            which = np.flatnonzero(~batch._run.over)
+            batch._run.advance(which, n, shows=shows)
+        np.testing.assert_array_equal(now.numbers(), later.numbers())
+    assert now.ended.tolist() == [True, False, True] or now.ended.all()
+
+
 def test_runs_of_an_unmonitored_batch_go_on_too():
     s = hc.constant_cut(gain=(2.0, 2.0), start=(0.06, 0.0))
     end = hc.simulate(s, engine="python").outcome

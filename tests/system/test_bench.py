@@ -12,6 +12,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from benchmarks import (
+    arm_integrators,
+    arms,
     bench,
     common,
     diagrams,
@@ -364,6 +366,8 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
     monkeypatch.setattr(common, "warm", lambda: None)  # nobody reads these times
     monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)  # nor sees the figures
     monkeypatch.setattr(hits, "CLAYS", (1e1, 1e3))
+    monkeypatch.setattr(arm_integrators, "CASES", ())
+    monkeypatch.setattr(arm_integrators, "HALVINGS", 1)
     if not HUNTS:  # in Python
         monkeypatch.setattr(hits, "methods", lambda: {"fast": (2e-2, 1e-2, 4e-3, 2e-3)})
     monkeypatch.setattr(throughput, "SCENES", {"constant cut": throughput.SCENES["constant cut"]})
@@ -485,6 +489,16 @@ def test_stiffness_sweep_tells_where_each_breaks_down(tmp_path, monkeypatch):
         assert r["default"]["error"] < 2e-5 and r["default"]["energy"] < 1.1
     assert "broken" in stiffness.sections(data)[-1]
     assert sorted(p.name for p in tmp_path.iterdir()) == ["stiffness.json"]
+
+
+def test_runs_of_an_arm_find_its_gain_limit_at_one_step_in_a_sample(tmp_path, monkeypatch):
+    monkeypatch.setattr(arms, "OURS", (1,))
+    monkeypatch.setattr(arm_integrators, "CASES", [("Euler", "mjINT_EULER", 1)])
+    data = arms.main(tmp_path)
+    ours, euler = data["rows"]
+    # the bisection finds it to 0.3 %; a run of 2 s sees growth that begins 0.2 % above the limit
+    assert abs(ours["error"]) < 0.005 and 0.3 < euler["error"] < 0.5
+    assert "37" in "".join(arms.conclusions(data)) and arms.sections(data)
 
 
 def test_published_stiff_clay_breaks_nothing_of_ours():

@@ -47,7 +47,10 @@ def test_signals_page_runs(tmp_path):
     assert "at " in out
 
 
-@pytest.mark.parametrize("page", ["materials.md", "fit.md", "logs.md", "pair_log.md", "pair.md"])
+PRINTING = "materials.md", "fit.md", "logs.md", "pair_log.md", "pair.md", "replay.md"
+
+
+@pytest.mark.parametrize("page", PRINTING)
 def test_page_says_what_its_snippet_prints(page, tmp_path):
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / page).read_text(), re.S)
     out = printed_by(code, tmp_path)

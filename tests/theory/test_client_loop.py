@@ -65,10 +65,11 @@ def test_the_map_is_the_motion_between_samples():
         x = solve_ivp(motion, (t, end - 1e-15), x, rtol=1e-11, atol=1e-14).y[:, -1]
         t = end
     A = client_map(handle, K, B, Ts, delay)
-    found = A @ [*start, forces[0], forces[1]]
+    found = A @ [*start, *(forces[0] * handle.normal), *(forces[1] * handle.normal)]
     assert found[:4] == pytest.approx(x, rel=1e-8, abs=1e-12)
     law = -K * handle.normal @ start[:2] - B * handle.normal @ start[2:]
-    assert found[4] == pytest.approx(law, rel=1e-14)
+    assert found[4:6] == pytest.approx(law * handle.normal, rel=1e-14)
+    assert found[6:] == pytest.approx(forces[0] * handle.normal, rel=1e-14)
 
 
 def test_the_slowest_period_is_where_the_limit_is_reached():
