@@ -3,11 +3,12 @@
 import control
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 
 from hapticclay.model.operator import Operator
-from hapticclay.paper.classics import sampled_pair, yokokohji1994
+from hapticclay.paper.classics import niemeyer1991, sampled_pair, yokokohji1994
 from hapticclay.paper.classics.sampled_pair import HeldArm
+from hapticclay.scene.link import KINDS
 from hapticclay.theory.pair_build import Build
 
 
@@ -109,6 +110,52 @@ def test_an_arm_under_held_force_by_scipy():
     np.testing.assert_allclose([arm.x, arm.v], found, rtol=1e-10)
     a = (7.0 - 3.5 * arm.v - 40.0 * arm.x) / 3.0
     assert arm.felt == pytest.approx(2.0 * a + 3.0 * arm.v + 40.0 * arm.x, rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_free_runs_are_those_of_the_map(kind):
+    """The matrix of theory, state by state: formulas of each link are written twice."""
+    pair = yokokohji1994.sampled(kind)
+    loop = Build(pair).loop((0.05, 0.05))
+    state, A, out = np.zeros(loop.states), loop.map(), []
+    state[0] = 1.0
+    for _ in range(300):
+        out.append(state[[0, loop.leader.states]])
+        state = A @ state
+    # 300 products of matrices
+    np.testing.assert_allclose(out, sampled_pair.free_run(pair, 50, 300), atol=1e-11)
+
+
+@pytest.mark.parametrize("b", [0.5, 3.0, 80.0])
+def test_energy_of_waves(b):
+    """What both ends take is on its way, whatever they do."""
+    taken, stored = niemeyer1991.energies(b)
+    assert np.abs(taken - stored).max() < 1e-12 * stored.max() * len(taken)
+    assert taken.min() >= 0.0 and taken[-1] > 0.0
+
+
+def test_reflection_by_a_transmission_line():
+    """d'Alembert: at a damper Z at the end of a line of impedance b the force is 2 Z/(Z + b)."""
+    b, Z, u = 3.0, 7.0, 1.3
+    speed = np.sqrt(2.0 * b) * u / (b + Z)
+    rate, w = niemeyer1991.follower_wave(b, Z * speed, u)
+    assert rate == pytest.approx(speed, rel=1e-14)
+    assert w == pytest.approx((b - Z) / (b + Z) * u, rel=1e-14)
+    force, sent = niemeyer1991.leader_wave(b, 0.4, w)
+    assert sent**2 - w**2 == pytest.approx(2.0 * force * 0.4, rel=1e-13)  # power
+
+
+def test_what_a_late_link_gives_by_quadrature():
+    """Leader at V cos(w t), a spring behind T, its force T later: by SciPy over a period."""
+    V, K, T, w = niemeyer1991.SPEED, niemeyer1991.SPRING, 0.1, 2.0 * np.pi
+
+    def power(t):
+        force = K * V / w * np.sin(w * (t - 2.0 * T))
+        own = K * V / w * np.sin(w * (t - T)) * V * np.cos(w * (t - T))
+        return force * V * np.cos(w * t) - own
+
+    taken = quad(power, 0.0, 1.0, epsabs=1e-12)[0]
+    assert -niemeyer1991.given_in_a_period() == pytest.approx(taken, rel=1e-10)
 
 
 @pytest.mark.parametrize("kind", ["position-position", "position-force", "four-channel"])

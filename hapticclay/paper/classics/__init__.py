@@ -8,6 +8,7 @@ from ...errors import choice
 from .classic import Classic
 
 CLASSICS = (  # one module of this folder each, by year
+    "niemeyer1991",
     "yokokohji1994",
     "colgate1997",
     "hannaford2002",

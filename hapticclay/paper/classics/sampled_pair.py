@@ -42,20 +42,16 @@ class HeldArm:
         x, v = self.x, self.v
         self.x = self.xx * x + self.xv * v + self.xf * force
         self.v = self.vx * x + self.vv * v + self.vf * force
+        self._feel(force)
+
+    def let_go(self, x: float) -> None:
+        """Places it at rest, under no force."""
+        self.x, self.v = x, 0.0
+        self._feel(0.0)
+
+    def _feel(self, force: float) -> None:
         a = (force - self.b * self.v - self.k * self.x) / self.m
         self.felt = self.load[0] * a + self.load[1] * self.v + self.load[2] * self.x
-
-
-class Line:
-    """What goes one way, some samples late."""
-
-    def __init__(self, samples: int, first: Any):
-        self.on_the_way = deque([first] * samples)
-
-    def through(self, message: Any) -> Any:
-        """Sends a message; returns the one that arrives."""
-        self.on_the_way.append(message)
-        return self.on_the_way.popleft()
 
 
 def arms_of(pair: Pair) -> tuple[HeldArm, HeldArm]:
@@ -70,8 +66,11 @@ def arms_of(pair: Pair) -> tuple[HeldArm, HeldArm]:
 
 
 def ends_of(pair: Pair) -> tuple[End, End]:
-    """What both hosts compute; a message is (x, v, F)."""
+    """What both hosts compute; a message is (x, v, F), or a wave."""
     Kp, Kd, kind = pair.law.Kp[0], pair.law.Kd[0], pair.link.kind
+    if kind == "waves":
+        b = pair.link.impedance
+        return wave_ends(Kp, Kd, float(b) if isinstance(b, (int, float)) else Kd, pair.Ts)
 
     def led(x: float, v: float, arrived: tuple[float, float, float]) -> float:
         return Kp * (arrived[0] - x) + Kd * (arrived[1] - v)
@@ -87,19 +86,54 @@ def ends_of(pair: Pair) -> tuple[End, End]:
     return leader, follower
 
 
+def leader_wave(b: float, v: float, w: float) -> tuple[float, float]:
+    """Force that the leader feels, and its wave: b v - sqrt(2 b) w, sqrt(2 b) v - w."""
+    root = math.sqrt(2.0 * b)
+    return b * v - root * w, root * v - w
+
+
+def follower_wave(b: float, F: float, u: float) -> tuple[float, float]:
+    """Rate that leads the follower, and its wave: sqrt(2/b) u - F/b, u - sqrt(2/b) F."""
+    root = math.sqrt(2.0 / b)
+    return root * u - F / b, u - root * F
+
+
+def wave_ends(Kp: float, Kd: float, b: float, Ts: float) -> tuple[End, End]:
+    """Both ends of a link that carries waves; the follower's law is behind them."""
+    desired = 0.0
+
+    def leader(x, v, F, w):
+        force, u = leader_wave(b, v, w)
+        return -force, u
+
+    def follower(x, v, F, u):
+        nonlocal desired
+        force = Kp * (desired - x) + Kd * (math.sqrt(2.0 / b) * u - v)
+        force /= 1.0 + Kd / b
+        rate, w = follower_wave(b, force, u)
+        desired += Ts * rate
+        return force, w
+
+    return leader, follower
+
+
 def free_run(pair: Pair, delay: int, samples: int) -> np.ndarray:
-    """Positions of leader and follower after the leader is let go, shape (samples, 2)."""
+    """Positions of leader and follower after the leader is let go, shape (samples, 2).
+
+    delay: one way, in samples, one at least.
+    """
     arms, ends = arms_of(pair), ends_of(pair)
-    lines = Line(delay, (0.0,) * 3), Line(delay, (0.0,) * 3)
-    arms[0].x = 1.0
-    arms[0].felt = arms[0].load[2]
+    first: Any = 0.0 if pair.link.kind == "waves" else (0.0,) * 3
+    there, back = deque([first] * delay), deque([first] * delay)
+    arms[0].let_go(1.0)
     out = []
     for _ in range(samples):
         out.append((arms[0].x, arms[1].x))
-        seen = [(arm.x, arm.v, arm.felt) for arm in arms]
-        arrived = lines[1].through(seen[1]), lines[0].through(seen[0])
-        for arm, end, values, message in zip(arms, ends, seen, arrived, strict=True):
-            arm.step(end(*values, message)[0])
+        arrived = back.popleft(), there.popleft()
+        for arm, end, message, line in zip(arms, ends, arrived, (there, back), strict=True):
+            force, sent = end(arm.x, arm.v, arm.felt, message)
+            line.append(sent)
+            arm.step(force)
     return np.array(out)
 
 
