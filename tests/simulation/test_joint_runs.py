@@ -143,7 +143,7 @@ YIELDS = hc.Clay(hc.Profile((), (1.0,), Fy=(0.5,)), hc.Profile((), (1.0,), Fy=(0
 GROOVE = hc.Groove((0.02, 0.08), (-0.02, 0.02), pressure=1e4)
 BAD = {
     "no law": (dict(controller=None), "controller", "must be given"),
-    "no handle": (dict(arm=BARE, controller=hc.JointPD((1.0,), (0.1,))), "site", "must name a site"),
+    "no handle": (dict(arm=BARE, controller=hc.JointPD((1.0,), (0.1,))), "site", "must name"),
     "law of another arm": (dict(controller=hc.JointPD((1.0,), (0.1,))), "Kp", "2 numbers"),
     "gains of text": (dict(controller="PD"), "controller", "must be"),
     "continuous": (dict(control="continuous"), "control", "must be 'sampled'"),
