@@ -75,7 +75,8 @@ class FrictionCycle(Result):
         harmonics: number of odd harmonics balanced, shape (m,); 1, the describing function, for a
             threshold, and where more are not found.
         first_amplitude: by the fundamental alone, the describing function [rad], shape (m,).
-        first_frequency: likewise [Hz], shape (m,).
+        first_frequency: likewise [Hz], shape (m,); where it is off by more than a half, that of
+            all harmonics is good to some ten percent only.
         line_rate: largest rates of a sine, by joint [rad/s], shape (n, l).
         line_growth: growth of the motion at them [1/s], shape (n, l); NaN without a law.
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
