@@ -91,6 +91,7 @@ def good_values(folder):
         "Recording": {"t": (0.0, 0.01), "p": np.zeros((2, 2))},
         "replay": {"recording": hc.studies.Recording((0.0, 0.01), f=np.ones((2, 2)))},
         "Measurement": {"t": t, "input": np.sin(t), "output": np.cos(t)},
+        "Measurement.resampled": {"t": t, "input": np.sin(t), "output": np.cos(t)},
     }  # fmt: skip
     return by_name, by_function
 
