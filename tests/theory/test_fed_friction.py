@@ -174,6 +174,14 @@ def test_few_counts_let_it_rest():
     assert (cycle.amplitude, cycle.frequency) == pytest.approx(measured(run), rel=0.01)
 
 
+def test_a_cycle_that_friction_would_hold_is_none():
+    """The fundamental balances at a tenth of the distance at which the joint rests: a run stops."""
+    matrices, gains = (0.01 * ONE, 0.02 * ONE, 0.0 * ONE), (0.4 * ONE, 0.02 * ONE)
+    joint, run = joint_and_run(matrices, gains, coulomb=0.17, velocity="exact", delay=4e-3)
+    assert joint.growth.max() > 0.0 and not list(joint.cycles())
+    assert np.ptp(run[len(run) // 2 :]) < 1e-12
+
+
 def test_the_mean_behind_an_encoder_is_straight_between_counts():
     loop = JointLoop(ONE, ONE, 0.0 * ONE, ONE, ONE, TS, 0.0, "difference")
     step = 2.0 * math.pi / 8192 / TS
