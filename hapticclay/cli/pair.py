@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..results import Result
     from ..scene.pair import Pair
 
-OF_THEORY = ("delay", "kind", "Ts", "map", "compare", "cells", "feel")
+OF_THEORY = ("delay", "kind", "Ts", "map", "compare", "cells", "feel", "run")
 OF_LOGS = ("columns", "band", "level", "units", "counts", "table", "where")
 
 
@@ -29,7 +29,7 @@ class PairCommand:
     Of a file of the pair: whether it is stable, the motion that turns unstable first, the largest
     one-way delay, what the torque from the other arm is late by, cause by cause, the friction that
     may be fed forward at each joint, and what to change first. Exact for small motions about the
-    pose: no runs.
+    pose; --run shows the motion of both arms.
 
     Of a log, with --data: gains, delays, friction, inertia and stiffness with intervals; the
     follower is then simulated behind the measured leader, and its error compared with the measured
@@ -45,6 +45,7 @@ class PairCommand:
         cells: Gains and delays of the map.
         feel: Also say what the hand feels along this axis of the world, and with which hands and
             objects the pair is stable.
+        run: Also run the pair for this time [s], after a push of the hand.
         data: Log of one axis, in place of a file of the pair, in any format that is read, or a
             scope of Simulink: time [s], both positions [rad], torques of both motors and the force
             on the follower [N.m].
@@ -65,6 +66,7 @@ class PairCommand:
     compare: bool = False
     cells: Annotated[tuple[int, int], Bound(2, 200, names=("gains", "delays"))] = (20, 20)
     feel: Literal["x", "y", "z"] | None = None
+    run: Annotated[float | None, Bound(0.0, 1e4, "s", above=True)] = None
     data: Path | None = None
     columns: tuple[str, ...] = ()
     band: Annotated[float, Bound(0.1, 1e5, "Hz")] = 80.0
@@ -117,6 +119,10 @@ class PairCommand:
             yield pair_maps.compare_links(pair)
         if self.feel:
             yield pair_ports.pair_transparency(pair, self.feel)
+        if self.run:
+            from ..simulation.pair_run import simulate_pair
+
+            yield simulate_pair(pair, self.run)
         if self.map:
             yield pair_maps.pair_map(pair, *map(int, self.cells))
 

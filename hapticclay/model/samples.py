@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from ..arguments import checked, named
-from ..columns.log import open_log
+from ..columns.log import Log, open_log
 from ..errors import ParameterError, array_of, choice
 from . import pieces
 from .signals import Signal
@@ -66,7 +66,7 @@ class Samples(Signal):
     @checked
     def of(
         cls,
-        path: str | os.PathLike[str],
+        path: str | os.PathLike[str] | Log,
         columns: Sequence[str] = COLUMNS,
         between: Between = "linear",
         outside: Outside = "hold",
@@ -79,7 +79,7 @@ class Samples(Signal):
         converted to SI.
 
         Args:
-            path: the file.
+            path: the file, or a log that was read.
             columns: names of the columns with time [s], x and y [N, or m for a position].
             between: as the attribute.
             outside: as the attribute.
@@ -94,7 +94,7 @@ class Samples(Signal):
         log = open_log("path", path, units)
         t, x, y = (log.values(name, x) for name, x in zip(columns, UNITS, strict=True))
         if not len(t):
-            raise ParameterError("path", str(path), "must have a line of numbers")
+            raise log.table.refusal("must have a line of numbers")
         return cls(t, np.column_stack((x, y)), between, outside)  # type: ignore[arg-type]
 
     @classmethod

@@ -129,7 +129,8 @@ class PairLog:
         try:
             plain = not (units or counts) and file.suffix.lower() == ".mat"
             if plain and (table := _scope(file)):
-                return cls(**_chosen(file, table, given), name=file.stem)
+                found: dict[str, Any] = _chosen(file, table, given)
+                return cls(**found, name=file.stem)
             return logged(open_log("path", file, units, counts), given)
         except OSError as error:
             bound = f"must be a readable file ({error.strerror})"
@@ -150,7 +151,7 @@ def logged(log: Log, columns: Mapping[str, str]) -> PairLog:
         notes += [wrap_note(turn, at, cells["t"])] if len(at) else []
     made = even_columns({OUTPUT.get(key, key): x for key, x in cells.items()})
     names = {new: key for key, new in OUTPUT.items()}
-    even = {names.get(key, key): x for key, x in made.columns.items()}
+    even: dict[str, Any] = {names.get(key, key): x for key, x in made.columns.items()}
     return PairLog(**even, name=log.path.stem, notes=(*notes, *made.notes))
 
 
