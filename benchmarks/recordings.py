@@ -18,11 +18,14 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from tqdm import tqdm
 
 import hapticclay as hc
 from hapticclay import files
 from hapticclay.results import json_ready
+from hapticclay.studies.coulomb_axis import Axis, follow
+from hapticclay.studies.pair_laws import PairLaw
 
 from . import common
 
@@ -49,6 +52,8 @@ LETTERS = {
 }
 INERTIA = 1.0 / 631.36  # [kg.m^2], of the rig's parameter file
 FILTER = 2.0 * math.pi * 100.0 / 2000.0  # share that the filter takes of each new error
+COULOMB = 0.0325  # [N.m], in the middle of what the levers of the rig have
+SETTLED = 0.2  # [s] after which errors count, as in identify_pair
 LAG = (1.0 - FILTER) / FILTER / 2000.0  # its mean delay [s]
 NOT_HAD = (
     (
@@ -136,9 +141,11 @@ def _checked(file: Path, data: bytes, digest: str) -> Path:
 
 def judged(path: str, file: Path) -> dict[str, Any]:
     """One log of the rig: settings of its letter, and what is found."""
-    found = hc.studies.identify_pair(hc.studies.PairLog.load(file))
+    log = hc.studies.PairLog.load(file)
+    found = hc.studies.identify_pair(log)
     parts = NAME.match(path)
     assert parts is not None
+    free = not math.isnan(found.simulated_rms)
     return {
         "log": Path(path).stem,
         "path": path,
@@ -148,9 +155,23 @@ def judged(path: str, file: Path) -> dict[str, Any]:
         "architecture": found.architecture,
         "rms": found.rms,
         "simulated_rms": None if math.isnan(found.simulated_rms) else found.simulated_rms,
+        "set_rms": set_rms(log, LETTERS[parts[2]]) if free else None,
         "numbers": {x.name: json_ready([x.value, x.low, x.high]) for x in found.numbers},
         "warnings": list(found.warnings),
     }
+
+
+def set_rms(log: hc.studies.PairLog, letter: Published) -> float:
+    """Error of a follower with the numbers that are set, behind the measured leader, rms [rad]."""
+    law = PairLaw(letter.P, letter.D, LAG, 0.0)
+    begin = (
+        float(log.follower[0]),
+        float(np.polyfit(log.t[:60] - log.t[0], log.follower[:60], 1)[0]),
+    )
+    error = float(log.leader[0]) - begin[0]
+    axis = Axis(INERTIA, 0.0, COULOMB)
+    q = follow(axis, log.leader.tolist(), lambda: law.start(log.Ts, error), begin, log.Ts)
+    return float(np.std((log.leader - q)[log.t >= log.t[0] + SETTLED]))
 
 
 def wide(rows: Iterable[dict[str, Any]], name: str) -> list[float]:
@@ -212,6 +233,7 @@ def free(rows: list[dict[str, Any]]) -> list[list[str]]:
                 f"{r['day']}, {r['letter']}",
                 f"{1e3 * r['rms']:.3f}",
                 f"{1e3 * r['simulated_rms']:.3f}",
+                f"{1e3 * r['set_rms']:.3f}",
                 _interval(J, 1e3, ".2f") + (" *" if slow else ""),
                 _interval(dry, 1e3, ".1f"),
                 f"{1e3 * wet[0]:.1f}",
@@ -283,17 +305,19 @@ def page(rows: list[dict[str, Any]], missing: int) -> str:
             [
                 "log",
                 "leader less follower, measured [mrad rms]",
-                "simulated",
+                "simulated as identified",
+                "as set",
                 "J [1e-3 kg·m²]",
                 "Coulomb [mN·m]",
                 "viscous [mN·m·s/rad]",
             ],
         ),
-        f"The rig's parameter file has J = {1e3 * INERTIA:.3f}e-3 kg·m², from the slope of a "
-        f"frequency response; where inertia makes a quarter of the torque or more, J here is "
-        f"{min(J):.2f}e-3 to {max(J):.2f}e-3. \\* marks logs where it makes less: friction "
-        "that is not Coulomb's is then read as inertia, and the interval does not cover that. "
-        "Friction has no published number.",
+        f"As set: J = {1e3 * INERTIA:.3f}e-3 kg·m² of the rig's parameter file (from the slope of "
+        "a frequency response), P and D of the letter, a filter of 100 Hz; friction has no "
+        f"published number, and {1e3 * COULOMB:.1f} mN·m of Coulomb's was taken. Where inertia "
+        f"makes a quarter of the torque or more, J here is {min(J):.2f}e-3 to {max(J):.2f}e-3. "
+        "\\* marks logs where it makes less: friction that is not Coulomb's is then read as "
+        "inertia, and the interval does not cover that.",
         "### Springs",
         common.table(
             springs(rows),

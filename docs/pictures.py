@@ -1,4 +1,4 @@
-"""Makes the pictures of the pages about symptoms: the figures of their examples.
+"""Makes pictures of pages, those about symptoms and some others: the figures of their examples.
 
 python docs/pictures.py [NAME ...]
 """
@@ -13,7 +13,8 @@ os.environ.setdefault("MPLBACKEND", "agg")
 import matplotlib.pyplot as plt
 
 DOCS = Path(__file__).parent
-EXAMPLES = DOCS.parent / "examples" / "symptoms"
+EXAMPLES = DOCS.parent / "examples"
+OTHERS = EXAMPLES / "studies" / "pair_log.py", EXAMPLES / "records" / "replay.py"
 
 
 def main(names: list[str]) -> None:
@@ -23,7 +24,7 @@ def main(names: list[str]) -> None:
         names: of the examples; none for all.
     """
     plt.show = lambda: None
-    for path in sorted(EXAMPLES.glob("*.py")):
+    for path in (*sorted(EXAMPLES.glob("symptoms/*.py")), *OTHERS):
         if not names or path.stem in names:
             runpy.run_path(str(path), run_name="__main__")
             plt.savefig(DOCS / f"{path.stem}.png", dpi=110)

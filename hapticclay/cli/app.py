@@ -20,6 +20,10 @@ from .console import ends
 
 HELP = frozenset(("-h", "--help"))
 
+# Matrices here are small: BLAS threads that wait for each other take up to ten times as long.
+# Before NumPy; whoever sets it decides.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 
 def _show_line(usual: Callable[..., None], message: Any, category: type, *where: Any) -> None:
     """Prints a warning of ours as a line, others as usual."""

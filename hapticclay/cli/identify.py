@@ -54,6 +54,7 @@ class IdentifyCommand:
             position or force is noisy or part of a loop.
         band: Lowest and highest frequency to fit [Hz].
         held: A computer holds the input of the file from sample to sample.
+        delay: Delay of the position behind the other columns [s], which is removed.
         paper: Show the paper's equation beside the fit, in the table and the figure.
         log: Units of the columns.
         figures: Formats and style of the figures.
@@ -72,6 +73,7 @@ class IdentifyCommand:
     columns: tuple[str, ...] = ()
     band: Annotated[tuple[float, float] | None, Bound(unit="Hz", names=("low", "high"))] = None
     held: bool = False
+    delay: Annotated[float, Bound(-1.0, 1.0, unit="s")] = 0.0
     paper: bool = False
     log: LogOptions = LogOptions()
     figures: console.FigureOptions = console.FigureOptions()
@@ -87,7 +89,18 @@ class IdentifyCommand:
             for file in ("file", "csv")
         ),
         Unused(
-            ("what", "columns", "band", "held", "paper", "units", "counts", "table", "where"),
+            (
+                "what",
+                "columns",
+                "band",
+                "held",
+                "delay",
+                "paper",
+                "units",
+                "counts",
+                "table",
+                "where",
+            ),
             "is for a log: give FILE too",
             (),
             ("file", "csv"),
@@ -117,7 +130,8 @@ class IdentifyCommand:
         names = named_columns(log, given, input="command" if what == "G" else "force")
         axis = "x" if self.axis == "both" else self.axis
         data = measured(log, names, "hold" if self.held else "spline")
-        result = identify_data(data, what, axis, band=self.band, held=self.held)
+        timing = {"held": self.held, "delay": self.delay}
+        result = identify_data(data, what, axis, band=self.band, **timing)
         if line := found_line(given, names):
             print(line)
         console.deliver(IdentifiedBlocks((result,), paper=self.paper), self.out, self.figures)

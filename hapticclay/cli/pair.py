@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..results import Result
     from ..scene.pair import Pair
 
-OF_THEORY = ("delay", "kind", "Ts", "map", "compare", "cells")
+OF_THEORY = ("delay", "kind", "Ts", "map", "compare", "cells", "feel")
 OF_LOGS = ("columns", "band", "level")
 
 
@@ -43,6 +43,8 @@ class PairCommand:
         map: Also map stability over this: delay and a common factor of all gains Kp.
         compare: Also compare the kinds of link.
         cells: Gains and delays of the map.
+        feel: Also say what the hand feels along this axis of the world, and with which hands and
+            objects the pair is stable.
         data: Log of one axis, in place of a file of the pair, in any format that is read, or a
             scope of Simulink: time [s], both positions [rad], torques of both motors and the force
             on the follower [N.m].
@@ -61,6 +63,7 @@ class PairCommand:
     map: Literal["delay-gain"] | None = None
     compare: bool = False
     cells: Annotated[tuple[int, int], Bound(2, 200, names=("gains", "delays"))] = (20, 20)
+    feel: Literal["x", "y", "z"] | None = None
     data: Path | None = None
     columns: tuple[str, ...] = ()
     band: Annotated[float, Bound(0.1, 1e5, "Hz")] = 80.0
@@ -101,11 +104,13 @@ class PairCommand:
         return 0
 
     def _answers(self, pair: Pair) -> Iterator[Result]:
-        from ..theory import pair_maps, pair_verdict
+        from ..theory import pair_maps, pair_ports, pair_verdict
 
         yield pair_verdict.pair_limits(pair)
         if self.compare:
             yield pair_maps.compare_links(pair)
+        if self.feel:
+            yield pair_ports.pair_transparency(pair, self.feel)
         if self.map:
             yield pair_maps.pair_map(pair, *map(int, self.cells))
 

@@ -128,9 +128,10 @@ class _Part:
 
 
 def _is_text(x: Any) -> bool:
-    """Whether a data set is a text of MATLAB, or says that it is empty."""
-    kind = _text(x.attrs.get("MATLAB_class"))
-    return kind in ("char", "cell") or "MATLAB_empty" in x.attrs
+    """Whether a data set is a text of MATLAB, or says that it holds nothing."""
+    kind, name = _text(x.attrs.get("MATLAB_class")), str(_text(x.attrs.get("NAME", "")))
+    empty = "MATLAB_empty" in x.attrs or name.startswith("This is a netCDF dimension but not")
+    return kind in ("char", "cell") or empty
 
 
 def _text(x: Any) -> Any:

@@ -385,6 +385,7 @@ def _check_arm(s: Scenario) -> None:
     """Refuses what an arm from a file cannot have, beyond the table of support."""
     arm, law, io = s.arm, s.controller, s.hardware
     assert isinstance(arm, MjcfArm)
+    arm.check_handle()
     with_arm = "with an arm from a file"
     given = {
         "controller": (law is None, f"must be given {with_arm}: a JointPD, or your own"),

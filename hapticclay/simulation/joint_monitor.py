@@ -20,6 +20,7 @@ GROWTH = 30.0  # an oscillation that has grown so much, swing by swing, is unsta
 SWINGS = 6  # that a verdict needs
 STEP_GROWTH = 2.0  # growth of one swing counts to this factor: a push is no instability
 CYCLE = 30  # swings into the torque limits that do not decay are a limit cycle
+PERIOD = 0.1  # [s] before a verdict: of the joints that oscillate, the fastest is to blame
 FLOOR = 1e-9  # [rad/s] swings below this are rounding
 
 
@@ -29,6 +30,7 @@ class Swings:
     def __init__(self) -> None:
         self.turn, self.hits, self.sizes = 0.0, 0, [0.0]
         self.bound: list[bool] = [False]
+        self.count, self.grown = 1, 1.0  # swings without a smaller one, and their growth
         self.past = np.zeros(2)
 
     def look(self, rate: np.ndarray, bound: np.ndarray) -> tuple[int, str] | None:
@@ -51,16 +53,17 @@ class Swings:
 
     def _swing(self, size: float, bound: bool) -> str:
         if size < FLOOR or size < (0.8 if bound else 1.0) * self.sizes[-1]:
-            self.sizes, self.bound = [], []
+            self.sizes, self.bound, self.count, self.grown = [], [], 0, 1.0
+        if self.sizes and self.sizes[-1] > 0.0:
+            self.grown *= min(size / self.sizes[-1], STEP_GROWTH)
         self.sizes.append(size)
         self.bound.append(bound)
-        del self.sizes[: -2 * CYCLE], self.bound[: -2 * CYCLE]
-        last = self.sizes[-CYCLE:]
-        if len(last) == CYCLE and all(self.bound[-CYCLE:]) and last[-1] >= 0.95 * last[0]:
+        self.count += 1
+        del self.sizes[:-CYCLE], self.bound[:-CYCLE]
+        last = self.sizes
+        if len(last) == CYCLE and all(self.bound) and last[-1] >= 0.95 * last[0]:
             return LIMITS
-        steps = zip(self.sizes, self.sizes[1:], strict=False)
-        grown = math.prod(min(b / a, STEP_GROWTH) for a, b in steps if a > 0.0)
-        return "growing oscillation" if len(self.sizes) > SWINGS and grown > GROWTH else ""
+        return "growing oscillation" if self.count > SWINGS and self.grown > GROWTH else ""
 
 
 class JointMonitor:
@@ -137,8 +140,8 @@ class JointMonitor:
         if not verdicts:
             return None
         at, _, cause = min(verdicts)
-        largest = max(verdicts, key=lambda x: self.swings[x[1]].sizes[-1])
-        return at, largest[1], cause
+        span = np.ptp(rates[:, max(0, at - round(PERIOD / self.scenario.dt)) : at + 1], axis=1)
+        return at, max((x[1] for x in verdicts), key=lambda j: span[j]), cause
 
     def _outcome(self, code: str, step: int, joint: int, cause: str) -> Outcome:
         dt, name = self.scenario.dt, self.names[joint]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -34,18 +34,38 @@ class BlockFit:
 
     Attributes:
         values: fitted numbers, (k,).
-        half: half widths of their intervals, (k,); nan for a number that the data do not fix.
+        covariance: of these, (k, k); nan where the data do not fix them.
+        slopes: derivatives of the residuals by the numbers, (n, k).
         rest: residuals, (n,).
+        level: confidence level of intervals.
     """
 
     values: np.ndarray
-    half: np.ndarray
+    covariance: np.ndarray
+    slopes: np.ndarray
     rest: np.ndarray
+    level: float
 
     @property
     def rms(self) -> float:
         """Deviation of the residuals."""
         return math.sqrt(float(np.mean(self.rest**2)))
+
+    @property
+    def half(self) -> np.ndarray:
+        """Half widths of the intervals, (k,)."""
+        quantile = student_quantile(self.level, BLOCKS - len(self.values))
+        return quantile * np.sqrt(np.diag(self.covariance))
+
+    def given(self, slopes: np.ndarray, covariance: np.ndarray) -> BlockFit:
+        """The fit where other numbers, taken as given, are not exact.
+
+        Args:
+            slopes: derivatives of the residuals by those numbers, (n, m).
+            covariance: of those numbers, (m, m).
+        """
+        moved, *_ = np.linalg.lstsq(self.slopes, -slopes, rcond=None)
+        return replace(self, covariance=self.covariance + moved @ covariance @ moved.T)
 
 
 def block_fit(
@@ -69,19 +89,19 @@ def block_fit(
         x_scale="jac",
         max_nfev=rounds,
     )
-    half = _half_widths(found.jac, found.fun, level)
-    return BlockFit(found.x * size, half * size, found.fun)
+    slopes = found.jac / size
+    return BlockFit(found.x * size, _covariance(slopes, found.fun), slopes, found.fun, level)
 
 
-def _half_widths(J: np.ndarray, rest: np.ndarray, level: float) -> np.ndarray:
-    """Half widths of intervals, in the units of the columns of J; nan where these depend."""
+def _covariance(J: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Covariance of the numbers by the columns of J; nan where these depend on each other."""
     n, k = J.shape
     sizes = np.linalg.norm(J, axis=0)
     if not np.all(sizes > 0.0) or np.linalg.cond(J / sizes) > WORST:
-        return np.full(k, math.nan)
+        return np.full((k, k), math.nan)
     A = J / sizes
     inverse = np.linalg.inv(A.T @ A)
     parts = np.array_split(np.arange(n), BLOCKS)
     scores = np.array([A[i].T @ rest[i] for i in parts])
     cov = inverse @ (scores.T @ scores) @ inverse * BLOCKS / (BLOCKS - k)
-    return student_quantile(level, BLOCKS - k) * np.sqrt(np.diag(cov)) / sizes
+    return cov / np.outer(sizes, sizes)

@@ -33,7 +33,7 @@ LOST = 0.05  # ... if no larger share of all rows is missing
 TICK = 0.02  # of the duration: stamps of a coarser clock are no times of rows
 TURNS = (math.tau, 360.0)  # at which angles begin again [rad, deg]
 WRAP = 0.1  # of a turn: jumps at a wrap differ from the turn by less ...
-INSIDE, SLACK = 0.5, 1e-3  # ... all steps that go on are smaller, and like those around
+INSIDE, SLACK = 0.5, 1e-3  # ... all steps that go on are smaller, and like those around to this
 Between = Literal["spline", "linear", "hold"]
 Columns = dict[str, np.ndarray]
 
@@ -99,10 +99,14 @@ def _along(x: np.ndarray, jumps: np.ndarray) -> np.ndarray:
 
 
 def _go_on(steps: np.ndarray, at: np.ndarray, turn: float) -> bool:
-    """Whether steps are small, and those at some places no larger than those around."""
-    size, wide = np.abs(steps), np.pad(np.where(at, 0.0, np.abs(steps)), 3, mode="edge")
-    around = np.max([wide[i : i + len(steps)] for i in range(7)], axis=0)
-    return bool(size.max() <= INSIDE * turn and np.all(size[at] <= 1.5 * around[at] + SLACK * turn))
+    """Whether steps are small, and those at some places like those around."""
+    wide = np.pad(np.where(at, np.nan, steps), 3, constant_values=np.nan)
+    around = np.stack([wide[i : i + len(steps)] for i in range(7)])[:, at]
+    if np.abs(steps).max() > INSIDE * turn or np.isnan(around).all(axis=0).any():
+        return False
+    low, high = np.nanmin(around, axis=0), np.nanmax(around, axis=0)
+    room = 0.5 * (high - low) + 0.1 * np.maximum(np.abs(low), np.abs(high)) + SLACK * turn
+    return bool(np.all((steps[at] >= low - room) & (steps[at] <= high + room)))
 
 
 def _powers(span: float) -> list[float]:
@@ -144,7 +148,7 @@ def _in_order(rows: Columns) -> tuple[Columns, list[str]]:
                 "two logs in one file?"
             )
             raise ParameterError(f"t[{row}]", float(stamps.t[row]), bound)
-        notes.append(f"{len(back)} rows came out of order and are sorted by their stamps")
+        notes.append(f"rows that came out of order are sorted by their stamps: {len(back)}")
         order = np.argsort(stamps.t, kind="stable")
         rows = {key: x[order] for key, x in rows.items()}
     same = np.ones(len(rows["t"]), dtype=bool)
@@ -152,7 +156,7 @@ def _in_order(rows: Columns) -> tuple[Columns, list[str]]:
     for x in rows.values():
         same[1:] &= np.diff(x) == 0.0
     if same.any():
-        notes.append(f"{np.count_nonzero(same)} rows repeat the row before and are left out")
+        notes.append(f"rows that repeat the row before are left out: {np.count_nonzero(same)}")
         rows = {key: x[~same] for key, x in rows.items()}
     return rows, notes
 
@@ -234,7 +238,8 @@ def _longest_part(rows: Columns, stamps: Stamps) -> tuple[Columns, list[str]]:
     t = stamps.t
     missing = int(np.sum(lengths[gaps]))
     share = missing / (missing + len(t))
-    told = f"{missing} rows are missing in {len(gaps)} gaps, at t = {times(t[gaps])} s"
+    where = f"{len(gaps)} gap{'s' * (len(gaps) > 1)}, at t = {times(t[gaps])} s"
+    told = f"{missing} rows are missing in {where}"
     if np.max(lengths) <= BRIDGED and share <= LOST:
         return rows, [f"{told}: bridged by cubics"]
     ends = gaps[lengths[gaps] > (BRIDGED if share <= LOST else 1.0)]
@@ -288,7 +293,7 @@ def _one_each(rows: Columns) -> tuple[Columns, list[str]]:
         return rows, []
     place = np.cumsum(apart) - 1
     count = np.bincount(place)
-    note = f"{np.count_nonzero(~apart)} rows less than a quarter of a step behind another: averaged"
+    note = f"rows within a quarter of a step of another are averaged: {np.count_nonzero(~apart)}"
     return {key: np.bincount(place, x) / count for key, x in rows.items()}, [note]
 
 

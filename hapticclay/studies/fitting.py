@@ -42,6 +42,7 @@ from .flow_models import (
 )
 from .measurement import Measurement
 from .outliers import LOST, Cleaned, cleaned, robust_deviation, sentence, times
+from .plausibility import FLOW, OF_DAMPER, YIELD, Number, doubts
 from .sliding import (
     FAST,
     LEAST_SLIDING,
@@ -267,6 +268,9 @@ def fit_flow(
     """
     names = _law_names(laws)
     if isinstance(data, Measurement):
+        if data.rotary:
+            bound = "must be of a motion along a line, in m and N, not about an axis"
+            raise ParameterError("data", data.name, bound)
         axis = choice("axis", "x" if axis is None else axis, AXES)
         t, p, v, f = data.t, data.output, None, data.input
         inside, source = np.ones(len(t), dtype=bool), data.name
@@ -296,8 +300,22 @@ def fit_flow(
     except np.linalg.LinAlgError:
         bound = "must be a motion that splines can follow"
         raise ParameterError("position", f"{count} samples", bound) from None
-    notes = data.notes if isinstance(data, Measurement) else ()
-    return dataclasses.replace(fitted, warnings=(*notes, *fitted.warnings))
+    if not isinstance(data, Measurement):
+        return fitted
+    return dataclasses.replace(
+        fitted, warnings=(*data.notes, *fitted.warnings, *doubts(_numbers(fitted), data, "clay"))
+    )
+
+
+def _numbers(fitted: Fitted) -> list[Number]:
+    """Yield force and damping of a law, to be judged."""
+    kinds = {"Fy": (YIELD, (0.0, 1.0, 0.0)), "b": (FLOW, OF_DAMPER)}
+    out = []
+    for p in fitted.parameters:
+        if p.name in kinds:
+            span = (p.value, p.value) if math.isnan(p.low) else (p.low, p.high)
+            out.append(Number(p.name, p.unit, p.value, span, *kinds[p.name]))
+    return out
 
 
 def _law_names(laws: Sequence[str] | str) -> list[str]:

@@ -136,9 +136,9 @@ def refit_nested(joint: JointFit, found: dict[str, tuple[Minimum, Minimum]]) -> 
 
 def student_quantile(level: float, freedom: float) -> float:
     """Student's t quantile of a two-sided interval."""
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
-    return float(t.ppf(0.5 + 0.5 * level, max(freedom, 1.0)))
+    return float(stdtrit(max(freedom, 1.0), 0.5 + 0.5 * level))
 
 
 def parameter_intervals(

@@ -44,6 +44,8 @@ COEFFICIENT_UNITS = {
     "S": ("1/kg", "1/s", "1/s^2"),
     "Th": ("kg", "N.s/m", "N/m"),
 }
+ROTARY_UNITS = {"kg": "kg.m^2", "1/kg": "1/(kg.m^2)", "N.s/m": "N.m.s/rad", "N/m": "N.m/rad"}
+ROTARY_UNITS |= {"m/N": "rad/(N.m)", "m/m": "rad/rad"}  # in place of those along a line
 IDENTIFICATION_BAND = {"G": (0.15, 20.0), "S": (0.15, 20.0), "Th": (0.08, 3.0)}  # [Hz]
 PERIOD = {"G": 5.0, "S": 5.0, "Th": 10.0}  # [s]
 AMPLITUDE = {"G": 2e-3, "S": 2e-3, "Th": 1e-2}  # [m]: small enough to keep the pose; none for Th
@@ -135,6 +137,7 @@ class Identified(Result):
         realisations: number of runs.
         source: name of the measured columns; empty for the simulated arm.
         warnings: limits of the result, one sentence each.
+        rotary: whether the position is an angle and the force a torque.
     """
 
     drawn_by = "hapticclay.views.identification_plots:identified_plot"
@@ -154,6 +157,7 @@ class Identified(Result):
     realisations: int
     source: str = ""
     warnings: tuple[str, ...] = ()
+    rotary: bool = False
 
     def headline(self) -> str:
         """Block, axis or source, and coefficients with their intervals, in one line."""
@@ -179,8 +183,15 @@ class Identified(Result):
         return "whole record, with its start and end"
 
     @property
+    def response_unit(self) -> str:
+        """Unit of the response."""
+        return unit_of(RESPONSE_UNITS[self.what], self.rotary)
+
+    @property
     def device(self) -> tuple[float, float, float]:
         """Mass [kg], damper [N.s/m] and spring [N/m] of what moves: a device, or an arm at a pose.
+
+        Of a rotary one inertia [kg.m^2], damper [N.m.s/rad] and spring [N.m/rad].
 
         Raises:
             ParameterError: of G, whose input is no force.
@@ -206,13 +217,13 @@ class Identified(Result):
             "coefficients": [{**fields_of(c), "error": c.error} for c in self.coefficients],
             "real": self.response.real,
             "imaginary": self.response.imag,
-            "units": {"frequency": "Hz", "response": RESPONSE_UNITS[self.what]},
+            "units": {"frequency": "Hz", "response": self.response_unit},
         }
 
 
 def response_tables(results: Sequence[Identified], paper: bool = True) -> dict[str, dict[str, Any]]:
     """The response of a block by axis, beside those of its fit and, with `paper`, of the paper."""
-    unit = RESPONSE_UNITS[results[0].what]
+    unit = results[0].response_unit
     out: dict[str, dict[str, Any]] = {}
     for r in results:
         table: dict[str, Any] = {"frequency [Hz]": r.frequency}
@@ -543,11 +554,16 @@ def _linear(what: str, frequency: np.ndarray, H: np.ndarray, dt: float | None) -
     return np.linalg.lstsq(*both, rcond=None)[0]
 
 
+def unit_of(unit: str, rotary: bool) -> str:
+    """A unit along a line, or what stands for it about an axis."""
+    return ROTARY_UNITS.get(unit, unit) if rotary else unit
+
+
 def coefficients_of(
-    what: str, axis: str, value: np.ndarray, half: np.ndarray
+    what: str, axis: str, value: np.ndarray, half: np.ndarray, rotary: bool = False
 ) -> tuple[Coefficient, ...]:
     """Fitted coefficients and half of their intervals, (3,) each, beside the printed ones."""
-    names, units = COEFFICIENT_NAMES[what], COEFFICIENT_UNITS[what]
+    names, units = COEFFICIENT_NAMES[what], [unit_of(x, rotary) for x in COEFFICIENT_UNITS[what]]
     rows = zip(names, units, printed_form(what, axis), value.tolist(), half.tolist(), strict=True)
     return tuple(
         Coefficient(name, unit, known, x, x - h, x + h) for name, unit, known, x, h in rows

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..display import table_of
 from ..results import Result, figure_of
-from .identification import Identified, response_tables
+from .identification import COEFFICIENT_UNITS, Identified, response_tables, unit_of
 from .workspace import Drift
 
 FIGURES = {"G": "fig4", "S": "fig5", "Th": "fig6"}  # of the paper
@@ -61,11 +61,10 @@ class IdentifiedBlocks(Result):
         lines = [f"lines: {counts}; lowest coherence {low:.6f}{way}"]
         for r in measured:
             if r.what == "S":
-                mass, damper, spring = r.device
-                lines.append(
-                    f"as a device: mass {mass:.5g} kg, damper {damper:.5g} N.s/m, "
-                    f"spring {spring:.5g} N/m"
-                )
+                names = ("inertia" if r.rotary else "mass", "damper", "spring")
+                units = (unit_of(x, r.rotary) for x in COEFFICIENT_UNITS["Th"])
+                triples = zip(names, r.device, units, strict=True)
+                lines.append("as a device: " + ", ".join(f"{n} {x:.5g} {u}" for n, x, u in triples))
         lines += [f"warning: {x}" for r in self.results for x in r.warnings]
         return lines + ([self.drift.headline()] if self.drift else [])
 

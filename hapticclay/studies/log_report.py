@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..columns.finding import candidates
+from ..columns.finding import UNITS, candidates
 from ..columns.log import Log
 from ..columns.stamps import Stamps
 from ..display import table_of
 from ..errors import ParameterError
 from ..results import Result
-from ..units import parse_unit, si_unit
+from ..units import Powers, parse_unit, si_unit
 from .even_columns import unwrapped
 from .outliers import runs_of, times
 
@@ -102,9 +102,9 @@ def log_report(log: Log) -> LogReport:
     if stamps is not None and stamps.even < 1.0:
         share = 100.0 * (1.0 - stamps.even)
         warnings.append(f"{share:.3g} % of the steps are off by more than 5 %: {TREATED}")
-    rows = []
+    rows, accepted = [], _accepted(log)
     for place, head in enumerate(log.table.heads):
-        size, unit, faults = _unit(log, place)
+        size, unit, faults = _unit(log, place, accepted.get(head.text, ()))
         x = log.table.loose_numbers(place)
         kept = x[np.isfinite(x)] * size
         low, high = (float(kept.min()), float(kept.max())) if len(kept) else (math.nan, math.nan)
@@ -122,21 +122,30 @@ def _stamps(log: Log, time: str) -> tuple[Stamps | None, list[str]]:
     t, out = stamps.t, []
     if len(gaps := stamps.gaps):
         longest = float(np.max(stamps.steps))
-        out.append(f"{len(gaps)} gaps, the longest {longest:.4g} s, at t = {times(t[gaps])} s")
+        out.append(
+            f"{_several(len(gaps), 'gap')}, the longest {longest:.4g} s, at t = {times(t[gaps])} s"
+        )
     if len(again := stamps.repeats):
-        out.append(f"{len(again)} stamps repeat the one before, at t = {times(t[again])} s")
+        first = f"{_several(len(again), 'stamp')} as the one before"
+        out.append(f"{first}, at t = {times(t[again])} s")
     if len(back := stamps.backward):
-        out.append(f"{len(back)} stamps go back, at t = {times(t[back])} s")
+        out.append(
+            f"{_several(len(back), 'stamp')} before the one before, at t = {times(t[back])} s"
+        )
     if stamps.step > 0.0 and not 1.0 <= stamps.rate <= 1e5:
         out.append(f"a rate of {stamps.rate:.3g} Hz: is the time in seconds?")
     return stamps, out
+
+
+def _several(n: int, what: str) -> str:
+    return f"{n} {what}{'s' * (n != 1)}"
 
 
 def _beside(log: Log, stamps: Stamps, other: str) -> str:
     """How another clock runs beside that of the stamps."""
     x = log.table.loose_numbers(log.place(other)) * log.size(log.place(other))[0]
     good = np.isfinite(x)
-    if np.count_nonzero(good) < LEAST or np.ptp(x[good]) == 0.0:
+    if np.count_nonzero(good) < LEAST or not np.ptp(x[good]) * np.ptp(stamps.t[good]) > 0.0:
         return f"{other} is no clock"
     rate, start = np.polyfit(stamps.t[good], x[good], 1)
     rest = x[good] - start - rate * stamps.t[good]
@@ -146,18 +155,30 @@ def _beside(log: Log, stamps: Stamps, other: str) -> str:
     )
 
 
-def _unit(log: Log, place: int) -> tuple[float, str, list[str]]:
+def _accepted(log: Log) -> dict[str, tuple[str, ...]]:
+    """Units of the quantity that a name means, by the name of the column."""
+    meanings = ("command", "position", "force", "time")
+    return {name: UNITS[x] for x in meanings for name in candidates(log, x)}
+
+
+def _unit(log: Log, place: int, accepted: tuple[str, ...]) -> tuple[float, str, list[str]]:
     """Size of the unit of a column, the unit in words, and what is wrong with it."""
     head = log.table.heads[place]
     try:
-        size, powers = log.size(place)
+        size, powers = log.size(place, accepted)
     except ParameterError as error:
         return 1.0, head.unit, [error.bound.partition("; ")[2] or error.bound]
     if powers is None:
         words = [text for _, text in head.last_words() if parse_unit(text)]
         return 1.0, f"{words[0]}, by its name?" if words else "none: SI", []
     si = si_unit(powers)
-    return size, si if size == 1.0 else f"{head.unit or 'stated'}, shown in {si}", []
+    own = head.unit or next((x for _, x in head.last_words() if _has(x, powers)), "stated")
+    return size, si if size == 1.0 else f"{own}, shown in {si}", []
+
+
+def _has(unit: str, powers: Powers) -> bool:
+    known = parse_unit(unit)
+    return known is not None and known[1] == powers
 
 
 def _remarks(x: np.ndarray) -> list[str]:
@@ -177,10 +198,11 @@ def _remarks(x: np.ndarray) -> list[str]:
     if stuck > STUCK * len(x) and len(np.unique(x[good])) > LEAST:
         out.append("limited?")
     if len(at := unwrapped(x[good])[2]):
-        return [*out, f"begins again {len(at)} times: an encoder that wraps"]
+        return [*out, f"begins again {_several(len(at), 'time')}: an encoder that wraps"]
     steps = np.abs(np.diff(x[good]))
     if np.count_nonzero(steps > 0.5 * span) in range(1, max(len(x) // 50, 2)):
-        out.append(f"{np.count_nonzero(steps > 0.5 * span)} jumps of more than half the range")
+        count = int(np.count_nonzero(steps > 0.5 * span))
+        out.append(f"{_several(count, 'jump')} of more than half the range")
     return out
 
 

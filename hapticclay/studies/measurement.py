@@ -19,6 +19,7 @@ from ..columns.finding import find
 from ..columns.log import Log, open_log
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
+from ..units import parse_unit
 from .even_columns import Between, even_columns, unwrapped, wrap_note
 
 COLUMNS = {  # columns of a file and their contents
@@ -28,7 +29,8 @@ COLUMNS = {  # columns of a file and their contents
     "reference": "what drives the experiment, free of noise, in any unit",
 }
 MEANINGS = {"t": "time", "input": "force or command", "output": "position"}
-UNITS = {"t": ("s",), "input": ("N", "m"), "output": ("m",)}
+UNITS = {"t": ("s",), "input": ("N", "m", "N.m", "rad"), "output": ("m", "rad")}
+ROTARY = tuple(parse_unit(x)[1] for x in ("N.m", "rad"))  # type: ignore[index]
 LEAST_ROWS = 100
 LARGEST_VALUE = 1e50  # value in a column; squares and sums of it do not overflow
 JITTER = 0.05  # largest deviation of a step from the mean step
@@ -50,6 +52,7 @@ class Measurement:
             uses the input, for Th the position.
         name: name in titles and files.
         notes: what was done to the rows of a log, one sentence each.
+        rotary: whether the output is an angle [rad] and a force a torque [N.m].
 
     Raises:
         ParameterError: a column is not such an array, is constant or too short; a value is not
@@ -65,6 +68,7 @@ class Measurement:
     reference: np.ndarray | None = None
     name: str = "data"
     notes: tuple[str, ...] = ()
+    rotary: bool = False
 
     def __post_init__(self):
         for column in COLUMNS:
@@ -160,7 +164,22 @@ def measured(log: Log, names: Mapping[str, str], between: Between = "spline") ->
         cells["output"] = raw * log.size(log.place(names["output"]), UNITS["output"])[0]
         notes.append(wrap_note(turn, at, cells["t"]))
     made = even_columns(cells, between)
-    return Measurement(**made.columns, name=log.path.name, notes=(*notes, *made.notes))
+    notes += made.notes
+    return Measurement(
+        **made.columns, name=log.path.name, notes=tuple(notes), rotary=_is_rotary(log, names)
+    )
+
+
+def _is_rotary(log: Log, names: Mapping[str, str]) -> bool:
+    """Whether input and output are of a motion about an axis, by the units that they state."""
+    keys = [key for key in ("input", "output") if key in names]
+    powers = {key: log.size(log.place(names[key]), UNITS[key])[1] for key in keys}
+    rotary = {key: x in ROTARY for key, x in powers.items() if x is not None}
+    if len(set(rotary.values())) > 1:
+        (about,) = [names[key] for key, x in rotary.items() if x]
+        bound = "must both be along a line, in N and m, or about an axis, in N.m and rad"
+        raise log.table.refusal(f"input and output {bound}; only {about!r} is about an axis")
+    return any(rotary.values())
 
 
 def named_columns(log: Log, given: Mapping[str, str], **meanings: str) -> dict[str, str]:

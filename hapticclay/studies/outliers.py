@@ -9,6 +9,7 @@ Between a jump away and the jump back lie outliers. Scales are medians, which ou
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -118,7 +119,7 @@ def _gaps(x: np.ndarray, at: np.ndarray) -> list[tuple[int, int]]:
         if i < SIDES[0] or i >= len(x) - 1 - SIDES[0]:  # the end of the column
             out.append((0, i + 1) if i < SIDES[0] else (i + 1, len(x)))
             continue
-        back = (j for j in at[k + 1 :].tolist() if j - i <= LONGEST)
+        back = at[k + 1 : np.searchsorted(at, i + LONGEST, "right")].tolist()
         found = next((j for j in back if _stands_out(x, i + 1, j + 1).all()), None)
         if found is not None:
             out.append((i + 1, found + 1))
@@ -130,23 +131,40 @@ def _gaps(x: np.ndarray, at: np.ndarray) -> list[tuple[int, int]]:
 
 def _first_repeat(x: np.ndarray, i: int) -> int:
     """Index of the first sample that has the value of sample i without a change in between."""
-    other = np.flatnonzero(x[:i] != x[i])
-    return int(other[-1]) + 1 if len(other) else 0
+    first = i
+    while first > 0 and x[first - 1] == x[i]:
+        first -= 1
+    return first
 
 
 def _stands_out(x: np.ndarray, first: int, stop: int) -> np.ndarray:
     """Whether first and last of some samples lie far from a curve that both sides follow, (2,)."""
-    ends = np.array([first, stop - 1])
+    ends = x[[first, stop - 1]] - x[first]
     for side in SIDES:
-        low, high = max(first - side, 0), min(stop + side, len(x))
-        around = np.concatenate((np.arange(low, first), np.arange(stop, high)))
+        left, right = min(side, first), min(side, len(x) - stop)
+        around = np.concatenate((x[first - left : first], x[stop : stop + right])) - x[first]
         if len(around) < 2 * SIDES[-1]:
             break
-        curve = _curve(around, x, 3 if side > SIDES[-1] else 2)
-        left = np.max(np.abs(x[around] - curve(around)))
-        if (far := np.abs(x[ends] - curve(ends)) > FAR * left).any():
+        rest, bridge = _bridge(left, stop - first, right, 3 if side > SIDES[-1] else 2)
+        deviation = np.max(np.abs(rest @ around))
+        if (far := np.abs(ends - bridge @ around) > FAR * deviation).any():
             return far
     return np.zeros(2, dtype=bool)
+
+
+@functools.lru_cache(maxsize=1000)  # a gap is short, and only near the ends has fewer samples
+def _bridge(left: int, gap: int, right: int, degree: int) -> tuple[np.ndarray, np.ndarray]:
+    """What the samples around a gap are multiplied by, for the polynomial of least squares.
+
+    To get their distances from it, and its values at first and last sample of the gap.
+    """
+    around = np.concatenate((np.arange(-left, 0), np.arange(gap, gap + right)))
+    powers, at_ends = (
+        np.vander(2.0 * (x + left) / (left + gap + right - 1) - 1.0, degree + 1)  # from -1 to 1
+        for x in (around, np.array([0, gap - 1]))
+    )
+    solved = np.linalg.pinv(powers)
+    return np.eye(len(around)) - powers @ solved, at_ends @ solved
 
 
 def _curve(around: np.ndarray, x: np.ndarray, degree: int) -> np.polynomial.Polynomial:

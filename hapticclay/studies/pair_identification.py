@@ -37,6 +37,7 @@ SETTLED = 0.2  # [s] after which errors count
 FREE = 0.3  # of the follower's torque: a force that varies less is no contact
 EXPLAINS = 0.5  # of the leader's torque that a law must explain
 ELASTIC = 0.9  # square of the correlation from which on a contact is a spring
+MOST_STEPS = 40_000  # of a simulation that is repeated: the first of a longer log
 AXIS_STEP = 1e-3  # of differences, where friction stops and starts the axis
 ROUNDS = 12  # of that fit
 INERTIAL = 0.25  # of the torque: below it, friction's errors are read as inertia
@@ -174,7 +175,7 @@ def identify_pair(
     numbers += more
     simulated, axis = np.zeros(0), None
     if _is_free(log):
-        axis, found, simulated = _mechanics(log, law, level)
+        axis, found, simulated = _mechanics(log, law, fit, level)
         left = float(np.std(simulated - (log.leader - log.follower)))
         if left > PUSHED * float(np.std(log.leader - log.follower)):
             axis, simulated = None, np.zeros(0)
@@ -239,24 +240,33 @@ def _is_free(log: PairLog) -> bool:
     return log.force is None or float(np.std(log.force)) < FREE * float(np.std(log.follower_torque))
 
 
-def _mechanics(log: PairLog, law: PairLaw, level: float) -> tuple[Axis, BlockFit, np.ndarray]:
+def _mechanics(
+    log: PairLog, law: PairLaw, of_law: BlockFit, level: float
+) -> tuple[Axis, BlockFit, np.ndarray]:
     """Inertia and friction of a free follower; the error of the one that they make."""
-    target = delayed(log.t, log.leader, law.link).tolist()
     first = max(3, round(0.03 / log.Ts))
     speed = float(np.polyfit(log.t[:first] - log.t[0], log.follower[:first], 1)[0])
     begin = float(log.follower[0]), speed
-    after = log.t >= log.t[0] + SETTLED
+    after = (log.t >= log.t[0] + SETTLED)[:MOST_STEPS]
 
-    def moved(axis: Axis) -> np.ndarray:
+    def moved(axis: Axis, law: PairLaw, count: int | None = MOST_STEPS) -> np.ndarray:
+        target = delayed(log.t, log.leader, law.link)[:count].tolist()
         starts = lambda: law.start(log.Ts, target[0] - begin[0])  # noqa: E731
         return follow(axis, target, starts, begin, log.Ts, law.late)
 
-    def rest(x: np.ndarray) -> np.ndarray:
-        return (moved(Axis(*x.tolist())) - log.follower)[after]
+    def rest(x: np.ndarray, law: PairLaw = law) -> np.ndarray:
+        return (moved(Axis(*x.tolist()), law) - log.follower[:MOST_STEPS])[after]
 
     found = block_fit(rest, _axis_guess(log), level, AXIS_STEP, ROUNDS)
-    axis = Axis(*found.values.tolist())
-    return axis, found, log.leader - moved(axis)
+    axis, covariance = Axis(*found.values.tolist()), of_law.covariance[:4, :4]
+    if np.isfinite(covariance).all():
+        steps = np.sqrt(np.diag(covariance))
+        pairs = zip(law._fields[:4], steps.tolist(), strict=True)
+        laws = [law._replace(**{name: getattr(law, name) + h}) for name, h in pairs]
+        slopes = [rest(found.values, x) - found.rest for x in laws]
+        scaled = covariance / np.outer(steps, steps)
+        found = found.given(np.column_stack(slopes), scaled)
+    return axis, found, log.leader - moved(axis, law, None)
 
 
 def _weak_inertia(log: PairLog, axis: Axis) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import warnings
 from collections.abc import Mapping
@@ -12,10 +13,12 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
+from ..columns.heads import powers_of
 from ..columns.log import open_log
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
 from ..files import MOST_TABLE, read_bytes
+from ..units import parse_unit
 from .measurement import LARGEST_VALUE, LEAST_ROWS, _check_sampling
 
 COLUMNS = {  # columns of a log and their contents
@@ -29,6 +32,7 @@ COLUMNS = {  # columns of a log and their contents
 UNITS = {"t": ("s",), "leader": ("rad",), "follower": ("rad",)} | {
     name: ("N.m",) for name in ("leader_torque", "follower_torque", "force")
 }
+QUANTITIES = "rad", "N.m"
 SPELLINGS = {  # of a column's name in lower case without its sign
     "t": ("t", "time"),
     "leader": ("leader", "master", "x_m", "q_m", "x_l", "q_l"),
@@ -184,18 +188,27 @@ def _scope(file: Path) -> dict[str, np.ndarray]:
         raise
     except Exception:  # noqa: BLE001  # whatever SciPy raises on another file
         return {}
-    scopes = [x for x in data.values() if isinstance(x, dict) and {"time", "signals"} <= x.keys()]
-    tables = [_signals(x) for x in scopes if np.size(x["time"]) >= LEAST_ROWS]
+    tables = []
+    for x in data.values():
+        if isinstance(x, dict) and {"time", "signals"} <= x.keys():
+            with contextlib.suppress(KeyError, TypeError, ValueError, AttributeError):  # damaged
+                tables.append(_signals(x))
+    tables = [x for x in tables if len(x["time"]) >= LEAST_ROWS]
     return max(tables, key=len, default={})  # a file may hold smaller ones, such as a reference
 
 
 def _signals(scope: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Columns in SI units by the names in labels such as "Torque (Nm at lever) -tau_rm, tau_rs"."""
     out = {"time": np.asarray(scope["time"], dtype=float).ravel()}
     signals = scope["signals"]
     for i, signal in enumerate([signals] if isinstance(signals, dict) else signals, 1):
         values = np.asarray(signal["values"], dtype=float).reshape(len(out["time"]), -1)
         label = LABEL.fullmatch(str(signal.get("label", "")).strip())
         names = [x.strip() for x in label[2].split(",") if x.strip()] if label else []
+        word = label[1].split()[0] if label and label[1].split() else ""
+        unit = parse_unit(word)
+        size, other = (float(unit[0]), unit[1] not in powers_of(QUANTITIES)) if unit else (1.0, 0)
         for j, column in enumerate(values.T):
-            out[names[j] if j < len(names) else f"signal {i}.{j + 1}"] = column
+            name = names[j] if j < len(names) else f"signal {i}.{j + 1}"
+            out[f"{name} [{word}]" if other else name] = size * column  # so that none mistakes it
     return out

@@ -19,6 +19,7 @@ from ..arguments import checked, named
 from ..columns.log import Log, open_log
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
+from ..model.arm import Arm
 from ..model.constants import AXES
 from ..model.operator import Operator
 from ..model.samples import Samples
@@ -210,6 +211,7 @@ def driven(
     """The scene that a recording drives."""
     if grip.mass:
         raise ParameterError("grip.mass", grip.mass, "must be 0: the recorded hand had its own")
+    recording = placed(recording, scenario)
     t, p, f = recording.t - recording.t[0], recording.p, recording.f
     column = f if drive == "force" else p
     if column is None:
@@ -218,12 +220,20 @@ def driven(
     changes: dict[str, Any] = {"force": (0.0, 0.0), "t_max": float(t[-1]), "length": None}
     if p is not None:
         v = np.gradient(p, t, axis=0)
-        changes |= {"start": tuple(p[0].tolist()), "velocity": tuple(v[0].tolist())}
+        if isinstance(scenario.arm, Arm):
+            changes |= {"start": tuple(p[0].tolist()), "velocity": tuple(v[0].tolist())}
         if drive == "motion":
             column = grip.spring * p + grip.damper * v + (0.0 if f is None else f)
     hand = grip if drive == "motion" else None
     muscle = Samples(t, column)  # type: ignore[arg-type]
     return replace(scenario, muscle=muscle, operator=hand, **changes)
+
+
+def placed(recording: Recording, scenario: Scenario) -> Recording:
+    """The recording, from the pose of an arm from a file on, which is its p = 0."""
+    if recording.p is None or isinstance(scenario.arm, Arm):
+        return recording
+    return replace(recording, p=recording.p - recording.p[0])
 
 
 @checked
@@ -234,6 +244,8 @@ def replay(
     grip: Operator = GRIP,
 ) -> Replayed:
     """Runs a scene under a recorded force or motion, from the recorded start.
+
+    An arm from a file starts at rest at its pose; the recorded motion is moved there.
 
     A recorded force is that at the handle, so the hand has no impedance of its own. A recorded
     motion leads the handle by a spring and a damper, beside the recorded force if there is one. The
@@ -256,6 +268,7 @@ def replay(
 
 def beside(record: Record, recording: Recording, drive: Drive) -> Replayed:
     """A run and its recording, at the times of the recording that the run reached."""
+    recording = placed(recording, record.scenario)
     t = recording.t - recording.t[0]
     t = t[t <= record.t[-1] + 1e-9] if len(record.t) else t[:0]
     p, f = (

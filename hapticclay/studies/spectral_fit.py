@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from ..arguments import checked
-from ..errors import ParameterError, numbers_of
+from ..errors import Bound, ParameterError, numbers_of
 from ..fields import Axis
 from .identification import (
+    COEFFICIENT_NAMES,
     COHERENT,
     CONFIDENCE,
     IDENTIFICATION_BAND,
@@ -18,6 +20,7 @@ from .identification import (
     MULTISINE_LINES,
     Band,
     Block,
+    Coefficient,
     Identified,
     coefficients_of,
     moving_mean,
@@ -26,9 +29,11 @@ from .identification import (
 )
 from .measurement import Measurement
 from .outliers import LOST, Cleaned, bridged, cleaned, runs_of, sentence, times
+from .plausibility import device_numbers, doubts
 from .sliding import quantum
 
 LEAST_LINES = 20  # of the spectrum in the band, without a period
+LATE = 3.0, 0.05, 0.01  # half intervals, steps and share of a coefficient: a delay that matters
 LEAST_EXCITED = 5  # lines of a periodic input
 EXCITED = 1e-6  # least power of a line, as a share of the strongest in the band
 PERIODIC = 3e-5  # largest share of a periodic input's power in the band between its lines
@@ -39,6 +44,8 @@ USUAL, FAR_BEYOND = 0.99, 2.0  # quantile of a column, and times that an impossi
 NEIGHBOURS = 20  # lines to each side over which noise is averaged, at most
 WEIGHT_ROUNDS = 4  # of fit and noise; the weights settle in two
 
+Delay = Annotated[float, Bound(-1.0, 1.0, "s")]
+Timing = tuple[bool, float]  # whether the input is held, and the delay of the position [s]
 # frequency [Hz], response, its deviation, coherence
 Averaged = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
@@ -51,6 +58,7 @@ def identify_data(
     *,
     band: Band = None,
     held: bool = False,
+    delay: Delay = 0.0,
 ) -> Identified:
     """Identify one block from measured columns.
 
@@ -67,6 +75,7 @@ def identify_data(
         band: lowest and highest frequency [Hz], to 0.1/dt; None for the part of (0.15, 20), Th
             (0.08, 3), that the record covers.
         held: True for an input that a computer holds from each sample to the next; not for Th.
+        delay: of the position behind the other columns [s], which is removed.
 
     Returns:
         As `identify`, without scenario; `realisations` is 1 and `periods` 0 without a period.
@@ -87,15 +96,31 @@ def identify_data(
             "identify the parts one by one"
         )
     columns = columns._replace(output=place.x)
-    found, left_out = _without_wrong_readings(what, columns, data, band, held)
-    coefficients = coefficients_of(what, axis, found.fitted.value, found.fitted.half)
+    timing = held, delay
+    found, left_out = _without_wrong_readings(what, columns, data, band, timing)
+    left_out += _lag_warning(what, found, data.dt)
+    value, half, rotary = found.fitted.value, found.fitted.half, data.rotary
+    coefficients = coefficients_of(what, axis, value, half, rotary)
     if all(c.high < 0.0 for c in coefficients[: 3 if what == "Th" else 1]):
         bound = "must not be negative: input or output has the wrong sign (fh is on the handle)"
         raise ParameterError(coefficients[0].name, float(f"{coefficients[0].value:.4g}"), bound)
     return Identified(
         what, axis, *found.averaged, coefficients, None, None, 0, found.periods, 1, data.name,
-        (*warnings, *left_out),
+        (*warnings, *left_out, *_doubts(what, coefficients, data)), rotary,
     )  # fmt: skip
+
+
+def _doubts(what: str, found: Sequence[Coefficient], data: Measurement) -> tuple[str, ...]:
+    """What no hand or device has."""
+    if what == "G" or data.rotary:  # the inertias of arms and knobs span seven decades
+        return ()
+    values, spans = [c.value for c in found], [(c.low, c.high) for c in found]
+    if what == "S":  # 1/mass, damper/mass, spring/mass
+        gain, (low, high) = values[0], spans[0]
+        mass = (1.0 / high, 1.0 / low if low > 0.0 else math.inf)
+        values = [1.0 / gain, values[1] / gain, values[2] / gain]
+        spans = [mass, *((x / gain, y / gain) for x, y in spans[1:])]
+    return doubts(device_numbers(values, spans), data, "hand or device")
 
 
 class _Columns(NamedTuple):
@@ -122,7 +147,7 @@ class _Estimate(NamedTuple):
 
 
 def _without_wrong_readings(
-    what: str, columns: _Columns, data: Measurement, band: object, held: bool
+    what: str, columns: _Columns, data: Measurement, band: object, timing: Timing
 ) -> tuple[_Estimate, list[str]]:
     """The better fit, with or without outliers of input and reference, and warnings about these.
 
@@ -141,7 +166,7 @@ def _without_wrong_readings(
         if extreme is not None and (not other or min(map(np.ptp, other.values())) == 0.0):
             continue
         try:
-            made = _estimate(what, columns._replace(**other), data, band, held)
+            made = _estimate(what, columns._replace(**other), data, band, timing)
         except ParameterError as error:
             best = best or error
             continue
@@ -167,7 +192,7 @@ def _far(x: np.ndarray, clean: Cleaned, extreme: bool) -> np.ndarray:
 
 
 def _estimate(
-    what: str, columns: _Columns, data: Measurement, band: object, held: bool
+    what: str, columns: _Columns, data: Measurement, band: object, timing: Timing
 ) -> _Estimate:
     """Fit a block to columns."""
     u, y = columns.input, columns.output
@@ -177,7 +202,10 @@ def _estimate(
     low, high = _band(what, band, data.dt, len(u))
     n = _period(signals[0], high * data.dt)
     periods = len(u) // n - 1 if n else 0
-    spectrum = _spectrum(signals[:, -periods * n :], data.dt, (low, high), periods, held)
+    spectrum = _spectrum(signals[:, -periods * n :], data.dt, (low, high), periods, timing[0])
+    late = np.exp(2j * np.pi * spectrum.frequency * timing[1])
+    side = "u" if what == "Th" else "y"
+    spectrum = spectrum._replace(**{side: getattr(spectrum, side) * late})
     _check_coherence(spectrum)
     try:
         with np.errstate(all="ignore"):  # of what cannot be fitted
@@ -300,6 +328,7 @@ class _Fitted(NamedTuple):
     known: np.ndarray  # the part of the input that the reference causes
     left: np.ndarray
     noise: np.ndarray  # standard deviation of the residual
+    theta: np.ndarray  # coefficients, and terms of start and end
 
 
 def _fit_spectrum(what: str, x: _Spectrum, instrument: bool) -> _Fitted:
@@ -309,8 +338,6 @@ def _fit_spectrum(what: str, x: _Spectrum, instrument: bool) -> _Fitted:
     reference. Intervals from the residual at each line (HC3 of MacKinnon, White 1985) hold for
     inexact weights; Student's t with the degrees of freedom of Satterthwaite (1946).
     """
-    from scipy.special import stdtrit
-
     known = x.u if not instrument else x.r * (_near(x.u * x.r.conj()) / _near(np.abs(x.r) ** 2))
     theta, left = _first_guess(what, x), x.y
     noise = np.full(len(x.y), float(np.std(x.y)))
@@ -325,21 +352,63 @@ def _fit_spectrum(what: str, x: _Spectrum, instrument: bool) -> _Fitted:
         floor = LINE_FLOOR * np.abs(x.y)
         noise = np.sqrt(spent * _near(np.abs(left) ** 2) + floor**2)
     columns, tools = (_slopes(what, x, u, theta) for u in (x.u, known))
-    J, Z = (real_and_imaginary(c.T / noise).T for c in (columns, tools))
-    size = np.linalg.norm(J, axis=0)
-    # influence of the residual at each line on the coefficients, (p, 2 lines)
-    gain = np.linalg.solve(Z.T @ J / size, Z.T) / size[:, None]
-    hat = np.einsum("lp,pl->l", J, gain).reshape(2, -1).mean(axis=0)
-    own = 0.5 * (np.abs(left) / noise / (1.0 - np.minimum(hat, 0.9))) ** 2
-    shares = np.square(gain).reshape(len(theta), 2, -1).sum(axis=1) * own
-    variance = shares.sum(axis=1)
-    freedom = 2.0 * variance**2 / np.maximum(np.sum(shares**2, axis=1), 1e-300)
-    half = stdtrit(np.maximum(freedom, 1.0), 0.5 + 0.5 * CONFIDENCE) * np.sqrt(variance)
+    gain, half = _intervals(columns, tools, left, noise)
     # the motion between samples is unknown
     lost = response(what, theta[:3], x.frequency) * x.u * (2.0 * np.pi * x.frequency * x.dt) ** 2
     half = np.hypot(half, gain @ real_and_imaginary(lost / 6.0 / noise))[:3]
     model = response(what, theta[:3], x.frequency)
-    return _Fitted(theta[:3], half, model, known, left, noise)
+    return _Fitted(theta[:3], half, model, known, left, noise, theta)
+
+
+def _intervals(
+    columns: np.ndarray, tools: np.ndarray, left: np.ndarray, noise: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Influence of the residual at each line on the unknowns, (p, 2 lines), and half intervals."""
+    from scipy.special import stdtrit
+
+    J, Z = (real_and_imaginary(c.T / noise).T for c in (columns, tools))
+    size = np.linalg.norm(J, axis=0)
+    gain = np.linalg.solve(Z.T @ J / size, Z.T) / size[:, None]
+    hat = np.einsum("lp,pl->l", J, gain).reshape(2, -1).mean(axis=0)
+    own = 0.5 * (np.abs(left) / noise / (1.0 - np.minimum(hat, 0.9))) ** 2
+    shares = np.square(gain).reshape(len(gain), 2, -1).sum(axis=1) * own
+    variance = shares.sum(axis=1)
+    freedom = 2.0 * variance**2 / np.maximum(np.sum(shares**2, axis=1), 1e-300)
+    half = stdtrit(np.maximum(freedom, 1.0), 0.5 + 0.5 * CONFIDENCE) * np.sqrt(variance)
+    return gain, half
+
+
+def _lag(what: str, x: _Spectrum, found: _Fitted) -> tuple[float, float, np.ndarray]:
+    """Delay of the output that the residual shows [s], half its interval, and what it changes."""
+    s = 2j * np.pi * x.frequency
+    late, tool = (-s * found.model * u for u in (x.u, found.known))
+    columns = np.column_stack((_slopes(what, x, x.u, found.theta), late))
+    tools = np.column_stack((_slopes(what, x, found.known, found.theta), tool))
+    gain, half = _intervals(columns, tools, found.left, found.noise)
+    step = gain @ real_and_imaginary(found.left / found.noise)
+    return float(step[-1]), float(half[-1]), step[:3]
+
+
+def _lag_warning(what: str, found: _Estimate, dt: float) -> list[str]:
+    """A sentence about a delay between the columns, if it matters."""
+    with np.errstate(all="ignore"):
+        try:
+            lag, half, change = _lag(what, found.spectrum, found.fitted)
+        except np.linalg.LinAlgError:
+            return []
+    share = np.abs(change) / np.abs(found.fitted.value)
+    seen = abs(lag) > LATE[0] * half and abs(lag) > LATE[1] * dt
+    if not seen or not np.any((share > LATE[2]) & (np.abs(change) > found.fitted.half)):
+        return []
+    worst = int(np.argmax(share))
+    late = -lag if what == "Th" else lag  # of the position, which is the input of Th
+    way = "later" if late > 0.0 else "earlier"
+    return [
+        f"the position comes {1e3 * abs(late):.3g} ms (+- {1e3 * half:.2g}) {way} than a block of "
+        "this form has it: a delay between the columns, a filter in one, or a held input; it moves "
+        f"{COEFFICIENT_NAMES[what][worst]} by {100.0 * float(share[worst]):.2g} %. With the delay "
+        f"of {late:.3g} s it goes"
+    ]
 
 
 def _near(a: np.ndarray) -> np.ndarray:

@@ -122,8 +122,11 @@ def part_schema(plan: Plan, number: int) -> Any:
     import pyarrow as pa
 
     marks = {DIGEST: plan.digest().encode(), NUMBER: b"%d" % number}
-    schema = pa.Table.from_pylist([plan.blank_row()]).schema
-    fields = [_with_note(field, column_note(field.name, plan.notes)) for field in schema]
+    kinds = {float: pa.float64(), int: pa.int64(), bool: pa.bool_(), str: pa.string()}
+    fields = []
+    for name, x in plan.blank_row().items():
+        field = pa.field(name, kinds.get(type(x)) or pa.array([x]).type)
+        fields.append(_with_note(field, column_note(name, plan.notes)))
     return pa.schema(fields, marks)
 
 
@@ -131,12 +134,39 @@ def _with_note(field: Any, note: tuple[str, str]) -> Any:
     return field.with_metadata(dict(zip(NOTE, note, strict=True)))
 
 
+def _table(rows: list[dict[str, Any]], schema: Any) -> Any:
+    """Rows as a pyarrow Table."""
+    import pyarrow as pa
+
+    columns = [_array([row[field.name] for row in rows], field.type) for field in schema]
+    return pa.Table.from_arrays(columns, schema=schema)
+
+
+def _array(values: list[Any], kind: Any) -> Any:
+    """Values as a pyarrow Array.
+
+    Those of numbers and words are made of their bytes: `pyarrow.array` imports pandas, which takes
+    as long as a thousand runs.
+    """
+    import pyarrow as pa
+
+    if kind == pa.string():
+        texts = [x.encode() for x in values]
+        buffers = [np.cumsum([0, *map(len, texts)], dtype=np.int32), b"".join(texts)]
+    elif kind == pa.bool_():
+        buffers = [np.packbits(np.array(values, bool), bitorder="little")]
+    elif kind in (pa.float64(), pa.int64()):
+        buffers = [np.array(values, np.float64 if kind == pa.float64() else np.int64)]
+    else:
+        return pa.array(values, kind)
+    return pa.Array.from_buffers(kind, len(values), [None, *map(pa.py_buffer, buffers)])
+
+
 def write_part(plan: Plan, number: int, rows: list[dict[str, Any]], file: Any) -> None:
     """Writes rows to an open file."""
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
-    table = pa.Table.from_pylist(rows, part_schema(plan, number))
+    table = _table(rows, part_schema(plan, number))
     pq.write_table(table, file, write_page_checksum=True)
 
 
@@ -399,7 +429,8 @@ def read_sweep(out: str | os.PathLike[str]):
             bound = f"is {fault}: the command of the sweep in {out} makes it again"
             raise ParameterError("part", file.name, bound)
     table = pa.concat_tables(tables)
-    if np.any(np.diff(table["run"].to_numpy()) <= 0):
+    numbers = np.concatenate([np.empty(0, int), *map(np.from_dlpack, table["run"].chunks)])
+    if np.any(np.diff(numbers) <= 0):
         raise ParameterError("sweep", str(out), "must have each run once")
     total = (_head(Path(out)) or {}).get("total")
     if isinstance(total, int) and table.num_rows < total:

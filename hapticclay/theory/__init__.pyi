@@ -32,10 +32,14 @@ from .loop_passivity import clay_passivity as clay_passivity
 from .loop_passivity import passivity as passivity
 from .loops import Loop as Loop
 from .loops import closed_loop_poles as closed_loop_poles
+from .pair_boxes import PairHands as PairHands
+from .pair_boxes import pair_hands as pair_hands
 from .pair_maps import PairComparison as PairComparison
 from .pair_maps import PairMap as PairMap
 from .pair_maps import compare_links as compare_links
 from .pair_maps import pair_map as pair_map
+from .pair_ports import PairTransparency as PairTransparency
+from .pair_ports import pair_transparency as pair_transparency
 from .pair_verdict import PairLimits as PairLimits
 from .pair_verdict import pair_limits as pair_limits
 from .relay_cycle import ExactCycle as ExactCycle

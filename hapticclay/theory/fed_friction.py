@@ -51,7 +51,8 @@ class FrictionCycle(Result):
     """Oscillations of the joints of an arm under friction fed forward in excess.
 
     n joints, m oscillations. A joint with Coulomb friction of its own may rest, too: motion between
-    its threshold and its limit cycle grows, smaller motion comes to rest.
+    its threshold and its limit cycle grows, smaller motion comes to rest. A cycle within the
+    distance at which friction holds the joint would stop, and is none.
 
     Attributes:
         names: joints, shape (n,).
@@ -74,7 +75,8 @@ class FrictionCycle(Result):
         harmonics: number of odd harmonics balanced, shape (m,); 1, the describing function, for a
             threshold, and where more are not found.
         first_amplitude: by the fundamental alone, the describing function [rad], shape (m,).
-        first_frequency: likewise [Hz], shape (m,).
+        first_frequency: likewise [Hz], shape (m,); where it is off by more than a half, that of
+            all harmonics is good to some ten percent only.
         line_rate: largest rates of a sine, by joint [rad/s], shape (n, l).
         line_growth: growth of the motion at them [1/s], shape (n, l); NaN without a law.
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
@@ -305,8 +307,6 @@ class Joint:
     @cached_property
     def _motions(self) -> np.ndarray:
         """Growth [1/s] and angular frequency [rad/s] of the motion at those rates, shape (2, l)."""
-        if not (self.fed.Fc * self.fed.k and self._stiffness and self.loop.stable()):
-            return np.full((2, len(self.speeds)), math.nan)
         found = [(math.nan, 0.0)]
         for V in self.speeds.tolist():
             found.append(self._motion(V, found[-1][1]))
@@ -314,8 +314,13 @@ class Joint:
 
     @property
     def growth(self) -> np.ndarray:
-        """Growth of the motion at those rates [1/s]."""
-        return self._motions[0]
+        """Growth of the motion at those rates [1/s], of a steady rate for a joint that drifts."""
+        if not (self.fed.Fc * self.fed.k and self.loop.stable()):
+            return np.full(len(self.speeds), math.nan)
+        if self._stiffness:
+            return self._motions[0]
+        mass = 1.0 / np.linalg.inv(self.loop.inertia)[self.j, self.j]
+        return np.array([self._excess(w) / (mass * w) for w in self.speeds.tolist()])
 
     def _motion(self, V: float, omega: float) -> tuple[float, float]:
         """Growth [1/s] and angular frequency [rad/s] of the largest motion of the loop.
@@ -341,19 +346,26 @@ class Joint:
         if not self._stiffness:
             yield from self._drifts()
             return
-        grows = self.growth > 0.0
+        grows, before = self.growth > 0.0, []
         for i in np.flatnonzero(grows[:-1] != grows[1:]).tolist():
             first = self._first(i, bool(grows[i]))
             if grows[i + 1]:
-                yield self._cycle("threshold", first, first, 1)
+                before = [self._cycle("threshold", first, first, 1)]
                 continue
-            theta = first.omega * self.loop.Ts
-            n = max(1, min(HARMONICS, int((FASTEST / theta + 1.0) / 2.0)))
-            whole = self._balanced(n, first.rate, first.omega)
-            if whole and whole.forward:
-                yield self._cycle("limit cycle", whole, first, n)
-            else:
-                yield self._cycle("limit cycle", first, first, 1)
+            found = self._limit_cycle(first)
+            if found.amplitude > self.rests:  # else it stops where it turns around
+                yield from (*before, found)
+            before = []
+        yield from before
+
+    def _limit_cycle(self, first: _Balance) -> _Cycle:
+        """The cycle with all harmonics, if they are found and it does not stick."""
+        theta = first.omega * self.loop.Ts
+        n = max(1, min(HARMONICS, int((FASTEST / theta + 1.0) / 2.0)))
+        whole = self._balanced(n, first.rate, first.omega)
+        if whole and whole.forward:
+            return self._cycle("limit cycle", whole, first, n)
+        return self._cycle("limit cycle", first, first, 1)
 
     def _first(self, i: int, grows: bool) -> _Balance:
         """The balance of the fundamental between two rates; by bisection if it is not found."""
@@ -372,18 +384,17 @@ class Joint:
             self.j, kind, best.amplitude, hertz[0], best.rate, n, first.amplitude, hertz[1]
         )
 
+    def _excess(self, w: float) -> float:
+        """Torque that speeds a steady rate up: what is fed forward less friction and damping."""
+        brake = float((self.loop.damping + self.loop.rate)[self.j, self.j])
+        return float(self.fed(np.array([w]))[0]) - self.coulomb - brake * w
+
     def _drifts(self) -> Iterator[_Cycle]:
-        """Constant rates at which the torques of friction, damping and law balance."""
-        total = self.loop.damping + self.loop.rate
-        brake = float(total[self.j, self.j])
-
-        def excess(w: float) -> float:
-            return float(self.fed(np.array([w]))[0]) - self.coulomb - brake * w
-
+        """Steady rates to which nearby ones tend."""
         speeds = self.speeds.tolist()
         for a, b in zip(speeds[:-1], speeds[1:], strict=True):
-            if excess(a) > 0.0 >= excess(b):
-                w = roots.bisect(lambda x: excess(x) > 0.0, a, b, 1e-9)[0]
+            if self._excess(a) > 0.0 >= self._excess(b):
+                w = roots.bisect(lambda x: self._excess(x) > 0.0, a, b, 1e-9)[0]
                 yield _Cycle(self.j, "drift", math.nan, 0.0, w, 1, math.nan, 0.0)
 
     def _balanced(self, n: int, V: float, omega: float) -> _Balance | None:

@@ -140,6 +140,39 @@ class End:
         out[at["x"], n:] = self.control.state[:, arrived]
         return out
 
+    def pushed(self, omega: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """Right side of T X for a force of a sine on the handle, shape (m, size).
+
+        The force acts between samples, along joint torques of shape (n,), at omega [rad/s] of
+        shape (m,); without held torques the arm would follow it by (M s^2 + D s + S)^-1. The
+        measured torque on the load has the force in it, as a hand's push.
+        """
+        s = 1j * np.asarray(omega)[:, None]
+        alone = self.alone(omega) @ along
+        both = np.concatenate([alone, s * alone], axis=1)
+        out = np.zeros((len(s), self.size), complex)
+        z = np.exp(s * self.loop.Ts)
+        out[:, : 2 * self.n] = z * both - both @ self.loop.hold[0].T
+        out[:, self.columns["F"]] = self._on_load @ along - along
+        return out
+
+    def alone(self, omega: np.ndarray) -> np.ndarray:
+        """Positions per torque of a sine between samples, of the arm alone, shape (m, n, n)."""
+        s, loop = 1j * np.asarray(omega)[:, None, None], self.loop
+        return np.linalg.inv(loop.inertia * s**2 + loop.damping * s + loop.stiffness)
+
+    def between(self, omega: np.ndarray, X: np.ndarray) -> np.ndarray:
+        """Torque of the hold at omega, of the unknowns at the samples, shape (m, n).
+
+        A hold makes of samples at exp(s Ts) the sine (1 - exp(-s Ts))/(s Ts), as late as it is;
+        sidebands beyond the Nyquist frequency are left out.
+        """
+        s, Ts = 1j * np.asarray(omega)[:, None], self.loop.Ts
+        hold = (1.0 - np.exp(-s * Ts)) / (s * Ts)
+        late = np.exp(-s * self.loop.delay), np.exp(-s * self.received.delay)
+        own, other = X[:, self.columns["own"]], X[:, self.columns["other"]]
+        return hold * (late[0] * own + late[1] * other)
+
     @cached_property
     def message(self) -> tuple[np.ndarray, np.ndarray]:
         """What is sent per X, shape (m, size), and per what arrives, shape (m, m)."""

@@ -266,6 +266,26 @@ class PairLoop:
         arrived = np.linalg.solve(np.eye(2 * m) - own, pushed)
         return _joined(ql, qf, arrived, n), _joined(vl, vf, arrived, n)
 
+    def admittance(self, omega: np.ndarray, along: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+        """Rates of both handles per sine on either, at omega [rad/s] of shape (m,), (m, 2, 2).
+
+        along: joint torques of a unit force on the leader's and on the follower's handle.
+        """
+        z = np.exp(1j * omega * self.Ts)
+        T = np.array([self.equations(each) for each in z])
+        starts, pushed = (0, self.leader.size), np.zeros((len(z), T.shape[1], 2), complex)
+        for i, end in enumerate(self.ends):
+            pushed[:, starts[i] : starts[i] + end.size, i] = end.pushed(omega, along[i])
+        X = np.linalg.solve(T, pushed)
+        out = np.zeros((len(z), 2, 2), complex)
+        for i, end in enumerate(self.ends):
+            for j in range(2):
+                own = X[:, starts[i] : starts[i] + end.size, j]
+                torque = end.between(omega, own) + (along[i] if i == j else 0.0)
+                moved = (end.alone(omega) @ torque[:, :, None])[:, :, 0]
+                out[:, i, j] = 1j * omega * (moved @ along[i])
+        return out
+
     def around(self, theta: np.ndarray) -> np.ndarray:
         """What comes back per message, without the whole samples: H_l H_f, shape (m, k, k)."""
         z = np.exp(1j * np.asarray(theta))

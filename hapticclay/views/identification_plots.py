@@ -24,14 +24,13 @@ class PlottedBlock(NamedTuple):
     """Labels of an identified block."""
 
     symbol: str  # in titles
-    unit: str  # of its magnitude
     equations: tuple[str, str]  # of the paper, on x and y
 
 
 BLOCKS = {
-    "G": PlottedBlock("G", "dB re 1 m/m", ("Eq. 15", "Eq. 16")),
-    "S": PlottedBlock("S", "dB re 1 m/N", ("Eq. 17", "Eq. 18")),
-    "Th": PlottedBlock("T$_h$", "dB re 1 N/m", ("Eq. 19", "Eq. 19")),
+    "G": PlottedBlock("G", ("Eq. 15", "Eq. 16")),
+    "S": PlottedBlock("S", ("Eq. 17", "Eq. 18")),
+    "Th": PlottedBlock("T$_h$", ("Eq. 19", "Eq. 19")),
 }
 HEIGHTS = (2.2, 2.0, 0.8)  # of magnitude, phase and coherence
 
@@ -53,7 +52,7 @@ def identification_plot(results: Sequence[Identified], paper: bool | None = None
             ax.tick_params(labelleft=rows > 1)
     for column, result in zip(axes.T, results, strict=True):
         _response_column(column, result, paper)
-    labels = f"magnitude [{BLOCKS[results[0].what].unit}]", "phase [deg]", "coherence"
+    labels = f"magnitude [dB re 1 {results[0].response_unit}]", "phase [deg]", "coherence"
     labelled = axes if rows > 1 else axes[:, :1]
     for row, label in zip(labelled, labels, strict=True):
         for ax in row:

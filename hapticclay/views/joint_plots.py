@@ -78,15 +78,19 @@ def friction_plot(found: FrictionCycle) -> Figure:
         if np.isfinite(growth[j]).any():
             ax.plot(found.line_rate[j], growth[j], **curve_look(j), label=name)
     rates = 2.0 * math.pi * found.first_frequency * found.first_amplitude
+    rates = np.where(np.isnan(rates), found.rate, rates)  # of a drift
     for kind, rate in zip(found.kind, rates, strict=True):
-        face = {"mfc": BLACK} if kind == "limit cycle" else {}
+        face = {} if kind == "threshold" else {"mfc": BLACK}
         ax.plot(rate, 0.0, **(hollow(BLACK, size=5.0) | face))
     level(ax)
-    ax.set(xscale="log", ylim=(-1.5 * most, 1.2 * most))
+    ends = found.line_rate.min(), found.line_rate.max()
+    ax.set(xscale="log", xlim=ends, ylim=(-1.5 * most, 1.2 * most))
     label_axes(ax, "largest rate of the joint [rad/s]", "growth [1/s]")
     if ax.get_legend_handles_labels()[0]:
         ax.legend()
-    set_title(ax, "motion under friction fed forward", "full dots: limit cycles; open: thresholds")
+    set_title(
+        ax, "motion under friction fed forward", "full dots: what it tends to; open: thresholds"
+    )
     return figure
 
 

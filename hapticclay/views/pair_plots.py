@@ -8,12 +8,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..theory.pair_boxes import PairHands
 from ..theory.pair_maps import PairComparison, PairMap
+from ..theory.pair_ports import PairTransparency
 from ..theory.pair_verdict import PairLimits
 from .palette import BLACK, BLUE, CURVE_STYLES, MID_GREY, PALE_GREY, VERMILION
-from .panels import add_legend, label_axes, plain_ticks, set_title, single
+from .panels import add_legend, label_axes, plain_ticks, set_title, side_by_side, single
 from .style import figure_size, figure_style, points, stroke
 
+SAFE = (-1.2, 3.2)  # of the criterion that is shown
 PER_JOINT = 0.3  # [inch] of height
 
 
@@ -104,4 +107,58 @@ def comparison_plot(found: PairComparison) -> Figure:
     ax.set_xlim(0.0, top)
     label_axes(ax, "largest one-way delay [ms]")
     set_title(ax, "the dashed line is the link's delay")
+    return figure
+
+
+@figure_style()
+def transparency_plot(found: PairTransparency) -> Figure:
+    """Plots impedances felt, and how motion and force are followed, over frequency."""
+    figure, (felt, follows, safe) = side_by_side(3, 3.4)
+    curves = [("free motion", found.free), ("rigid wall", found.rigid)]
+    if np.abs(found.contact).any():
+        curves += [("in the contact", found.felt), ("the contact itself", found.contact)]
+    for (name, curve), (color, dash) in zip(curves, CURVE_STYLES, strict=False):
+        felt.plot(found.frequency, np.abs(curve), color=color, ls=dash, label=name)
+    for name, curve, (color, dash) in zip(
+        ("motion, free", "force, on a rigid wall"),
+        (found.motion, found.force),
+        CURVE_STYLES,
+        strict=False,
+    ):
+        follows.plot(found.frequency, np.abs(curve), color=color, ls=dash, label=name)
+    safe.plot(found.frequency, found.criterion, color=BLUE)
+    safe.axhline(1.0, color=VERMILION, ls="--", lw=stroke(1.2))
+    felt.set(xscale="log", yscale="log")
+    follows.set(xscale="log", yscale="log")
+    safe.set(xscale="log", ylim=SAFE)
+    label_axes(felt, "frequency [Hz]", "impedance felt [N.s/m]")
+    label_axes(follows, "frequency [Hz]", "follower over leader")
+    label_axes(safe, "frequency [Hz]", "Llewellyn's criterion")
+    for ax in (felt, follows):
+        ax.legend(fontsize=points(8))
+    set_title(felt, f"{found.kind}, along {found.axis}")
+    set_title(safe, "any passive hand and object: above 1", panel=True)
+    return figure
+
+
+@figure_style()
+def hands_plot(found: PairHands) -> Figure:
+    """Plots the largest delay over the mass of the hand, each member a dot."""
+    figure, ax = single(3.6)
+    finite = np.isfinite(found.delay)
+    top = 1.2 * max(1e3 * found.delay[finite].max(initial=1.0), 1e3 * found.present)
+    late = np.where(finite, 1e3 * found.delay, top)
+    for name, color, which in (
+        ("stable", BLUE, found.stable),
+        ("unstable", VERMILION, ~found.stable),
+    ):
+        if which.any():
+            ax.plot(found.hands[which, 0], late[which], ".", color=color, label=name)
+    if not finite.all():
+        ax.plot(found.hands[~finite, 0], late[~finite], "^", color=BLUE, label="any delay")
+    ax.axhline(1e3 * found.present, color=BLACK, ls="--", lw=stroke(1.2), label="the link")
+    ax.set_ylim(0.0, 1.05 * top)
+    label_axes(ax, "mass of the hand [kg]", "largest one-way delay [ms]")
+    add_legend(figure, 4, fontsize=points(9))
+    set_title(ax, found.kind, "the worst hand counts")
     return figure

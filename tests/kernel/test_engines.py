@@ -154,7 +154,7 @@ def grooves(method, damping=0.0, **common):
 
 
 MORE = {
-    "whole cut": hc.constant_cut(),
+    "whole cut": hc.constant_cut(dt=1e-3),  # more than two buffers of samples
     "muscle": dataclasses.replace(
         hc.free(operator=hc.Operator(), t_max=1.0), clay=GROWING, length=None, muscle=WAVE
     ),
@@ -164,7 +164,7 @@ MORE = {
     "growth": dataclasses.replace(hc.free(t_max=2.0), clay=GROWING),
     "layers": dataclasses.replace(hc.free(t_max=1.0, force=(1.0, 0.3)), clay=LAYERS),
     "at speed": dataclasses.replace(
-        hc.constant_cut(b=1e4, t_max=0.3, torque_limit=(1e5, 1e5)), velocity=(2.0, 0.0)
+        hc.constant_cut(b=1e4, t_max=0.1, torque_limit=(1e5, 1e5)), velocity=(2.0, 0.0)
     ),
     "backwards": hc.constant_cut(start=(0.06, 0.0), force=(-1.0, 0.0), t_max=1.0),
     "along a border": hc.constant_cut(start=(0.1501, 0.0), force=(0.0, 1.0), t_max=0.3),
@@ -182,9 +182,9 @@ MORE = {
 
 
 STILL = {  # by the accurate method as well
-    "cut": hc.constant_cut(),
+    "cut": MORE["whole cut"],
     "off axis, origin": hc.constant_cut(force=(1.0, 0.3), t_max=3.0),
-    "stiff: substeps": hc.constant_cut(b=2e4, start=(0.049, 0.0), t_max=0.25),
+    "stiff: substeps": hc.constant_cut(b=2e4, start=(0.049, 0.0), t_max=0.1),
     "not on the grid": hc.constant_cut(t_max=0.9007),
     **{
         name: MORE[name]

@@ -1,6 +1,7 @@
 """The compiled kernel beside CPython, and batches beside single runs."""
 
 import dataclasses
+import functools
 import math
 import random
 import re
@@ -27,6 +28,12 @@ ALL = CASES | MORE
 
 def same(a, b):
     test_engines.same(a, b, "run")
+
+
+@functools.cache
+def alone(name):
+    """The compiled run of a scene by itself."""
+    return hc.simulate(ALL[name], engine="native")
 
 
 @native
@@ -71,12 +78,12 @@ def test_batch_is_the_single_run_bit_for_bit_at_any_number_of_threads_and_order(
     random.Random(threads).shuffle(names)
     records = hc.simulate_batch([ALL[n] for n in names], threads=threads)
     for name, r in zip(names, records, strict=True):
-        same(r, hc.simulate(ALL[name], engine="native"))
+        same(r, alone(name))
 
 
 @native
 def test_summaries_are_those_of_the_records():
-    records = hc.simulate_batch(ALL.values())
+    records = [alone(name) for name in ALL]
     short = hc.simulate_batch(ALL.values(), keep="summaries")
     assert short.dtype == batch.SUMMARY
     for i, r in enumerate(records):

@@ -96,11 +96,11 @@ def test_rows_that_repeat_or_came_out_of_order():
     x, y = motion(T)
     rows = {"t": T[order], "input": x[order], "output": y[order]}
     found = even_columns(rows)
-    assert "12 rows repeat" in found.notes[0] and len(found.columns["t"]) == N
+    assert "are left out: 12" in found.notes[0] and len(found.columns["t"]) == N
     order = np.arange(N)
     order[[400, 401, 900, 901]] = [401, 400, 901, 900]
     found = even_columns({"t": T[order], "input": x[order], "output": y[order]})
-    assert "2 rows came out of order" in found.notes[0]
+    assert "sorted by their stamps: 2" in found.notes[0]
     np.testing.assert_array_equal(found.columns["output"], y)
     with pytest.raises(hc.ParameterError, match="two logs in one file"):
         even_columns({"t": np.concatenate((T[:1000], T[:1000])), "input": x, "output": y})
@@ -133,6 +133,7 @@ def test_encoders_that_begin_again(turn):
         np.sin(3.0 * T),
         0.0 * T,
         0.25 * (np.arange(N) % 28),  # 0 to 6.75, a saw
+        250.0 * (np.arange(N) % 5),
         np.where(np.arange(N) % 400 < 200, 0.0, 6.2832),  # a switch
         np.where(np.arange(N) == 700, 0.0, 5.0 + 0.01 * np.sin(T)),  # a lost packet
         180.0 * np.sin(T),
@@ -180,3 +181,61 @@ def test_a_log_with_jitter_gives_the_device(tmp_path):
     again = hc.studies.Measurement.resampled(t, force, place)
     own = hc.studies.identify_data(again, "S", band=(0.3, 12.0))
     assert own.values == pytest.approx(found.values, rel=1e-5)  # nine digits in the file
+
+
+@pytest.mark.parametrize("what", ["S", "Th"])
+@pytest.mark.parametrize("delay", [3e-3, -2e-3, 0.0])
+def test_a_delay_between_the_columns_is_named_and_removed(what, delay):
+    """0.5 kg, 4 N.s/m, 100 N/m, by the exact response to many lines, and noise of 1 %."""
+    rng = np.random.default_rng(6)
+    t = 0.002 * np.arange(6000)
+    f = np.arange(4, 170) / 13.0
+    s = 2j * np.pi * f
+    Z = 0.5 * s**2 + 4.0 * s + 100.0
+    waves = np.exp(np.outer(t, s)) * np.exp(1j * rng.uniform(0.0, 6.28, len(f)))
+    force = (waves @ Z if what == "Th" else waves.sum(axis=1)).real
+    place = (waves @ ((1.0 if what == "Th" else 1.0 / Z) * np.exp(-s * delay))).real
+    force = -force if what == "Th" else force
+    noisy = force if what == "Th" else place
+    noisy += 0.01 * np.std(noisy) * rng.standard_normal(len(t))
+    data = hc.studies.Measurement(t, force, place)
+    found = hc.studies.identify_data(data, what, band=(0.4, 12.0))
+    said = [x for x in found.warnings if x.startswith("the position comes")]
+    assert bool(said) == bool(delay), found.warnings
+    if delay:
+        assert "ms (+- " in said[0] and ("later" if delay > 0.0 else "earlier") in said[0]
+        number = float(said[0].split()[3])
+        assert number == pytest.approx(1e3 * abs(delay), rel=0.15)  # one step of Newton
+    r = hc.studies.identify_data(data, what, band=(0.4, 12.0), delay=delay)
+    for value, true in zip(r.device, (0.5, 4.0, 100.0), strict=True):
+        assert value == pytest.approx(true, rel=0.01)  # noise of 1 %
+    assert not any(x.startswith("the position comes") for x in r.warnings)
+
+
+def test_a_motion_about_an_axis(tmp_path):
+    """Counts of an encoder and torques in mN.m: 2e-3 kg.m^2, 0.02 N.m.s/rad, 0.8 N.m/rad."""
+    rng = np.random.default_rng(7)
+    t = 0.002 * np.arange(6000)
+    f = np.arange(4, 170) / 13.0
+    s = 2j * np.pi * f
+    Z = 2e-3 * s**2 + 0.02 * s + 0.8
+    waves = np.exp(np.outer(t, s)) * np.exp(1j * rng.uniform(0.0, 6.28, len(f)))
+    torque, angle = 0.05 * waves.sum(axis=1).real, 0.05 * (waves @ (1.0 / Z)).real
+    turns = np.round(2.0 + angle * 65536 / (2.0 * np.pi))
+    path = tmp_path / "knob.csv"
+    head = "t,torque [mNm],q [counts]"
+    np.savetxt(
+        path, np.column_stack((t, 1e3 * torque, turns)), "%.9g", ",", header=head, comments=""
+    )
+    data = hc.studies.Measurement.load(path, counts={"q": 65536})
+    r = hc.studies.identify_data(data, "S", band=(0.4, 12.0))
+    assert r.rotary and r.response_unit == "rad/(N.m)" and r.warnings == ()
+    assert [c.unit for c in r.coefficients] == ["1/(kg.m^2)", "1/s", "1/s^2"]
+    # a count is 1e-4 rad of some 0.3
+    for value, true in zip(r.device, (2e-3, 0.02, 0.8), strict=True):
+        assert value == pytest.approx(true, rel=5e-3)
+    assert "rad/(N" in r.plot().axes[0].get_ylabel()
+    with pytest.raises(hc.ParameterError, match="along a line"):
+        hc.studies.fit_flow(data)
+    with pytest.raises(hc.ParameterError, match="only 'torque"):
+        hc.studies.Measurement.load(path, units={"q": "mm"})

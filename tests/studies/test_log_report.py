@@ -41,15 +41,15 @@ def test_the_commands_that_it_prints_run(tmp_path, capsys, monkeypatch):
     "t, x, said",
     [
         (T, T, "gaps 0, repeated 0, backward 0"),
-        (np.delete(T, [200, 201]), np.delete(T, [200, 201]), "1 gaps, the longest 0.006 s"),
-        (np.repeat(T, 2)[:400], T, "repeat the one before"),
-        (np.roll(T, 1), T, "1 stamps go back"),
+        (np.delete(T, [200, 201]), np.delete(T, [200, 201]), "1 gap, the longest 0.006 s"),
+        (np.repeat(T, 2)[:400], T, "as the one before"),
+        (np.roll(T, 1), T, "1 stamp before the one before"),
         (1e3 * T, T, "is the time in seconds?"),
         (T, np.where(np.arange(400) == 70, np.nan, T), "1 missing"),
         (T, np.full(400, 3.0), "constant"),
         (T, np.clip(np.sin(9.0 * T), -0.5, 0.5), "limited?"),
         (T, (30.0 * T) % 6.2832, "begins again 3 times: an encoder that wraps"),
-        (T, 1.0 * (T > 0.4), "1 jumps of more than half the range"),
+        (T, 1.0 * (T > 0.4), "1 jump of more than half the range"),
         (T + 1e-4 * (-1.0) ** np.arange(400), T, "% of the steps are off by more than 5 %"),
     ],
 )
@@ -65,16 +65,11 @@ def test_a_second_clock_is_compared(tmp_path):
 
 
 def test_units_are_shown_as_they_were_read(tmp_path):
-    head = "t_ms,x [in],y_mm,z [furlong],w"
+    head = "t_ms,x [in],y_mm,z [furlong],w_mm"
     log = hc.Log.read(written(tmp_path / "a.csv", head, 1e3 * T, T, T, T, T))
     table = hc.studies.log_report(log).tables()["columns"]
-    assert table["unit"] == [
-        "ms, by its name?",
-        "in, shown in m",
-        "mm, by its name?",
-        "furlong",
-        "none: SI",
-    ]
+    shown = ["ms, shown in s", "in, shown in m", "mm, shown in m", "furlong", "mm, by its name?"]
+    assert table["unit"] == shown
     assert "unknown unit 'furlong'" in table["remarks"][3]
     assert table["highest"][1] == pytest.approx(0.0254 * T[-1], rel=1e-12)  # one product
     assert hc.studies.log_report(log).stamps.step == pytest.approx(0.002, rel=1e-9)  # differences

@@ -472,9 +472,9 @@ FILE = ["identify", "--csv", "a.csv"]
         ("t,input,output\n" + ROWS + "0.1,1,2\n", FILE, ["t[200]", "goes back by 0.099 s"]),
         ("t,input,output\n" + ROWS, FILE, ["band", "too short"]),
         (
-            "t,input,out [deg]\n" + ROWS,
-            [*FILE, "--columns", "output=out [deg]"],
-            ["'out [deg]'", "must be in m, not in deg"],
+            "t,input,out [V]\n" + ROWS,
+            [*FILE, "--columns", "output=out [V]"],
+            ["'out [V]'", "must be in m or rad, not in V"],
         ),
         ("", [*FILE, "--columns", "inptu=a"], ["columns", "did you mean 'input'"]),
         ("", [*FILE, "--columns", "a"], ["columns", "t=time"]),

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.io import savemat
 
 import hapticclay as hc
+from benchmarks import recordings
 from hapticclay.cli.app import main
 from hapticclay.studies.coulomb_axis import Axis
 
@@ -160,6 +161,24 @@ def test_a_scope_of_simulink_is_read_with_its_signs(tmp_path):
         np.testing.assert_array_equal(getattr(read, name), getattr(log, name))
 
 
+def test_a_scope_in_degrees_is_turned_into_radians(tmp_path):
+    t = 1e-3 * np.arange(200.0)
+    one = {"label": "p (deg) leader, follower", "values": np.outer(t, [90.0, 180.0])}
+    two = {"label": "u (mNm) tau_s", "values": t[:, None]}
+    savemat(tmp_path / "log.mat", {"s": {"time": t, "signals": [one, two]}})
+    read = hc.studies.PairLog.load(tmp_path / "log.mat")
+    np.testing.assert_allclose(read.follower, math.pi * t, rtol=1e-15)
+    np.testing.assert_allclose(read.follower_torque, 1e-3 * t, rtol=1e-15)
+
+
+def test_a_scope_in_another_quantity_is_refused(tmp_path):
+    t = 1e-3 * np.arange(200.0)
+    signal = {"label": "p (mm) leader, follower, tau_s", "values": np.outer(t, [1.0, 2.0, 3.0])}
+    savemat(tmp_path / "log.mat", {"s": {"time": t, "signals": signal}})
+    with pytest.raises(hc.ParameterError, match=r"leader \[mm\]"):
+        hc.studies.PairLog.load(tmp_path / "log.mat")
+
+
 def test_a_csv_file_is_read_with_units_and_names(tmp_path):
     log = synthetic(n=200)
     head = "time [ms],master [deg],slave [deg],u1 [mN.m],tau_rs [N.m],F_e [N.m]"
@@ -211,17 +230,19 @@ def test_a_column_that_is_missing_is_named(tmp_path):
 
 @pytest.mark.skipif(not RIG.is_dir(), reason="no logs of the rig")
 @pytest.mark.parametrize(
-    "name, P, rms",
+    "name, letter, rms, as_set",
     [
-        ("question1e_free_motion", 15.0, 2.147e-3),
-        ("m2_question1a_free_motion", 8.0, 3.708e-3),
-        ("m2_question1e_free_motion", 15.0, 3.160e-3),
+        ("question1e_free_motion", "e", 2.147e-3, 2.066e-3),
+        ("m2_question1a_free_motion", "a", 3.708e-3, 3.789e-3),
+        ("m2_question1e_free_motion", "e", 3.160e-3, 3.033e-3),
     ],
 )
-def test_the_rig(name, P, rms):
-    """Gains within 0.7 %, errors as measured, simulated within 4 %."""
-    found = hc.studies.identify_pair(hc.studies.PairLog.load(RIG / f"{name}.mat"))
-    assert found["P"].value == pytest.approx(P, rel=7e-3)
+def test_the_rig(name, letter, rms, as_set):
+    """Gains within 0.7 %, errors as measured, simulated within 4 %, as set to the last digit."""
+    log = hc.studies.PairLog.load(RIG / f"{name}.mat")
+    assert recordings.set_rms(log, recordings.LETTERS[letter]) == pytest.approx(as_set, abs=1e-6)
+    found = hc.studies.identify_pair(log)
+    assert found["P"].value == pytest.approx(recordings.LETTERS[letter].P, rel=7e-3)
     assert found.rms == pytest.approx(rms, abs=5e-7)  # half of the last printed digit
     assert found.simulated_rms == pytest.approx(rms, rel=0.04)
     if found.architecture == "position-force":

@@ -72,6 +72,20 @@ def test_a_softer_clay_moves_farther(made):
     assert np.ptp(found.p[:, 0]) > 1.1 * np.ptp(recording.p[:, 0])
 
 
+def test_an_arm_from_a_file_begins_at_its_pose():
+    """Its own record, moved elsewhere, moves it again."""
+    scenario = hc.Scenario(
+        arm=hc.MjcfArm("haptic_3"), controller=hc.JointPD((4.0,) * 3, (0.1,) * 3),
+        control="sampled", muscle=hc.Multisine((0.6, 0.4), low=0.5, high=3.0, period=2.0, lines=5),
+        force=(0.0, 0.0), length=None, t_max=1.0, dt=1e-3,
+    )  # fmt: skip
+    record = hc.simulate(scenario)
+    recording = hc.studies.Recording(record.t, record.p[:, :2] + 0.3, record.fh[:, :2])
+    for drive in ("force", "motion"):
+        found = hc.studies.replay(scenario, recording, drive)
+        assert found.off < 0.02 * float(np.ptp(record.p[:, 0])), found.headline()
+
+
 def test_the_scene_runs_again_and_is_saved(made, tmp_path):
     scenario, recording = made
     found = hc.studies.replay(scenario, recording)

@@ -15,6 +15,7 @@ from pathlib import Path
 import imageio.v3 as iio
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 import hapticclay as hc
 from hapticclay.cli import app
@@ -23,6 +24,8 @@ from hapticclay.ports.device import Trajectory
 from hapticclay.ports.exchanges import Exchanges
 from hapticclay.results import Result
 from hapticclay.studies.measurement import Measurement
+from hapticclay.studies.pair_log import PairLog
+from hapticclay.studies.replay import Recording
 from hapticclay.studies.store import read_sweep
 from hapticclay.studies.sweep import load_sweep
 from hapticclay.views.images import gray_image
@@ -51,6 +54,9 @@ READERS = {  # by the name of the file
     "buttons.csv": ButtonScript.of_file,
     "exchanges.csv": Exchanges.load,
     "clay.png": gray_image,
+    "pair.csv": PairLog.load,
+    "scope.mat": PairLog.load,
+    "recording.csv": Recording.load,
 }
 
 
@@ -139,6 +145,12 @@ def good(tmp_path_factory):
     (here / "log.csv").write_text("t,input,output\n" + "".join(rows))
     (here / "samples.csv").write_text("t,x,y\n" + "".join(rows))
     (here / "hand.csv").write_text("t,x,y\n" + "".join(rows))
+    (here / "recording.csv").write_text("t,x,y\n" + "".join(rows))
+    (here / "pair.csv").write_text(
+        "t,leader,follower,tau_s\n" + "".join(f"{x},{np.sin(x)},{np.cos(x)},{x}\n" for x in t)
+    )
+    signals = [{"label": "p (rad) leader, follower, tau_s", "values": np.outer(t, [1.0, 2.0, 3.0])}]
+    savemat(here / "scope.mat", {"s": {"time": t, "signals": signals}})
     (here / "buttons.csv").write_text("t,a,b,c,home\n0,0,0,0,0\n1,1,0,0,0\n")
     Exchanges.of_table(np.arange(24.0).reshape(2, 12)).save(here / "exchanges.csv")
     iio.imwrite(here / "clay.png", np.arange(64, dtype=np.uint8).reshape(8, 8))

@@ -174,6 +174,14 @@ def test_few_counts_let_it_rest():
     assert (cycle.amplitude, cycle.frequency) == pytest.approx(measured(run), rel=0.01)
 
 
+def test_a_cycle_that_friction_would_hold_is_none():
+    """The fundamental balances at a tenth of the distance at which the joint rests: a run stops."""
+    matrices, gains = (0.01 * ONE, 0.02 * ONE, 0.0 * ONE), (0.4 * ONE, 0.02 * ONE)
+    joint, run = joint_and_run(matrices, gains, coulomb=0.17, velocity="exact", delay=4e-3)
+    assert joint.growth.max() > 0.0 and not list(joint.cycles())
+    assert np.ptp(run[len(run) // 2 :]) < 1e-12
+
+
 def test_the_mean_behind_an_encoder_is_straight_between_counts():
     loop = JointLoop(ONE, ONE, 0.0 * ONE, ONE, ONE, TS, 0.0, "difference")
     step = 2.0 * math.pi / 8192 / TS
@@ -199,6 +207,28 @@ def test_without_stiffness_it_drifts():
     w = found.rate[0]
     assert 0.2 * math.tanh(20.0 * w) == pytest.approx(0.052 + 1.05 * w, rel=1e-6)
     assert "drifts" in found.headline()
+    # the rate grows where the line is above zero
+    assert np.interp(0.5 * w, found.line_rate[0], found.line_growth[0]) > 0.0
+    assert np.interp(2.0 * w, found.line_rate[0], found.line_growth[0]) < 0.0
+
+
+@pytest.mark.parametrize("Kp", [15.0, 0.0, 1e6])
+def test_every_outcome_is_drawn(Kp, tmp_path):
+    """A cycle, a drift, and a law that is unstable by itself."""
+    hc.theory.friction_cycle(pan_arm(), pan_law(Kp), TS).plot().savefig(tmp_path / "figure.png")
+
+
+def test_a_law_in_the_drive_is_part_of_the_joint():
+    """Its gains act between samples; only what is fed forward is held and late."""
+    law = replace(pan_law(), runs="drive")
+    found = hc.theory.friction_cycle(pan_arm(), law, TS, TS)
+    arm = PAN["M"] * ONE, 1.1 * ONE, 15.0 * ONE
+    gains = 0.0 * ONE, -0.05 * ONE
+    run = joints.FrictionRun(
+        arm, gains, fed_torque, TS, delay=TS, velocity="difference", coulomb=0.052
+    )
+    at = measured(run.positions(np.array([0.02]), 7.0))
+    assert (found.amplitude[1], found.frequency[1]) == pytest.approx(at, rel=4e-3)
 
 
 def test_an_arm_without_friction_is_told():

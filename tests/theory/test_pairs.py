@@ -388,6 +388,80 @@ def test_a_mirrored_joint_is_the_same_pair():
     assert hc.theory.pair_limits(one_joint).mode == hc.theory.pair_limits(one(Ts=2e-3)).mode
 
 
+# ---- what a hand feels, and which hands ----------------------------------------------------------
+
+
+def test_impedances_are_those_of_continuous_control():
+    """Two masses and a coupling C = K/s + B at 100 kHz: the hold lags by 6e-4 rad at 20 Hz."""
+    found = hc.theory.pair_transparency(one(Ts=1e-5), frequency=(0.1, 1.0, 5.0, 20.0))
+    s = 2j * math.pi * found.frequency
+    z, C = 6.0 * s + 0.1, 400.0 / s + 50.0
+    np.testing.assert_allclose(found.free, z + C * z / (C + z), rtol=1e-3)
+    np.testing.assert_allclose(found.rigid, z + C, rtol=1e-3)
+    np.testing.assert_allclose(found.motion, C / (C + z), rtol=1e-3)
+    np.testing.assert_allclose(found.force, C / (C + z), rtol=1e-3)
+
+
+def test_a_spring_through_position_force():
+    """k P/(k + P), the follower's law in series, but for the leader's mass times omega^2."""
+    pair = one(kind="position-force", follower_clay=hc.Contact(K=50.0))
+    found = hc.theory.pair_transparency(pair, frequency=(0.01,))
+    omega = 2.0 * math.pi * 0.01
+    felt = (1j * omega * found.felt[0]).real + 6.0 * omega**2
+    assert felt == pytest.approx(50.0 * 400.0 / 450.0, rel=1e-4)  # the follower's mass, too
+
+
+@given(seed=st.integers(0, 10**6))
+@settings(max_examples=20, deadline=None)
+def test_rates_under_a_sine_are_those_of_the_map(seed):
+    """A stable pair in the steady state of a slow push; the hold adds sidebands at the samples."""
+    pair = replace(drawn(seed), leader_operator=None, follower_clay=None)
+    loop = Build(pair).loop()
+    felt = pair.link.kind in ("position-force", "four-channel")  # needs another input
+    if pair.n > 1 or loop.radius() > 0.98 or felt:
+        return
+    end, omega = loop.leader, 2.0 * math.pi / (100.0 * pair.Ts)
+    alone, z = end.alone(np.array([omega]))[0] @ np.ones(1), np.exp(1j * omega * pair.Ts)
+    forced, push = np.concatenate([alone, 1j * omega * alone]), np.zeros(loop.states, complex)
+    push[starts(loop)[0]] = z * forced - end.loop.hold[0] @ forced
+    x = np.linalg.solve(z * np.eye(loop.states) - loop.map(), push)
+    Y = loop.admittance(np.array([omega]), (np.ones(1), np.ones(1)))[0]
+    assert x[starts(loop)[0]][1] == pytest.approx(Y[0, 0], rel=0.05)
+
+
+def test_absolutely_stable_pairs_are_stable_in_any_hand():
+    """Sixty hands and contacts over decades; where the criterion fails, some make it unstable."""
+    random = np.random.default_rng(1)
+    safe, risky = one(), replace(one(), link=hc.Link("position-force", scale=(1.0, 4.0)))
+    assert hc.theory.pair_transparency(safe).absolutely_stable
+    assert not hc.theory.pair_transparency(risky).absolutely_stable
+    fails = 0
+    for _ in range(60):
+        hand = hc.Operator(*10.0 ** random.uniform(-2.0, 3.0, 3))
+        clay = hc.Contact(*10.0 ** random.uniform(-2.0, 3.0, 3))
+        held = {"leader_operator": hand, "follower_clay": clay}
+        assert Build(replace(safe, **held)).loop().stable()
+        fails += not Build(replace(risky, **held)).loop().stable()
+    assert fails
+
+
+def test_hands_of_a_box():
+    pair = replace(one(), link=hc.Link(delay=0.16))
+    hands = hc.theory.Box((0.2, 4.0), (0.5, 10.0), (0.0, 40.0))
+    contacts = hc.theory.Box((0.0, 3.0), (0.0, 20.0), (0.0, 1000.0))
+    found = hc.theory.pair_hands(pair, hands, contacts, samples=4)
+    assert len(found.stable) == 8 * 8 + 4
+    for i in (0, 17, found.worst, 66):
+        mass, damper, spring = found.contacts[i]
+        held = {
+            "leader_operator": hc.Operator(*found.hands[i]),
+            "follower_clay": hc.Contact(spring, damper, mass),
+        }
+        assert Build(replace(pair, **held)).loop().stable() == found.stable[i]
+    with pytest.raises(hc.ParameterError, match="rigid"):
+        hc.theory.pair_hands(pair, hc.theory.Box(rigid=True))
+
+
 # ---- maps, comparisons, files, refusals ----------------------------------------------------------
 
 

@@ -1,4 +1,4 @@
-"""Classic results of haptics, compared with runs: one page and one command for each."""
+"""Classics of haptics and teleoperation, compared with runs: a page and a command for each."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from ...errors import choice
 from .classic import Classic
 
 CLASSICS = (  # one module of this folder each, by year
+    "niemeyer1991",
+    "yokokohji1994",
     "colgate1997",
     "hannaford2002",
     "abbott2005",

@@ -1,0 +1,168 @@
+"""Classics of leader and follower: their runs against solutions that share nothing with them."""
+
+import control
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+
+from hapticclay.model.operator import Operator
+from hapticclay.paper.classics import niemeyer1991, sampled_pair, yokokohji1994
+from hapticclay.paper.classics.sampled_pair import HeldArm
+from hapticclay.scene.link import KINDS
+from hapticclay.theory.pair_build import Build
+
+
+def lti(*coefficients):
+    return control.tf(list(coefficients), [1.0])
+
+
+def test_case_1_by_python_control():
+    """The loop of hand, arms and object, closed block by block."""
+    arm, hand, thing = lti(6.0, 0.1, 0.0), lti(2.0, 2.0, 10.0), lti(3.0, 1.0, 50.0)
+    leader = 1.0 / (arm + 3.5 * hand)  # position per force
+    follower = 400.0 / (arm + thing + lti(50.0, 400.0))  # position per leader's position
+    loop = control.feedback(leader, 3.5 * follower * thing)
+    found = control.minreal(loop, verbose=False).poles()
+    found = found[np.lexsort((found.imag, found.real))]
+    # minreal cancels factors of polynomials: 1e-6 of its tolerance
+    np.testing.assert_allclose(found, yokokohji1994.case1_poles(), rtol=1e-6)
+    np.testing.assert_allclose(found[[1, 3]], [-3.115 + 8.555j, 0.003 + 2.974j], atol=6e-4)
+
+
+@pytest.mark.parametrize("law", ["case1", "case2", "case3"])
+def test_runs_of_the_simulation_by_scipy(law):
+    """Accelerations from Newton's law of both arms at every instant, by a linear solution."""
+    pair = yokokohji1994.pair_of(getattr(yokokohji1994, law))
+
+    def forces(y, a, u):
+        """Residual of both arms' equations."""
+        row = np.array([*y, *a, u])
+        signals = pair.signals
+        values = [[r @ row for r in rows] for rows in signals]
+        x, v, acc, f = (np.array(each) for each in values)
+        if law == "case1":
+            tau = 2.5 * f[0] - 3.5 * f[1], 400.0 * (x[0] - x[1]) - 50.0 * v[1]
+        else:
+            lead = [
+                6.0 * (acc.mean() + 8.0 * (v.mean() - v[i]) + 70.0 * (x.mean() - x[i])) + 0.1 * v[i]
+                for i in range(2)
+            ]
+            tau = lead[0] - f.mean(), lead[1] + f.mean()
+            if law == "case3":
+                half = 0.5 * (2.0 * acc.mean() + v.mean())
+                tau = tau[0] - half + 0.63 * f.mean(), tau[1] - half - 0.63 * f.mean()
+        hand = u - (2.0 * a[0] + 2.0 * y[1] + 10.0 * y[0])
+        thing = 3.0 * a[1] + y[3] + 50.0 * y[2]
+        return np.array(
+            [
+                6.0 * a[0] + 0.1 * y[1] - tau[0] - hand,
+                6.0 * a[1] + 0.1 * y[3] - tau[1] + thing,
+            ]
+        )
+
+    def change(t, y):
+        u = 5.0 - 5.0 * np.cos(4.0 * np.pi * t)
+        none = forces(y, np.zeros(2), u)
+        columns = [forces(y, e, u) - none for e in np.eye(2)]
+        a = np.linalg.solve(np.column_stack(columns), -none)
+        return [y[1], a[0], y[3], a[1]]
+
+    t = np.linspace(0.0, 2.0, 21)
+    ours = pair.run(yokokohji1994.SWING, t)
+    found = solve_ivp(change, (0.0, 2.0), np.zeros(4), t_eval=t, rtol=1e-12, atol=1e-13).y
+    # 1e-12 of SciPy over some hundred steps
+    np.testing.assert_allclose(ours.x, found[[0, 2]].T, atol=1e-9)
+    np.testing.assert_allclose(ours.v, found[[1, 3]].T, atol=1e-9)
+
+
+def test_the_ideal_response_is_a_solution():
+    """Starts at rest, and obeys Newton's law of hand and object by finite differences."""
+    run = yokokohji1994.direct()
+    assert abs(run.x[0, 0]) < 1e-15 and abs(run.v[0, 0]) < 1e-15
+    a = np.gradient(run.v[:, 0], run.t)[1:-1]
+    u = yokokohji1994.SWING.at(run.t)[1:-1]
+    left = 5.0 * a + 3.0 * run.v[1:-1, 0] + 60.0 * run.x[1:-1, 0] - u
+    assert np.abs(left).max() < 1e-4  # second order: h^2 w^3/6 of 10 N
+
+
+@pytest.mark.parametrize("dt", [1e-3, 1e-6])
+def test_a_held_acceleration_diverges_at_any_step(dt):
+    assert np.abs(yokokohji1994.held("hand", 0.0, dt))[-1] > 3.0**10
+    assert np.abs(yokokohji1994.held("arm", 0.0, dt))[-1] < 1.0
+
+
+def test_case_1_of_the_second_order_settles_by_its_polynomial():
+    """z^2 + z/3 + 2.5/3 = 0 has roots of size 0.913: it holds, by a little."""
+    size = np.abs(np.roots([1.0, 1.0 / 3.0, 2.5 / 3.0])).max()
+    assert size == pytest.approx(0.9129, abs=1e-4) and size < 1.0
+
+
+def test_an_arm_under_held_force_by_scipy():
+    hand = Operator(2.0, 3.0, 40.0)
+    arm = HeldArm((1.0, 0.5), (hand.mass, hand.damper, hand.spring), 0.05)
+    arm.x, arm.v = 0.1, -0.2
+
+    def change(t, y):
+        return [y[1], (7.0 - 3.5 * y[1] - 40.0 * y[0]) / 3.0]
+
+    found = solve_ivp(change, (0.0, 0.05), [0.1, -0.2], rtol=1e-12, atol=1e-14).y[:, -1]
+    arm.step(7.0)
+    np.testing.assert_allclose([arm.x, arm.v], found, rtol=1e-10)
+    a = (7.0 - 3.5 * arm.v - 40.0 * arm.x) / 3.0
+    assert arm.felt == pytest.approx(2.0 * a + 3.0 * arm.v + 40.0 * arm.x, rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_free_runs_are_those_of_the_map(kind):
+    """The matrix of theory, state by state: formulas of each link are written twice."""
+    pair = yokokohji1994.sampled(kind)
+    loop = Build(pair).loop((0.05, 0.05))
+    state, A, out = np.zeros(loop.states), loop.map(), []
+    state[0] = 1.0
+    for _ in range(300):
+        out.append(state[[0, loop.leader.states]])
+        state = A @ state
+    # 300 products of matrices
+    np.testing.assert_allclose(out, sampled_pair.free_run(pair, 50, 300), atol=1e-11)
+
+
+@pytest.mark.parametrize("b", [0.5, 3.0, 80.0])
+def test_energy_of_waves(b):
+    """What both ends take is on its way, whatever they do."""
+    taken, stored = niemeyer1991.energies(b)
+    assert np.abs(taken - stored).max() < 1e-12 * stored.max() * len(taken)
+    assert taken.min() >= 0.0 and taken[-1] > 0.0
+
+
+def test_reflection_by_a_transmission_line():
+    """d'Alembert: at a damper Z at the end of a line of impedance b the force is 2 Z/(Z + b)."""
+    b, Z, u = 3.0, 7.0, 1.3
+    speed = np.sqrt(2.0 * b) * u / (b + Z)
+    rate, w = niemeyer1991.follower_wave(b, Z * speed, u)
+    assert rate == pytest.approx(speed, rel=1e-14)
+    assert w == pytest.approx((b - Z) / (b + Z) * u, rel=1e-14)
+    force, sent = niemeyer1991.leader_wave(b, 0.4, w)
+    assert sent**2 - w**2 == pytest.approx(2.0 * force * 0.4, rel=1e-13)  # power
+
+
+def test_what_a_late_link_gives_by_quadrature():
+    """Leader at V cos(w t), a spring behind T, its force T later: by SciPy over a period."""
+    V, K, T, w = niemeyer1991.SPEED, niemeyer1991.SPRING, 0.1, 2.0 * np.pi
+
+    def power(t):
+        force = K * V / w * np.sin(w * (t - 2.0 * T))
+        own = K * V / w * np.sin(w * (t - T)) * V * np.cos(w * (t - T))
+        return force * V * np.cos(w * t) - own
+
+    taken = quad(power, 0.0, 1.0, epsabs=1e-12)[0]
+    assert -niemeyer1991.given_in_a_period() == pytest.approx(taken, rel=1e-10)
+
+
+@pytest.mark.parametrize("kind", ["position-position", "position-force", "four-channel"])
+def test_runs_from_sample_to_sample_grow_as_the_map_says(kind):
+    """At 150 ms, where the largest eigenvalue stands out; 60 s are many of its periods."""
+    pair = yokokohji1994.sampled(kind)
+    z = Build(pair).loop((0.15, 0.15)).eigenvalues[0]
+    expected = np.log(np.abs(z)) / pair.Ts
+    # beats of a real oscillation in two windows: some 1e-3 1/s of a slow one
+    assert sampled_pair.growth(pair, 150) == pytest.approx(expected, abs=3e-3)
