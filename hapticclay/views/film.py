@@ -212,7 +212,7 @@ def frames(
             stage.push(record.fe[n - 1], all(held[n - 1]))
             title = f"t = {record.t[n - 1]:.{digits}f} s"
             if options.magnify != 1.0:
-                title += f"{gap}motion x {options.magnify:.3g}"
+                title += f"{gap}motion x {options.magnify:.0f}"
             if stage.field >= 0:
                 volume = stage.removal.volume if recorded is None else float(recorded[n - 1])
                 title += f"{gap}removed {1e6 * volume:.1f} cm3"

@@ -144,7 +144,7 @@ def _running_panels(r: Record, i: int, roomy: bool) -> tuple[Panel, ...]:
 
 
 def _joint_panels(r: Record) -> tuple[Panel, ...]:
-    """Joints that move most, their torques, and the handle, over time."""
+    """Joints that move most, their rates, and the handle, over time."""
     moved = np.ptp(r.q, axis=0)
     most = sorted(np.argsort(-moved)[:MOST_JOINTS].tolist())
     names, colors = r.scenario.joints, (BLUE, VERMILION, GREEN)
@@ -159,7 +159,7 @@ def _joint_panels(r: Record) -> tuple[Panel, ...]:
     labels = [names[j] for j in most]
     return (
         panel(f"joints [{unit}]", "", turned, labels),
-        panel("torque [N·m]", "", [r.tau[:, j] for j in most], labels),
+        panel("rates [rad/s]", "", [r.qd[:, j] for j in most], labels),
         panel(f"handle [{near}]", "", [*(per * r.p.T)], r.scenario.axes),
     )
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.studies.joint_runs import buzz, built_scenario, holding, near_limit
+from hapticclay.studies.joint_runs import built_scenario, buzz, holding, near_limit
 
 CASES = {
     "planar_2r": (hc.JointPD((20.0, 10.0), (0.3, 0.1), velocity="difference"), 1e-3, 1e-3),

@@ -121,7 +121,7 @@ def test_sticks_join_joints_and_handle(record):
     ends = shown.segments.reshape(-1, 3)
     assert np.abs(ends - shown.handle).max(axis=1).min() < 1e-12  # a link ends at the handle
     gap = np.abs(shown.segments[:, 1] - shown.segments[:, 0]).max(axis=1)
-    assert gap.max() > 0.1 and len(shown.joints) >= len(arm.names)
+    assert gap.max() > 0.05 and len(shown.joints) >= len(arm.names)
 
 
 def test_links_of_a_stick_figure_keep_their_lengths():
@@ -164,6 +164,8 @@ def test_a_buzz_is_slowed_and_magnified():
 def test_a_film_magnifies_arms_from_files_alone(tmp_path):
     with pytest.raises(hc.ParameterError, match="magnify = 2.0: must be 1 for the arm in closed"):
         film.stage_of(hc.simulate(hc.constant_cut(t_max=0.01)), FilmOptions(magnify=2.0))
-    wide = hc.simulate(scenario("five_bar"))
+    s = scenario("five_bar")
+    apart = dataclasses.replace(s.controller, reference=tuple(s.arm.q + (0.01, -0.01)))
+    wide = hc.simulate(dataclasses.replace(s, controller=apart))
     with pytest.raises(hc.ParameterError, match="magnify .*chains cannot be closed"):
-        film.stage_of(wide, FilmOptions(magnify=1e4))
+        film.stage_of(wide, FilmOptions(magnify=100.0))
