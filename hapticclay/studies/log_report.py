@@ -12,7 +12,7 @@ import numpy as np
 from ..arguments import checked, named
 from ..columns.finding import UNITS, candidates
 from ..columns.log import Log
-from ..columns.stamps import Stamps
+from ..columns.stamps import Stamps, times_of
 from ..display import table_of
 from ..errors import ParameterError
 from ..results import Result
@@ -116,10 +116,10 @@ def log_report(log: Log) -> LogReport:
 def _stamps(log: Log, time: str) -> tuple[Stamps | None, list[str]]:
     """The stamps of a log, and what is suspicious in them."""
     try:
-        stamps = Stamps(log.values(time, ("s",)))
+        t, out = times_of(log, time)
     except ParameterError as error:
         return None, [f"{time} is no time: {error.bound}"]
-    t, out = stamps.t, []
+    stamps = Stamps(t)
     if len(gaps := stamps.gaps):
         longest = float(np.max(stamps.steps))
         out.append(
@@ -151,7 +151,7 @@ def _beside(log: Log, stamps: Stamps, other: str) -> str:
     rest = x[good] - start - rate * stamps.t[good]
     return (
         f"a second clock, {other}: it runs {1e6 * (rate - 1.0):+.0f} ppm fast beside the first, "
-        f"with a deviation of {np.std(rest):.2g} s; the first is used"
+        f"with a deviation of {np.std(rest):.2g} s; name the one to use by --columns t=NAME"
     )
 
 
