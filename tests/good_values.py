@@ -49,7 +49,7 @@ def good_values(folder):
         "pair_transparency": pair, "pair_hands": {**pair, "hands": hc.theory.Box(), "samples": 2},
         "Pair": {"leader": device, "follower": device, "law": hc.JointPD((1.0,), (1.0,))},
         "friction_cycle": {"arm": arm, "law": rubbed},
-        "joint_limits": of_joints, "over_poses": of_joints,
+        "joint_limits": of_joints, "joint_runs": of_joints, "over_poses": of_joints,
         "wall_limit": {"arm": arm, "B": 1.0, "operator": hc.Operator()},
         "MjcfArm": {"file": ARM}, "JointPD": {"Kp": (1.0,), "Kd": (1.0,)},
         "stable_band": {"part": "K"}, "arm_mbk": {"loop": pushed}, "arm_index": {"loop": pushed},

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from ..errors import Bound, ParameterError
 from ..files import writable
 from . import console
-from .identify import column_names
+from .log_options import LogOptions, column_names
 from .options import Loose
 from .unused import Unused
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..scene.pair import Pair
 
 OF_THEORY = ("delay", "kind", "Ts", "map", "compare", "cells", "feel", "run")
-OF_LOGS = ("columns", "band", "level")
+OF_LOGS = ("columns", "band", "level", "units", "counts", "table", "where")
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,7 @@ class PairCommand:
         band: Highest frequency of the fits of laws [Hz].
         level: Confidence level of the intervals.
         out: Folder for the numbers and figures; by default out/pair/NAME.
+        log: Units of the columns of a log.
         figures: Format and style of the figures.
     """
 
@@ -71,6 +72,7 @@ class PairCommand:
     band: Annotated[float, Bound(0.1, 1e5, "Hz")] = 80.0
     level: Annotated[float, Bound(0.5, 0.999)] = 0.95
     out: Path | None = None
+    log: LogOptions = LogOptions()
     figures: console.FigureLook = console.FigureLook()
 
     unused: ClassVar[tuple[Unused, ...]] = (
@@ -95,10 +97,14 @@ class PairCommand:
 
     def _identified(self, data: Path) -> int:
         from ..studies.pair_identification import identify_pair
-        from ..studies.pair_log import COLUMNS, PairLog
+        from ..studies.pair_log import COLUMNS, PairLog, logged
 
         example = "leader=q1 follower=q2 leader_torque=-u1"
-        log = PairLog.load(data, column_names(self.columns, COLUMNS, example))
+        names = column_names(self.columns, COLUMNS, example)
+        if self.log == LogOptions():
+            log = PairLog.load(data, names)
+        else:
+            log = logged(self.log.log(data, "data"), names)
         out = self.out or console.default_folder("pair", log)
         writable(out)
         found = identify_pair(log, band=self.band, level=self.level)

@@ -17,6 +17,7 @@ import numpy as np
 from ..arguments import checked, named
 from ..columns.finding import find
 from ..columns.log import Log, open_log
+from ..columns.stamps import times_of
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
 from ..units import parse_unit
@@ -157,7 +158,11 @@ class Measurement:
 def measured(log: Log, names: Mapping[str, str], between: Between = "spline") -> Measurement:
     """The measurement in some columns of a log, `between` whose rows the input is as said."""
     cells, notes = {}, []
+    cells["t"], more = times_of(log, names["t"])
+    notes += more
     for key, name in names.items():
+        if key == "t":
+            continue
         cells[key] = log.values(name, UNITS[key]) if key in UNITS else log.raw(name)
     raw, turn, at = unwrapped(log.raw(names["output"]))
     if len(at):
