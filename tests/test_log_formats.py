@@ -211,6 +211,10 @@ def test_lerobots_layout(tmp_path):
     }
     np.testing.assert_array_equal(log.values("observation.state_lift"), PLACE[75:])
     np.testing.assert_array_equal(log.values("action[0]"), PLACE[75:])
+    columns = ("timestamp", "action[0]", "action[1]")
+    samples = hc.Samples.of(log, columns)
+    np.testing.assert_array_equal(np.array(samples.values), state[75:, ::-1])
+    assert samples.t == tuple(T[:75])
     with pytest.raises(hc.ParameterError, match="4, 7"):
         hc.Log.read(file, where={"episode_index": 1})
     assert hc.studies.log_report(hc.Log.read(file)).stamps.backward.tolist() == [75]

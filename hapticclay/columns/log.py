@@ -182,13 +182,15 @@ class Log:
 
 def open_log(
     field: str,
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | Log,
     units: Mapping[str, str] | None = None,
     counts: Mapping[str, Any] | None = None,
     table: str = "",
     where: Mapping[str, float] | None = None,
 ) -> Log:
-    """As `Log.read`, with the name of the path for errors."""
+    """As `Log.read`, with the name of the path for errors; a log is taken as it is."""
+    if isinstance(path, Log):
+        return path.stating(units, counts)
     log = Log(Path(path), open_table(field, Path(path), table)).stating(units, counts)
     return _chosen(log, where) if where else log
 

@@ -12,7 +12,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from ..arguments import checked, named
-from ..columns.log import open_log
+from ..columns.log import Log, open_log
+from ..columns.stamps import times_of
 from ..errors import ParameterError, array_of, choice
 from . import pieces
 from .signals import Signal
@@ -20,7 +21,7 @@ from .signals import Signal
 Between = Literal["linear", "hold"]
 Outside = Literal["hold", "zero"]
 COLUMNS = ("t", "fx", "fy")
-UNITS = ("s",), ("N", "m"), ("N", "m")
+UNITS = ("N", "m")
 
 
 @named
@@ -66,7 +67,7 @@ class Samples(Signal):
     @checked
     def of(
         cls,
-        path: str | os.PathLike[str],
+        path: str | os.PathLike[str] | Log,
         columns: Sequence[str] = COLUMNS,
         between: Between = "linear",
         outside: Outside = "hold",
@@ -79,7 +80,7 @@ class Samples(Signal):
         converted to SI.
 
         Args:
-            path: the file.
+            path: the file, or a log that was read.
             columns: names of the columns with time [s], x and y [N, or m for a position].
             between: as the attribute.
             outside: as the attribute.
@@ -92,9 +93,10 @@ class Samples(Signal):
         if isinstance(columns, str) or len(columns) != 3:
             raise ParameterError("columns", columns, "must name three columns: time, x, y")
         log = open_log("path", path, units)
-        t, x, y = (log.values(name, x) for name, x in zip(columns, UNITS, strict=True))
+        t, _ = times_of(log, columns[0])
+        x, y = (log.values(name, UNITS) for name in columns[1:])
         if not len(t):
-            raise ParameterError("path", str(path), "must have a line of numbers")
+            raise log.table.refusal("must have a line of numbers")
         return cls(t, np.column_stack((x, y)), between, outside)  # type: ignore[arg-type]
 
     @classmethod

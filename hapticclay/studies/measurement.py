@@ -7,9 +7,9 @@ of the whole record (R. Pintelon, J. Schoukens, System Identification: A Frequen
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from ..arguments import checked, named
 from ..columns.finding import find
 from ..columns.log import Log, open_log
+from ..columns.stamps import times_of
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
 from ..units import parse_unit
@@ -90,7 +91,7 @@ class Measurement:
     @checked
     def load(
         cls,
-        path: str | Path,
+        path: str | os.PathLike[str] | Log,
         columns: Mapping[str, str] | None = None,
         units: Mapping[str, str] | None = None,
         counts: Mapping[str, Any] | None = None,
@@ -104,7 +105,7 @@ class Measurement:
         is skipped, because a run ends between two samples.
 
         Args:
-            path: the file.
+            path: the file, or a log that was read.
             columns: names in the file of t, input, output and reference. One that is not given is
                 found if a single column can be meant; a reference is read only if it is given.
             units: unit of a column by name, in place of what the file says, as {"x": "mm"}.
@@ -147,8 +148,8 @@ class Measurement:
         Raises:
             ParameterError: time goes back, or as `Measurement`.
         """
-        given = {"t": t, "input": input, "output": output, "reference": reference}
-        given = {key: x for key, x in given.items() if x is not None}
+        given = {"t": t, "input": input, "output": output}
+        given |= {} if reference is None else {"reference": reference}
         columns = {key: _column(key, x, t) for key, x in given.items()}
         made = even_columns(columns, "hold" if held else "spline")
         return cls(**made.columns, name=name, notes=made.notes)
@@ -157,7 +158,11 @@ class Measurement:
 def measured(log: Log, names: Mapping[str, str], between: Between = "spline") -> Measurement:
     """The measurement in some columns of a log, `between` whose rows the input is as said."""
     cells, notes = {}, []
+    cells["t"], more = times_of(log, names["t"])
+    notes += more
     for key, name in names.items():
+        if key == "t":
+            continue
         cells[key] = log.values(name, UNITS[key]) if key in UNITS else log.raw(name)
     raw, turn, at = unwrapped(log.raw(names["output"]))
     if len(at):

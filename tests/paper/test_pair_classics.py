@@ -1,12 +1,14 @@
 """Classics of leader and follower: their runs against solutions that share nothing with them."""
 
+from dataclasses import replace
+
 import control
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
 from hapticclay.model.operator import Operator
-from hapticclay.paper.classics import niemeyer1991, sampled_pair, yokokohji1994
+from hapticclay.paper.classics import lawrence1993, niemeyer1991, sampled_pair, yokokohji1994
 from hapticclay.paper.classics.sampled_pair import HeldArm
 from hapticclay.scene.link import KINDS
 from hapticclay.theory.pair_build import Build
@@ -109,7 +111,7 @@ def test_an_arm_under_held_force_by_scipy():
     arm.step(7.0)
     np.testing.assert_allclose([arm.x, arm.v], found, rtol=1e-10)
     a = (7.0 - 3.5 * arm.v - 40.0 * arm.x) / 3.0
-    assert arm.felt == pytest.approx(2.0 * a + 3.0 * arm.v + 40.0 * arm.x, rel=1e-12)
+    assert arm.seen().F == pytest.approx(2.0 * a + 3.0 * arm.v + 40.0 * arm.x, rel=1e-12)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -156,6 +158,77 @@ def test_what_a_late_link_gives_by_quadrature():
 
     taken = quad(power, 0.0, 1.0, epsabs=1e-12)[0]
     assert -niemeyer1991.given_in_a_period() == pytest.approx(taken, rel=1e-10)
+
+
+@pytest.mark.parametrize("law", lawrence1993.LAWS, ids=lambda law: law.name)
+@pytest.mark.parametrize("K", [50.0, 1000.0])
+def test_delay_limits_by_python_control(law, K):
+    """Half the delay margin of what goes around, over all crossings of size 1."""
+    thing = replace(lawrence1993.OBJECT, K=K)
+    above, below = lawrence1993.around(law, thing)
+    loop = control.tf(above.coeffs, below.coeffs)
+    assert control.feedback(loop, 1).poles().real.max() < 0.0
+    _, phase, _, _, omega, _ = control.stability_margins(loop, returnall=True)
+    margins = np.radians(np.asarray(phase) % 360.0) / np.asarray(omega) / 2.0
+    expected = margins.min() if len(margins) else np.inf
+    # crossings of a table of 200,000 frequencies, on a line between two of them
+    assert lawrence1993.largest_delay(law, thing) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("law", lawrence1993.LAWS, ids=lambda law: law.name)
+@pytest.mark.parametrize("T", [0.0, 0.02])
+def test_two_port_and_felt_impedance_by_the_equations(law, T):
+    """Both arms' equations at a frequency, solved as they stand."""
+    s = 1j * 7.3
+    late, Z = np.exp(-s * T), (6.0 * s**2 + 0.1 * s) / s
+    C1, C4, Cm, Cs = (poly(s) / s for poly in (law.C1, law.C4, law.Cm, law.Cs))
+
+    def solved(v, fe, more):
+        """(v_l, v_f, f_h, f_e) of both arms and of two equations more."""
+        rows = [
+            [Z + Cm, C4 * late, -1.0, law.C2 * late],
+            [-C1 * late, Z + Cs, -law.C3 * late, 1.0],
+            [1.0, 0.0, 0.0, 0.0],
+            more,
+        ]
+        return np.linalg.solve(np.array(rows), np.array([0.0, 0.0, v, fe]))
+
+    h11, h12, h21, h22 = (x[0] for x in lawrence1993.two_port(law, np.array([7.3]), T))
+    for v, fe, first, second in ((1.0, 0.0, h11, h21), (0.0, 1.0, h12, h22)):
+        _, vf, fh, _ = solved(v, fe, [0.0, 0.0, 0.0, 1.0])
+        np.testing.assert_allclose([fh, -vf], [first, second], rtol=1e-10, atol=1e-13)
+    if T == 0.0:
+        Ze = (3.0 * s**2 + s + 50.0) / s
+        _, _, fh, _ = solved(1.0, 0.0, [0.0, -Ze, 0.0, 1.0])
+        felt = lawrence1993.felt_impedance(law, np.array([s]))[0] / s
+        assert felt == pytest.approx(fh, rel=1e-10)
+
+
+def test_llewellyn_by_all_springs_and_masses():
+    """Passive ends at one frequency are any with a real part of 0 or more: here, reactances.
+
+    Stable with all of them means h11 - h12 h21 Y/(1 + h22 Y), felt at the hand, is passive.
+    """
+    law, omega = lawrence1993.LAWS[0], np.geomspace(0.5, 200.0, 60)
+    for T in (1e-3, 0.1):
+        h11, h12, h21, h22 = lawrence1993.two_port(law, omega, T)
+        least = []
+        for x in np.concatenate([-np.geomspace(1e-6, 1e6, 4000), np.geomspace(1e-6, 1e6, 4000)]):
+            Ze = 1j * x
+            least.append((h11 - h12 * h21 * Ze / (1.0 + h22 * Ze)).real)
+        felt = np.min(least, axis=0)
+        number = lawrence1993.llewellyn(law, omega, T)
+        clear = np.abs(number - 1.0) > 1e-3
+        assert np.array_equal(felt[clear] > 0.0, (number > 1.0)[clear])
+
+
+@pytest.mark.parametrize("kind", ["position-position", "position-force", "four-channel"])
+def test_lawrence_channels_are_those_of_the_links(kind):
+    """The table of channels against the controls of theory."""
+    law = next(x for x in lawrence1993.LAWS if x.name == kind)
+    pair = yokokohji1994.sampled(kind)
+    mine = sampled_pair.free_run(pair, 3, 500, lawrence1993.sampled_ends(law))
+    np.testing.assert_allclose(mine, sampled_pair.free_run(pair, 3, 500), atol=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["position-position", "position-force", "four-channel"])

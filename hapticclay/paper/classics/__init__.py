@@ -9,6 +9,7 @@ from .classic import Classic
 
 CLASSICS = (  # one module of this folder each, by year
     "niemeyer1991",
+    "lawrence1993",
     "yokokohji1994",
     "colgate1997",
     "hannaford2002",
