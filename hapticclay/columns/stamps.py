@@ -60,8 +60,10 @@ class Stamps:
 
     @property
     def rate(self) -> float:
-        """Rows in a second [Hz]; of a log without gaps."""
-        return 1.0 / self.step
+        """Rows in a second, between gaps [Hz]."""
+        usual = self.steps[(self.steps >= 0.0) & (self.steps <= self.longest)]
+        mean = float(np.mean(usual)) if len(usual) else 0.0
+        return 1.0 / mean if mean > 0.0 else 1.0 / self.step
 
     @property
     def even(self) -> float:

@@ -204,7 +204,7 @@ class TextTable:
     @cached_property
     def _commas_and_points(self) -> bool:
         """Whether some cells have a decimal comma and others a decimal point."""
-        if not self._comma:
+        if not self._comma or not any("." in text for _, text in self.lines):
             return False
         found = [x for row in self._split_lines for x in row if cells.is_number(x)]
         return any("," in x for x in found) and any("." in x for x in found)

@@ -8,7 +8,14 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from hapticclay.model.operator import Operator
-from hapticclay.paper.classics import lawrence1993, niemeyer1991, sampled_pair, yokokohji1994
+from hapticclay.paper.classics import (
+    hard_contact,
+    lawrence1993,
+    niemeyer1991,
+    ryu2004,
+    sampled_pair,
+    yokokohji1994,
+)
 from hapticclay.paper.classics.sampled_pair import HeldArm
 from hapticclay.scene.link import KINDS
 from hapticclay.theory.pair_build import Build
@@ -239,3 +246,72 @@ def test_runs_from_sample_to_sample_grow_as_the_map_says(kind):
     expected = np.log(np.abs(z)) / pair.Ts
     # beats of a real oscillation in two windows: some 1e-3 1/s of a slow one
     assert sampled_pair.growth(pair, 150) == pytest.approx(expected, abs=3e-3)
+
+
+@pytest.mark.parametrize(
+    "m, b, k",
+    [(1.0, 0.0, 0.0), (1.0, 3.0, 0.0), (2.0, 4.0, 2.0), (1.0, 0.3, 50.0), (0.5, 9.0, 4.0)],
+)
+def test_an_oscillator_in_closed_form(m, b, k):
+    """Against SciPy: no spring, no damper, critical, under- and overdamped."""
+
+    def change(t, y):
+        return [y[1], (0.7 - b * y[1] - k * y[0]) / m]
+
+    found = solve_ivp(change, (0.0, 0.9), [0.2, -0.4], rtol=1e-12, atol=1e-14).y[:, -1]
+    ours = hard_contact.moved(m, b, k, 0.7, 0.2, -0.4, 0.9)
+    np.testing.assert_allclose(ours, found, rtol=1e-9, atol=1e-11)
+
+
+def test_bounces_of_a_wall_by_scipy():
+    """Touches found by SciPy's events, each mode integrated at 1e-12."""
+    arm = hard_contact.WalledArm(1.0, 0.4, 0.0, 2e4)
+    arm.x, arm.v, t, y = -0.01, 0.5, 0.0, np.array([-0.01, 0.5])
+    force = 3.0
+    for _ in range(200):
+        arm.step(force, 1e-3)
+
+    def touch(t, y):
+        return y[0]
+
+    touch.terminal = True
+    while t < 0.2:
+        K = 2e4 if y[0] > 0.0 or (y[0] == 0.0 and y[1] > 0.0) else 0.0
+
+        def change(t, y, K=K):
+            return [y[1], force - 0.4 * y[1] - K * y[0]]
+
+        if y[0] == 0.0:
+            y = np.array([1e-300 if y[1] > 0.0 else -1e-300, y[1]])
+        touch.direction = -np.sign(y[0])
+        run = solve_ivp(change, (t, 0.2), y, events=touch, rtol=1e-12, atol=1e-15)
+        t, y = float(run.t[-1]), run.y[:, -1].copy()
+        if run.status == 1:
+            y[0] = 0.0
+    # a touch found to 1e-13 s, at a bounce of 0.5 m/s
+    np.testing.assert_allclose([arm.x, arm.v], y, rtol=1e-7, atol=1e-9)
+
+
+@pytest.mark.parametrize("control", ["none", "observer", "sides"])
+@pytest.mark.parametrize("delay", [0, 7])
+def test_the_observer_counts_the_energy_of_the_motion(control, delay):
+    run = ryu2004.Teleoperation(ryu2004.HARD, control, delay=delay, time=0.3)
+    energy, motion = np.array(run.energy), np.array(run.motion)
+    assert np.abs(energy - motion).max() < ryu2004.BY_MOTION * np.abs(motion).max()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_late_observers_keep_their_reserves(seed):
+    """Any delay up to 300 ms, any wall and gain: two reserves, and what one sample lets out."""
+    random = np.random.default_rng(seed)
+    run = ryu2004.Teleoperation(
+        10.0 ** random.uniform(2.5, 3.5),
+        "sides",
+        delay=int(random.integers(1, 300)),
+        reserve=0.02,
+        Kp=random.uniform(100.0, 800.0),
+        speed=random.uniform(0.02, 0.1),
+        time=4.0,
+    )
+    assert min(run.energy) >= -0.04 * 1.25
+    assert np.abs(run.v).max() < 1.0

@@ -13,6 +13,7 @@ CLASSICS = (  # one module of this folder each, by year
     "yokokohji1994",
     "colgate1997",
     "hannaford2002",
+    "ryu2004",
     "abbott2005",
     "diolaiti2006",
     "hulin2006",
