@@ -18,7 +18,7 @@ def good_values(folder):
     loop = hc.theory.Loop(K=1.0, b=90.0)
     zigzag = hc.walls.zigzag(1e-4)
     swept = hc.studies.Sweep("constant", {"b": hc.studies.Range(1.0, 9.0, 2)})
-    pair = hc.studies.PairLog(t, np.sin(t), np.sin(t - 0.05), np.cos(t))
+    logged = hc.studies.PairLog(t, np.sin(t), np.sin(t - 0.05), np.cos(t))
     files = [cut.save(folder / "a.toml"), hc.constant_cut(b=50.0).save(folder / "b.toml")]
     by_name = {
         "axis": "x", "K": 1.0, "b": 90.0, "wall": wall, "scenario": cut, "subject": wall,
@@ -87,7 +87,7 @@ def good_values(folder):
         "simulate_columns": {"base": cut, "columns": {"gain.x": np.ones(3)}},
         "run_columns": {"base": cut, "columns": {"gain.x": np.ones(3)}},
         "PairLog": {"t": t, "leader": np.sin(t), "follower": np.cos(t), "follower_torque": t},
-        "identify_pair": {"log": pair},
+        "identify_pair": {"log": logged},
         "Recording": {"t": (0.0, 0.01), "p": np.zeros((2, 2))},
         "replay": {"recording": hc.studies.Recording((0.0, 0.01), f=np.ones((2, 2)))},
         "Measurement": {"t": t, "input": np.sin(t), "output": np.cos(t)},
