@@ -9,6 +9,7 @@ from ..errors import Bound, ParameterError
 
 WAYS = ("there", "back")  # leader to follower, follower to leader
 KINDS = ("position-position", "position-force", "four-channel", "waves")
+RESERVE = 0.01  # [J]
 
 
 @part("link.")
@@ -31,6 +32,9 @@ class Link:
             1e6: how much lighter each arm is made; with force sensors alone.
         impedance: wave impedance of each joint [N.m.s/rad], > 0, at most 1e9; one number for all;
             None for the follower's Kd, which matches it: then no wave is reflected.
+        passivity: whether, in runs, an observer and a controller at each end let out no more energy
+            than came in at the other one (Ryu, Kwon, Hannaford 2004); theory leaves them out.
+        energy: reserve E0 that each of them may let out besides [J], 0 to 1e6; None for 0.01 J.
     """
 
     kind: Literal["position-position", "position-force", "four-channel", "waves"] = KINDS[0]
@@ -48,6 +52,8 @@ class Link:
     impedance: Annotated[
         float | tuple[float, ...] | None, Bound(0.0, 1e9, "N.m.s/rad", above=True)
     ] = None
+    passivity: bool = False
+    energy: Annotated[float | None, Bound(0.0, 1e6, "J")] = None
 
     def __post_init__(self):
         felt = self.kind in ("position-force", "four-channel")
@@ -56,6 +62,8 @@ class Link:
             raise ParameterError("link.local_force", self.local_force, bound)
         if self.impedance is not None and self.kind != "waves":
             raise ParameterError("link.impedance", self.impedance, "must be None without waves")
+        if self.energy is not None and not self.passivity:
+            raise ParameterError("link.energy", self.energy, "must be None without passivity")
         if self.kind == "waves" and not self.rates:
             raise ParameterError("link.rates", self.rates, "must be True: a wave is made of rates")
         if self.kind == "position-position" and self.scale[1] != 1.0:
@@ -66,6 +74,11 @@ class Link:
     def delays(self) -> tuple[float, float]:
         """Delays there and back, without jitter and loss [s]."""
         return self.delay if isinstance(self.delay, tuple) else (self.delay, self.delay)
+
+    @property
+    def reserve(self) -> float:
+        """Energy E0 that the passivity controller of an end may let out besides [J]."""
+        return RESERVE if self.energy is None else self.energy
 
     def further_delay(self, Ts: float) -> dict[str, float]:
         """What jitter and loss add to the delay each way [s], by cause.

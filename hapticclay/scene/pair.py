@@ -98,6 +98,12 @@ class Pair:
         if self.link.kind == "waves" and self.laws[1].runs == "drive":
             bound = "must be 'host' with waves: the follower's gains act behind them"
             raise ParameterError("law.runs", "drive", bound)
+        if self.link.passivity and "drive" in (law.runs for law in self.laws):
+            bound = "must be 'host' with passivity controllers, which act on all of the torque"
+            raise ParameterError("law.runs", "drive", bound)
+        if self.link.passivity and self.delay > 0.0:
+            bound = "must be 0 with passivity controllers: a damper that acts late feeds motion"
+            raise ParameterError("pair.delay", self.delay, bound)
 
     def __repr__(self) -> str:
         names = (type(arm).__name__ for arm in self.arms)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -21,6 +20,7 @@ from ..scene.pair import Pair
 from ..theory.architectures import ARCHITECTURES
 from ..theory.architectures.control import Control
 from .pair_arms import run_arm, run_scene
+from .pair_passivity import Port
 from .stepwise import Simulation
 
 PUSH = Pulse((1.0, 0.0), 0.0, 0.05)  # [N] for 50 ms: a hand's touch
@@ -47,6 +47,7 @@ class PairRecord(Result):
         contact: force of the follower on what it touches [N], likewise.
         energy: energy that controllers and link have taken from both arms [J], shape (m,): where
             it falls without bound, they feed the motion.
+        port_energy: the same at leader and follower [J], shape (m, 2).
         ended: how the run ended: "" at its time, else what ended it.
     """
 
@@ -64,6 +65,7 @@ class PairRecord(Result):
     hand: np.ndarray
     contact: np.ndarray
     energy: np.ndarray
+    port_energy: np.ndarray
     ended: str
 
     @property
@@ -104,6 +106,8 @@ class PairRecord(Result):
             "energy [J]": [float(self.energy[-1])],
         }
         samples: dict[str, Any] = {"t [s]": self.t, "energy [J]": self.energy}
+        for i, name in enumerate(("leader", "follower")):
+            samples[f"energy at {name} [J]"] = self.port_energy[:, i]
         for j, name in enumerate(self.names):
             samples[f"leader {name} [rad]"] = self.leader[:, j]
             samples[f"follower {name} [rad]"] = self.follower[:, j]
@@ -124,7 +128,8 @@ def simulate_pair(
     Each arm runs as in `simulate`, its host's torques given step by step. An engine step is the
     largest part of the control sample of which all delays are whole multiples. A packet is late by
     the link's delay and a random part of its jitter, or lost; the newest one that has arrived is
-    held. Joint friction, torque limits and joint stops act.
+    held; with passivity controllers it is read at samples. Joint friction, torque limits and joint
+    stops act.
 
     Args:
         pair: two arms from files or devices of one axis, with a handle each.
@@ -155,6 +160,8 @@ class _Host:
         self.held = pairs.compensated(pair.arms[i], self.law)
         self.acts = i == 1 or ARCHITECTURES[pair.link.kind].leader_law
         self.weight = self._weight(self.start)
+        self.port = Port(pairs.linear_arm(pair.arms[i]).inertia, pair.Ts, pair.link.reserve)
+        self.pull = np.zeros(pair.n)  # as it arrived, with passivity controllers
 
     def _weight(self, q: np.ndarray) -> np.ndarray:
         """Torque against the arm's weight."""
@@ -176,7 +183,12 @@ class _Host:
         own = self.control.torque @ signals
         message = self.control.message @ signals
         self.x = self.control.state @ signals
-        return own + self._law(q, v) + self._weight(state.q), message
+        own = own + self._law(q, v)
+        if self.pair.link.passivity:
+            self.port.observe()
+            own = self.port.guarded(own + self.pull, v)
+        self.weight = self._weight(state.q)
+        return own + self.weight, message
 
     def _rate(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
         """The measured rate, as the law estimates it."""
@@ -232,7 +244,7 @@ class _Run:
             scene = run_scene(pair, i, run_arm(pair, i, acts), **more, **muscle)
             run = Simulation(scene, engine=engine, recorded=False, monitored=False)
             self.hosts.append(_Host(pair, i, control, run))
-        self.rows: list[Sequence[Any]] = []
+        self.rows: list[list[Any]] = []
 
     def record(self) -> PairRecord:
         """Runs to the end."""
@@ -259,19 +271,20 @@ class _Run:
         found = [host.sampled() for host in self.hosts]
         for i, (own, message) in enumerate(found):
             self._later(step, pair.delay, ACT, i, "own", own)
-            self._send(step, i, message)
+            self._send(step, i, (step, message, self.hosts[i].port.into))
         row = [pair.Ts * step / self.parts]
         row += [x.q for x in states] + [host.torque for host in self.hosts]
         self.rows.append([*row, states[0].fh, -states[1].fh, energy])
+        self.rows[-1].append([host.port.taken for host in self.hosts])
 
-    def _send(self, step: int, i: int, message: np.ndarray) -> None:
+    def _send(self, step: int, i: int, packet: tuple[int, np.ndarray, float]) -> None:
         """A packet of an end, on its way to the other one."""
         link = self.pair.link
         if link.loss and self.random.random() < link.loss:
             return
         late = link.delays[i] + (link.jitter * self.random.random() if link.jitter else 0.0)
         kind = "message" if self.architecture.whole else "pull"
-        self._later(step, late, ARRIVE, 1 - i, kind, (step, message))
+        self._later(step, late, ARRIVE, 1 - i, kind, packet)
 
     def _later(self, step: int, late: float, order: int, i: int, kind: str, value: Any) -> None:
         self.count += 1
@@ -288,22 +301,27 @@ class _Run:
             if kind in ("own", "other"):
                 setattr(host, kind, value)
                 continue
-            sent, message = value
+            sent, message, into = value
             if sent <= host.newest:
                 continue  # an older packet that a newer one has overtaken
-            host.newest = sent
+            host.newest, host.port.sent = sent, into
             if kind == "message":
                 host.arrived = message
                 continue
             n, m = self.pair.n, len(message)
             pull = host.control.torque[:, 3 * n : 3 * n + m] @ message
+            if self.pair.link.passivity:
+                host.pull = pull
+                continue
             self._later(step, self.pair.delay, ACT, i, "other", pull)
 
     def _advanced(self, host: _Host) -> float:
         """Makes a step of an arm; the energy that controllers took from it [J]."""
         before = host.run.state.q
         host.run.step(torque=host.torque.tolist())
-        return host.taken(before, host.run.state.q, host.weight)
+        taken = host.taken(before, host.run.state.q, host.weight)
+        host.port.taken += taken
+        return taken
 
     def _ended(self) -> str:
         for name, host in zip(("leader", "follower"), self.hosts, strict=True):

@@ -100,6 +100,8 @@ class Build:
             out = [f"both arms: {note}" for note in pairs.notes_of(pair.leader)]
         if pair.link.jitter or pair.link.loss:
             out.append("jitter and loss: as the constant delay that they come to")
+        if pair.link.passivity:
+            out.append("passivity controllers: left out, they are not linear; runs have them")
         return (*out, IGNORED)
 
 

@@ -52,7 +52,7 @@ PRINTING = "materials.md", "fit.md", "logs.md", "pair_log.md", "pair.md", "repla
 
 @pytest.mark.parametrize("page", PRINTING)
 def test_page_says_what_its_snippet_prints(page, tmp_path):
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / page).read_text(), re.S)
+    code = "\n".join(re.findall(r"```python\n(.*?)```", (ROOT / "docs" / page).read_text(), re.S))
     out = printed_by(code, tmp_path)
     assert out.splitlines() == re.findall(r"print\(.*\)  # (.*)", code) != []
 
