@@ -1,7 +1,8 @@
 """Limits of an arm by theory, and by runs half a percent on either side of each.
 
-    python -m benchmarks.arm_flips leader_7 --Kp 240 240 240 240 24 31 25 --Kd 3 3 3 3 .2 .2 .2 \\
-        --rate 500 --delay 2e-3 --cutoff 90
+    python -m benchmarks.arm_flips [arm.xml --Kp 20 20 --Kd 1 1 --rate 1000 --delay 1e-3 --wall 5]
+
+By default the leader of mjcf/arms under its gains.
 
 A run begins a microradian off, or under 0.1 mN, so that it stays linear; it grows if the third
 differences of its joints from sample to sample do, which hardly see slow motion, in its last
@@ -21,6 +22,10 @@ import numpy as np
 
 import hapticclay as hc
 
+LEADER = (
+    "leader_7 --Kp 240 240 240 240 24 31 25 --Kd 3 3 3 3 .2 .2 .2 --rate 500 --delay 2e-3 "
+    "--cutoff 90 --wall 5"
+)
 SHARE = 5e-3
 OFF = 1e-6  # [rad]
 PUSH = 1e-4  # [N]
@@ -174,4 +179,4 @@ def main(given: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main(sys.argv[1:] or LEADER.split()))
