@@ -142,7 +142,7 @@ def pair_transparency(
     along = _along(pair, axis)
     top = 0.5 / pair.Ts
     f = np.geomspace(LOWEST, HIGHEST * top, POINTS) if frequency is None else np.array(frequency)
-    if not f.max(initial=math.inf if not len(f) else 0.0) < top:
+    if not len(f) or not f.max() < top:
         bound = f"must be one or more frequencies below {top:g} Hz"
         raise ParameterError("frequency", f.tolist(), bound)
     loop = build.loop()

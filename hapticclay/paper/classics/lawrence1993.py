@@ -334,8 +334,8 @@ CLASSIC = Classic(
     "time-delayed bilateral teleoperation using wave variables, IEEE Trans. Control Systems "
     "Technology, 2008, whose abstract calls four channels optimal for transparency); "
     "that perfect transparency compromises stability is quoted from a later article (J. Robotics "
-    "2015, 861425). The formulas are derived here, the numbers are ours. The pair is that of "
-    "yokokohji1994.",
+    "2015, 861425). The formulas are derived in equations.md, section 8, the numbers are "
+    "ours. The pair is that of yokokohji1994.",
     "In continuous time what the hand feels is fitted to exact runs at one frequency each. Delays "
     "are runs from sample to sample, where growth changes its sign, at two samples and "
     "extrapolated to none.",

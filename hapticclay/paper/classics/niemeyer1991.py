@@ -285,8 +285,8 @@ CLASSIC = Classic(
     "The abstract of 2004 could be read (ijrr.org): passive transmission guarantees stability at "
     "unknown but constant delays of up to several seconds, while wave reflections may interfere. "
     "The articles could not. The wave transformation, u = (b v + F)/sqrt(2 b) and w = (b v - F)/"
-    "sqrt(2 b), is stated in many places; what follows from it is derived here, and so are the "
-    "numbers. The pair is that of yokokohji1994.",
+    "sqrt(2 b), is stated in many places; what follows from it is derived in equations.md, section "
+    "8, and the numbers are ours. The pair is that of yokokohji1994.",
     "Runs from sample to sample at 1 kHz: the arms move exactly under held forces, messages wait "
     "in a queue. The energy of a link is summed up at its ends, force by speed.",
     make,
