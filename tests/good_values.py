@@ -18,7 +18,7 @@ def good_values(folder):
     loop = hc.theory.Loop(K=1.0, b=90.0)
     zigzag = hc.walls.zigzag(1e-4)
     swept = hc.studies.Sweep("constant", {"b": hc.studies.Range(1.0, 9.0, 2)})
-    pair = hc.studies.PairLog(t, np.sin(t), np.sin(t - 0.05), np.cos(t))
+    logged = hc.studies.PairLog(t, np.sin(t), np.sin(t - 0.05), np.cos(t))
     files = [cut.save(folder / "a.toml"), hc.constant_cut(b=50.0).save(folder / "b.toml")]
     by_name = {
         "axis": "x", "K": 1.0, "b": 90.0, "wall": wall, "scenario": cut, "subject": wall,
@@ -45,10 +45,11 @@ def good_values(folder):
     pair = {"pair": hc.Pair(device, device, hc.JointPD((100.0,), (5.0,)))}
     by_function = {
         "pair_limits": pair, "pair_map": {**pair, "gains": 3, "delays": 3}, "compare_links": pair,
+        "simulate_pair": {**pair, "t_max": 0.01},
         "pair_transparency": pair, "pair_hands": {**pair, "hands": hc.theory.Box(), "samples": 2},
         "Pair": {"leader": device, "follower": device, "law": hc.JointPD((1.0,), (1.0,))},
         "friction_cycle": {"arm": arm, "law": rubbed},
-        "joint_limits": of_joints, "over_poses": of_joints,
+        "joint_limits": of_joints, "joint_runs": of_joints, "over_poses": of_joints,
         "wall_limit": {"arm": arm, "B": 1.0, "operator": hc.Operator()},
         "MjcfArm": {"file": ARM}, "JointPD": {"Kp": (1.0,), "Kd": (1.0,)},
         "stable_band": {"part": "K"}, "arm_mbk": {"loop": pushed}, "arm_index": {"loop": pushed},
@@ -86,7 +87,7 @@ def good_values(folder):
         "simulate_columns": {"base": cut, "columns": {"gain.x": np.ones(3)}},
         "run_columns": {"base": cut, "columns": {"gain.x": np.ones(3)}},
         "PairLog": {"t": t, "leader": np.sin(t), "follower": np.cos(t), "follower_torque": t},
-        "identify_pair": {"log": pair},
+        "identify_pair": {"log": logged},
         "Recording": {"t": (0.0, 0.01), "p": np.zeros((2, 2))},
         "replay": {"recording": hc.studies.Recording((0.0, 0.01), f=np.ones((2, 2)))},
         "Measurement": {"t": t, "input": np.sin(t), "output": np.cos(t)},

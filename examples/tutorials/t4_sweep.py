@@ -99,4 +99,5 @@ worst = table.loc[table.energy_residual.abs().idxmax()]
 print(f"worst: {worst.energy_residual:.1e} at b = {worst.b:g}, K = {worst['gain.y']:g}")
 
 # %%
-# More: :doc:`/sweep` has files, clusters and interrupted sweeps; :doc:`/gallery/studies/index`.
+# Next: :doc:`t5_own_arm`. More: :doc:`/sweep` has files, clusters and interrupted sweeps;
+# :doc:`/gallery/studies/index`.

@@ -94,24 +94,35 @@ def load(arm: Any) -> Loaded:
 
 def compiled(file: Any) -> tuple[Any, str]:
     """The model of a file or spec, and its name."""
-    from ..physics import mujoco, warnings_caught
+    from ..physics import warnings_caught
 
-    path = None if isinstance(file, mujoco.MjSpec) else _path(file)
     with warnings_caught() as caught:
         try:
-            spec = file.copy() if path is None else mujoco.MjSpec.from_file(str(path))
-            if path is not None:
-                spec.compiler.fusestatic = False  # a URDF's tool keeps its name
+            spec, name = spec_of(file)
             model = spec.compile()
         except ValueError as error:
+            if isinstance(error, ParameterError):
+                raise
             raise _bad_file(file, one_line(error, 200)) from None
     if caught:
         raise _bad_file(file, one_line(caught[0], 200))
     for array in ("body_mass", "body_inertia", "dof_armature", "dof_damping", "jnt_axis"):
         if not np.isfinite(getattr(model, array)).all():
             raise _bad_file(file, f"{array} is not finite")
-    named = spec.modelname != UNNAMED or path is None
-    return model, spec.modelname if named else path.stem
+    return model, name
+
+
+def spec_of(file: Any) -> tuple[Any, str]:
+    """The spec of a file, or a copy of a spec, and the name of its model."""
+    from ..physics import mujoco
+
+    path = None if isinstance(file, mujoco.MjSpec) else _path(file)
+    if path is None:
+        spec = file.copy()
+        return spec, spec.modelname
+    spec = mujoco.MjSpec.from_file(str(path))
+    spec.compiler.fusestatic = False  # a URDF's tool keeps its name
+    return spec, spec.modelname if spec.modelname != UNNAMED else path.stem
 
 
 def _plain(file: Any) -> Any:

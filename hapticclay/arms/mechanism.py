@@ -54,6 +54,20 @@ class Moving(NamedTuple):
     centripetal: np.ndarray
 
 
+class Sticks(NamedTuple):
+    """A mechanism as a stick figure [m].
+
+    Attributes:
+        segments: ends of links, shape (m, 2, 3).
+        joints: anchors of the moving joints, shape (k, 3).
+        handle: place of the handle, shape (3,).
+    """
+
+    segments: np.ndarray
+    joints: np.ndarray
+    handle: np.ndarray
+
+
 class Mechanism:
     """A compiled model with a choice of driven joints.
 
@@ -202,9 +216,8 @@ class Mechanism:
         self._mujoco.mj_fwdVelocity(self._model, data)
         whole, turned = np.zeros((self._model.nv,) * 2), np.zeros((3, self._model.nv))
         self._mujoco.mj_fullM(self._model, data, whole)
-        kind, number = self._site or ("body", 0)
-        body = int(self._model.site_bodyid[number]) if kind == "site" else number
-        self._mujoco.mj_jacDot(self._model, data, turned, None, self.handle_place(), body)
+        place, body = self.handle_place(), self._held()
+        self._mujoco.mj_jacDot(self._model, data, turned, None, place, body)
         torques = data.qfrc_bias - data.qfrc_spring - data.qfrc_gravcomp + whole @ drift
         return Moving(torques @ self._follow(), -(turned @ rates + self._jacobian() @ drift))
 
@@ -239,6 +252,57 @@ class Mechanism:
         own = self._constraints()[0][:, self.following]
         out[self.following] = -np.linalg.lstsq(own, turned, rcond=DEPENDENT)[0]
         return out
+
+    def sticks(self, q: np.ndarray) -> Sticks:
+        """The mechanism at joint positions as a stick figure.
+
+        Raises:
+            ParameterError: constraints cannot be satisfied there.
+        """
+        self._at(q)
+        model, data = self._model, self._data
+        moved = {int(model.dof_bodyid[i]) for i in (*self.dofs, *self.following)}
+        nodes, moving, ends = np.array(data.xpos), set(), set(range(model.nbody))
+        for body in range(1, model.nbody):
+            first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
+            if count:
+                nodes[body] = np.mean(data.xanchor[first : first + count], axis=0)
+            if body in moved or int(model.body_parentid[body]) in moving:
+                moving.add(body)
+        segments = [(nodes[body], anchor) for body, anchor in self._anchors()]
+        if self._site is not None:
+            segments.append((nodes[self._held()], self.handle_place()))
+            ends.discard(self._held())
+        for body in sorted(moving):
+            parent = int(model.body_parentid[body])
+            ends.discard(parent)
+            if parent:
+                segments.append((nodes[parent], nodes[body]))
+        ends -= {body for body, _ in self._anchors()}
+        segments += [(nodes[body], np.array(data.xipos[body])) for body in sorted(moving & ends)]
+        place = self.handle_place() if self._site is not None else segments[-1][1]
+        return Sticks(np.array(segments), nodes[sorted(moved)], np.array(place))
+
+    def _held(self) -> int:
+        """Body that the hand holds."""
+        kind, number = self._site or ("body", 0)
+        return int(self._model.site_bodyid[number]) if kind == "site" else number
+
+    def _anchors(self) -> list[tuple[int, np.ndarray]]:
+        """Bodies, and places at which constraints tie them to others."""
+        model, data, found = self._model, self._data, []
+        connect, site = self._mujoco.mjtEq.mjEQ_CONNECT, self._mujoco.mjtObj.mjOBJ_SITE
+        for k in range(model.neq):
+            if model.eq_type[k] != connect:
+                continue
+            for i, number in enumerate((int(model.eq_obj1id[k]), int(model.eq_obj2id[k]))):
+                if model.eq_objtype[k] == site:
+                    found.append((int(model.site_bodyid[number]), np.array(data.site_xpos[number])))
+                    continue
+                local = model.eq_data[k, 3 * i : 3 * i + 3]
+                turn = np.reshape(data.xmat[number], (3, 3))
+                found.append((number, data.xpos[number] + turn @ local))
+        return [(body, place) for body, place in found if body]
 
     # ---- the engine's terms
 

@@ -26,7 +26,8 @@ class ArmCommand:
     Prints the least and largest gain of each joint, all coupled, the frequency at which it buzzes,
     the delay and rate left, and what to change first; if the gains feed friction forward, its limit
     cycles; with --wall the stiffest wall at the handle; with --poses the same over the workspace.
-    Exact for small motions about the pose: no runs.
+    Exact for small motions about the pose. With --run it also runs the arm, at its gains and at
+    0.5 % to either side of their common limit, and says whether the runs agree.
 
     Attributes:
         file: MJCF or URDF file of the arm, or the name of one of the package: planar_2r, five_bar,
@@ -53,6 +54,9 @@ class ArmCommand:
         hand: Mass, damper and spring of a hand at the handle [kg, N.s/m, N/m].
         poses: Number of poses, drawn within the ranges of the joints; 0 for the one pose alone.
         seed: Seed of their draw.
+        run: Run the arm too, at its gains and beside their limit; as_built.toml is the scenario of
+            a run with friction and torque limits, for hapticclay run.
+        film: Film of the buzz beyond the limit, slowed and magnified: .mp4, .webp or .gif.
         out: Folder for the numbers and figures; by default out/arm/NAME.
         figures: Format and style of the figures.
     """
@@ -80,6 +84,8 @@ class ArmCommand:
     hand: walls.Hand | None = None
     poses: Annotated[int, Bound(0, 100_000)] = 0
     seed: Annotated[int, Bound(0, 2**63 - 1)] = 0
+    run: bool = False
+    film: Path | None = None
     out: Path | None = None
     figures: console.FigureOptions = console.FigureOptions()
 
@@ -87,6 +93,8 @@ class ArmCommand:
         Unused(("rate",), "is 1/Ts: give --Ts or --rate", ("Ts",)),
         Unused(("Kp", "Kd"), "is in the file of --gains: give one of the two", ("gains",)),
         Unused(("poses",), "needs gains: give --gains, or --Kp and --Kd", (), ("gains", "Kp")),
+        Unused(("run",), "needs gains: give --gains, or --Kp and --Kd", (), ("gains", "Kp")),
+        Unused(("film",), "shows a run: give --run", (), ("run",)),
         Unused(("seed",), "is of the draw of --poses", (), ("poses",)),
         Unused(("B", "hand"), "is of the wall: give --wall", (), ("wall",)),
         Unused(("counts",), "is of friction that a file of --gains feeds forward", (), ("gains",)),
@@ -96,9 +104,38 @@ class ArmCommand:
         arm = self._arm()
         out = self.out or console.default_folder("arm", arm)
         writable(out)
+        self._film_ready()
         for found in list(self._answers(arm)):  # all is computed before a file is written
             console.deliver(found, out, self.figures)
+        if self.run:
+            self._after_runs(arm, out)
         return 0
+
+    def _film_ready(self) -> None:
+        if self.film is not None:
+            from ..views.film import ready
+
+            writable(self.film.parent)
+            ready(self.film)
+
+    def _after_runs(self, arm: MjcfArm, out: Path) -> None:
+        """The scenario of the run as built, and the film of the buzz."""
+        from ..studies.joint_runs import built_scenario, buzz
+
+        law, timing = self._law(), (self._Ts, self.delay)
+        built = built_scenario(arm, law, *timing)
+        print(f"to run it as built: hapticclay run {built.save(out / 'as_built.toml')}")
+        if self.film is None:
+            return
+        from ..views import buzz_film, film
+
+        record, mode = buzz(arm, law, *timing)
+        shown, options = buzz_film.buzz_of(record, mode.frequency)
+
+        def progress(images: Any, count: int) -> Any:
+            return iter(console.progress_bar(images, total=count, desc="film", unit="frame"))
+
+        print(f"written to {film.film(shown, self.film, options, progress)}")
 
     def _answers(self, arm: MjcfArm) -> Any:
         """The limits of the gains, of a wall, and over poses: those that are asked for."""
@@ -108,6 +145,10 @@ class ArmCommand:
             law = self._law()
             timing = self._Ts, self.delay
             yield joint_gains.joint_limits(arm, law, *timing)
+            if self.run:
+                from ..studies.joint_runs import joint_runs
+
+                yield joint_runs(arm, law, *timing, self._shown_runs)
             if law.friction or self.counts:
                 yield fed_friction.friction_cycle(arm, law, *timing, self.counts)
             if self.poses:
@@ -119,6 +160,9 @@ class ArmCommand:
             velocity = "difference" if self.velocity == "difference" else "exact"
             timing = self._Ts, self.delay
             yield joint_walls.wall_limit(arm, self.wall, self.B, hand, *timing, velocity)
+
+    def _shown_runs(self, factors: Any) -> Any:
+        return console.progress_bar(factors, desc="runs")
 
     @property
     def _Ts(self) -> float:

@@ -10,7 +10,7 @@ from ..errors import ParameterError
 from ..files import writable
 from ..model.constants import AXES
 from . import console
-from .identify import column_names
+from .log_options import column_names
 from .options import Loose
 from .replay import EXAMPLE
 from .unused import Unused

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from ..errors import Bound, ParameterError
 from ..files import writable
 from . import console
-from .identify import column_names
+from .log_options import LogOptions, column_names
 from .options import Loose
 from .unused import Unused
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from ..results import Result
     from ..scene.pair import Pair
 
-OF_THEORY = ("delay", "kind", "Ts", "map", "compare", "cells", "feel")
-OF_LOGS = ("columns", "band", "level")
+OF_THEORY = ("delay", "kind", "Ts", "map", "compare", "cells", "feel", "run")
+OF_LOGS = ("columns", "band", "level", "units", "counts", "table", "where")
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class PairCommand:
     Of a file of the pair: whether it is stable, the motion that turns unstable first, the largest
     one-way delay, what the torque from the other arm is late by, cause by cause, the friction that
     may be fed forward at each joint, and what to change first. Exact for small motions about the
-    pose: no runs.
+    pose; --run shows the motion of both arms.
 
     Of a log, with --data: gains, delays, friction, inertia and stiffness with intervals; the
     follower is then simulated behind the measured leader, and its error compared with the measured
@@ -45,6 +45,7 @@ class PairCommand:
         cells: Gains and delays of the map.
         feel: Also say what the hand feels along this axis of the world, and with which hands and
             objects the pair is stable.
+        run: Also run the pair for this time [s], after a push of the hand.
         data: Log of one axis, in place of a file of the pair, in any format that is read, or a
             scope of Simulink: time [s], both positions [rad], torques of both motors and the force
             on the follower [N.m].
@@ -53,6 +54,7 @@ class PairCommand:
         band: Highest frequency of the fits of laws [Hz].
         level: Confidence level of the intervals.
         out: Folder for the numbers and figures; by default out/pair/NAME.
+        log: Units of the columns of a log.
         figures: Format and style of the figures.
     """
 
@@ -64,11 +66,13 @@ class PairCommand:
     compare: bool = False
     cells: Annotated[tuple[int, int], Bound(2, 200, names=("gains", "delays"))] = (20, 20)
     feel: Literal["x", "y", "z"] | None = None
+    run: Annotated[float | None, Bound(0.0, 1e4, "s", above=True)] = None
     data: Path | None = None
     columns: tuple[str, ...] = ()
     band: Annotated[float, Bound(0.1, 1e5, "Hz")] = 80.0
     level: Annotated[float, Bound(0.5, 0.999)] = 0.95
     out: Path | None = None
+    log: LogOptions = LogOptions()
     figures: console.FigureLook = console.FigureLook()
 
     unused: ClassVar[tuple[Unused, ...]] = (
@@ -93,10 +97,14 @@ class PairCommand:
 
     def _identified(self, data: Path) -> int:
         from ..studies.pair_identification import identify_pair
-        from ..studies.pair_log import COLUMNS, PairLog
+        from ..studies.pair_log import COLUMNS, PairLog, logged
 
         example = "leader=q1 follower=q2 leader_torque=-u1"
-        log = PairLog.load(data, column_names(self.columns, COLUMNS, example))
+        names = column_names(self.columns, COLUMNS, example)
+        if self.log == LogOptions():
+            log = PairLog.load(data, names)
+        else:
+            log = logged(self.log.log(data, "data"), names)
         out = self.out or console.default_folder("pair", log)
         writable(out)
         found = identify_pair(log, band=self.band, level=self.level)
@@ -111,6 +119,10 @@ class PairCommand:
             yield pair_maps.compare_links(pair)
         if self.feel:
             yield pair_ports.pair_transparency(pair, self.feel)
+        if self.run:
+            from ..simulation.pair_run import simulate_pair
+
+            yield simulate_pair(pair, self.run)
         if self.map:
             yield pair_maps.pair_map(pair, *map(int, self.cells))
 

@@ -9,7 +9,7 @@ from typing import Literal
 from ..errors import ParameterError
 from ..files import writable
 from . import console
-from .identify import column_names
+from .log_options import LogOptions, column_names
 from .options import ScenarioWord
 
 EXAMPLE = "t=time x=pos fx=force"
@@ -27,6 +27,7 @@ class ReplayCommand:
         columns: Names in the file, as in t=time x=pos fx=force.
         drive: What drives the arm.
         out: Folder for replay.json and replay.png; by default out/replay/NAME.
+        log: Units of the columns.
         figures: Format and style of the figure.
     """
 
@@ -35,15 +36,16 @@ class ReplayCommand:
     columns: tuple[str, ...] = ()
     drive: Literal["force", "motion"] = "force"
     out: Path | None = None
+    log: LogOptions = LogOptions()
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
-        from ..studies.replay import COLUMNS, Recording, replay
+        from ..studies.replay import COLUMNS, recorded, replay
 
         if self.recording is None:
             raise ParameterError("recording", None, "must be given: a log")
         columns = column_names(self.columns, COLUMNS, EXAMPLE)
-        recording = Recording.load(self.recording, columns)
+        recording = recorded(self.log.log(self.recording, "recording"), columns)
         out = self.out or console.default_folder("replay", recording)
         writable(out)
         found = replay(self.scenario, recording, self.drive)

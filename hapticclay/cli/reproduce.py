@@ -26,8 +26,9 @@ class ReproduceCommand:
     """Reproduce the paper: every printed figure and number beside the simulated one, on one page.
 
     Add the name of a classic to reproduce that instead. Of walls: colgate1997, hannaford2002,
-    abbott2005, diolaiti2006, hulin2006 or chawda2015. Of leader and follower: niemeyer1991 or
-    yokokohji1994. The exit status is 1 if a number that should agree does not.
+    abbott2005, diolaiti2006, hulin2006 or chawda2015. Of leader and follower: niemeyer1991,
+    lawrence1993, yokokohji1994 or ryu2004. The exit status is 1 if a number that should agree does
+    not.
 
     Attributes:
         source: The classic; none for the paper of 2002.

@@ -30,6 +30,7 @@ class VideoCommand:
         plots: Show the running plots on the right, if there is room: from 320 x 100.
         smooth: Soften edges and shadows; takes twice as long without a graphics card.
         tool: The tool.
+        magnify: Show the motion of an arm from a file about its median pose so many times larger.
     """
 
     scenario: RecordWord
@@ -40,6 +41,7 @@ class VideoCommand:
     plots: bool = True
     smooth: bool = False
     tool: Prefixed[Tool] = Tool()
+    magnify: Annotated[float, Bound(1e-3, 1e9)] = 1.0
 
     def __call__(self) -> int:
         from ..simulation.record import Record
@@ -47,7 +49,7 @@ class VideoCommand:
 
         record = self.scenario
         options = film.FilmOptions(
-            self.camera, self.speed, self.size, self.plots, self.smooth, self.tool
+            self.camera, self.speed, self.size, self.plots, self.smooth, self.tool, self.magnify
         )
         writable(self.out.parent)
         film.ready(self.out, options)

@@ -133,6 +133,9 @@ def replay(record: Record, tool: Tool, stream: str | None = None) -> None:
     """Shows a record in a window, in real time, until it is closed."""
     if not len(record.t):
         raise ParameterError("record", record.scenario.name, "holds no samples")
+    if not record.scenario.is_closed_form:
+        bound = "must be of the arm in closed form: hapticclay video films arms from files"
+        raise ParameterError("record", record.scenario.name, bound)
     from ..live.replay import Replay
     from ..views.window import Window
 

@@ -7,10 +7,29 @@ from functools import cached_property
 
 import numpy as np
 
+from .log import Log
+
 EVEN = 0.05  # largest deviation of a step from the usual one, as a share, that counts as even
 GAP, FAR = 1.5, 5.0  # a gap is longer than so many usual steps, and deviations of the steps
 NORMAL = 1.4826  # standard deviation of normal noise over its median absolute value
+DATES = 9.4e8, 4.2e9  # [s] since 1970, of the years 2000 to 2100
+TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # of clocks that count since 1970
 DIGITS = range(12)  # decimal places of stamps that are rounded
+
+
+def times_of(log: Log, name: str) -> tuple[np.ndarray, list[str]]:
+    """A column of time [s], dates from the first one on; and what was done, one sentence each."""
+    place = log.place(name)
+    size, powers = log.size(place, ("s",))
+    raw = log.table.numbers(place)
+    for unit, tick in TICKS.items() if len(raw) else ():
+        tick = tick if powers is None else size
+        if DATES[0] <= raw[0] * tick <= DATES[1]:
+            stated = "" if powers is not None else f" in {unit}"
+            return tick * (raw - raw[0]), [
+                f"{name} counts{stated} since 1970: taken from its start"
+            ]
+    return size * raw if size != 1.0 else raw, []
 
 
 @dataclass(frozen=True)
@@ -41,8 +60,10 @@ class Stamps:
 
     @property
     def rate(self) -> float:
-        """Rows in a second [Hz]; of a log without gaps."""
-        return 1.0 / self.step
+        """Rows in a second, between gaps [Hz]."""
+        usual = self.steps[(self.steps >= 0.0) & (self.steps <= self.longest)]
+        mean = float(np.mean(usual)) if len(usual) else 0.0
+        return 1.0 / mean if mean > 0.0 else 1.0 / self.step
 
     @property
     def even(self) -> float:

@@ -7,9 +7,10 @@ numbers, and above the first such row its names, its units, or neither.
 from __future__ import annotations
 
 import csv
+import dataclasses
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -57,7 +58,7 @@ class TextTable:
     form: str
     notes: tuple[str, ...] = ()
     last_is_cut: bool = False
-    _kept: dict[int, np.ndarray] = field(default_factory=dict, repr=False)
+    _kept: dict[int, np.ndarray] = dataclasses.field(default_factory=dict, repr=False)
 
     @classmethod
     def read(cls, field: str, path: Path) -> TextTable:
@@ -208,7 +209,7 @@ class TextTable:
     @cached_property
     def _commas_and_points(self) -> bool:
         """Whether some cells have a decimal comma and others a decimal point."""
-        if not self._comma:
+        if not self._comma or not any("." in text for _, text in self.lines):
             return False
         found = [x for row in self._split_lines for x in row if cells.is_number(x)]
         return any("," in x for x in found) and any("." in x for x in found)

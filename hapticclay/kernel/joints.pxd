@@ -2,8 +2,6 @@ cimport cython
 from .records cimport Kick, Model, State
 from ..formulas cimport cmath as math
 from . cimport hand
-from . cimport joint_friction
-from . cimport kick
 
 cdef void sense(Model m, State s) noexcept nogil
 cdef void gather(Model m, double *J, double *A) noexcept nogil
@@ -17,14 +15,6 @@ cdef void before_kick(Model m, State s, Kick k) noexcept nogil
 @cython.locals(change=cython.double)
 cdef void from_event(Model m, State s, Kick k) noexcept nogil
 cdef void at_event(Model m, Kick k) noexcept nogil
-cdef void move_under(Model m, State s, Kick k) noexcept nogil
-@cython.locals(x=cython.double)
-cdef void put_momentum(Model m, State s, Kick k) noexcept nogil
-@cython.locals(load=cython.double)
-cdef bint is_touched(Model m, Kick k) noexcept nogil
-cdef void drive_alone(Model m, Kick k) noexcept nogil
-@cython.locals(x=cython.double)
-cdef void drive(Model m, State s, Kick k) noexcept nogil
 @cython.locals(x=cython.double)
 cdef double damping(Model m, double *w, long i) noexcept nogil
 cdef void factor_inertia(Model m, double h) noexcept nogil

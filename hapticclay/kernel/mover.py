@@ -15,7 +15,6 @@ from ..scene.scenario import Scenario
 from . import engine, layout, records
 from .engine import mujoco
 
-STORED = 8  # movers per store
 CALLS = {  # fields of Engine, and functions of the engine
     "step": "mj_step",
     "kinematics": "mj_kinematics",
@@ -146,29 +145,3 @@ def refuse_callbacks() -> None:
 def bias(model: Any, data: Any, accelerated: int, _: Any) -> None:
     """mj_rne, into data.qfrc_bias."""
     mujoco.mj_rne(model, data, accelerated, data.qfrc_bias)
-
-
-class Movers:
-    """Movers that successive runs share: one for each arm, with clay and without."""
-
-    def __init__(self):
-        self.known: dict[Any, Mover] = {}
-
-    def of(self, scenario: Scenario) -> Mover:
-        """The mover of a scenario, at rest."""
-        clay = scenario.clay
-        key = None if clay is None else clay.angle, scenario.arm
-        if key not in self.known:
-            if len(self.known) >= STORED:
-                del self.known[next(iter(self.known))]  # the oldest one
-            self.known[key] = _new(scenario)
-        self.known[key].rest(scenario)
-        return self.known[key]
-
-
-def _new(scenario: Scenario) -> Mover:
-    if scenario.is_closed_form:
-        return Mover(scenario)
-    from .joint_mover import JointMover  # imported only for an arm from a file
-
-    return JointMover(scenario)

@@ -8,6 +8,7 @@ from . cimport arm
 from . cimport friction
 from . cimport hand
 from . cimport hardware
+from . cimport joint_kick
 from . cimport joint_law
 from . cimport joints
 from . cimport kick

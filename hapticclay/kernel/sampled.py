@@ -14,6 +14,7 @@ from . import (
     friction,
     hand,
     hardware,
+    joint_kick,
     joint_law,
     joints,
     kick,
@@ -72,7 +73,7 @@ def move_under(m, s, k, machine):
     for i in range(m.joints):
         k.tau[i], k.slip[i] = machine.tau[i], 0.0
     if m.general:
-        joints.move_under(m, s, k)
+        joint_kick.move_under(m, s, k)
         return
     kick.load(m, s, k)
     if m.friction:

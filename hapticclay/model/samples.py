@@ -13,6 +13,7 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..columns.log import Log, open_log
+from ..columns.stamps import times_of
 from ..errors import ParameterError, array_of, choice
 from . import pieces
 from .signals import Signal
@@ -20,7 +21,7 @@ from .signals import Signal
 Between = Literal["linear", "hold"]
 Outside = Literal["hold", "zero"]
 COLUMNS = ("t", "fx", "fy")
-UNITS = ("s",), ("N", "m"), ("N", "m")
+UNITS = ("N", "m")
 
 
 @named
@@ -92,7 +93,8 @@ class Samples(Signal):
         if isinstance(columns, str) or len(columns) != 3:
             raise ParameterError("columns", columns, "must name three columns: time, x, y")
         log = open_log("path", path, units)
-        t, x, y = (log.values(name, x) for name, x in zip(columns, UNITS, strict=True))
+        t, _ = times_of(log, columns[0])
+        x, y = (log.values(name, UNITS) for name in columns[1:])
         if not len(t):
             raise log.table.refusal("must have a line of numbers")
         return cls(t, np.column_stack((x, y)), between, outside)  # type: ignore[arg-type]

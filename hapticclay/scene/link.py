@@ -27,6 +27,8 @@ class Link:
         scale: (motion, force): the follower's motion per leader's, and the leader's force per
             follower's; > 0, at most 1e6.
         rates: whether rates are sent with positions.
+        local_force: (leader, follower) gains of the own measured force, fed to the own motors, 0 to
+            1e6: how much lighter each arm is made; with force sensors alone.
         impedance: wave impedance of each joint [N.m.s/rad], > 0, at most 1e9; one number for all;
             None for the follower's Kd, which matches it: then no wave is reflected.
     """
@@ -39,11 +41,19 @@ class Link:
         tuple[float, float], Bound(0.0, 1e6, above=True, names=("motion", "force"))
     ] = (1.0, 1.0)
     rates: bool = True
+    local_force: Annotated[tuple[float, float], Bound(0.0, 1e6, names=("leader", "follower"))] = (
+        0.0,
+        0.0,
+    )
     impedance: Annotated[
         float | tuple[float, ...] | None, Bound(0.0, 1e9, "N.m.s/rad", above=True)
     ] = None
 
     def __post_init__(self):
+        felt = self.kind in ("position-force", "four-channel")
+        if any(self.local_force) and not felt:
+            bound = "must be 0 but for position-force and four-channel, which have force sensors"
+            raise ParameterError("link.local_force", self.local_force, bound)
         if self.impedance is not None and self.kind != "waves":
             raise ParameterError("link.impedance", self.impedance, "must be None without waves")
         if self.kind == "waves" and not self.rates:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..formulas import arm
-from ..kernel import layout, mover, path, records, scene
+from ..kernel import layout, movers, path, records, scene
 from ..kernel.hardware import QUEUED
 from ..kernel.row import ROWS, Buffers, Row
 from ..model.sampled_controller import BUFFER
@@ -42,7 +42,7 @@ class PeriodMaps:
     """The maps of scenes, which share engines and buffers."""
 
     def __init__(self):
-        self.movers, self.buffers = mover.Movers(), Buffers()
+        self.movers, self.buffers = movers.Movers(), Buffers()
         self.coupled: set[Any] = set()  # kinds of scene in which one axis has acted on the other
 
     def of(self, s: Scenario, i: int) -> PeriodMap | None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..arguments import named
 from ..kernel import arm, energy, joints, modes, mover, path, rows, scene, viscous
+from ..kernel.movers import Movers
 from ..kernel.row import CHUNK, Buffers, NativeRow, Row, Saved
 from ..kernel.scene import NOISE_AHEAD
 from ..model import hardware
@@ -73,8 +74,8 @@ class SamplesNeeded(Exception):
 class Workspace:
     """Engines that move the arms of successive runs, and buffers that their rows fill."""
 
-    def __init__(self, movers: mover.Movers | None = None):
-        self.movers, self.buffers = movers or mover.Movers(), Buffers()
+    def __init__(self, movers: Movers | None = None):
+        self.movers, self.buffers = movers or Movers(), Buffers()
 
 
 _idle: list[Workspace] = []  # workspaces that no run uses

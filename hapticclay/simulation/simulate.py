@@ -2,30 +2,47 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, overload
 
 from ..arguments import checked
-from ..errors import Bound
+from ..errors import Bound, ParameterError
+from ..scene.pair import Pair
 from ..scene.plausible import warn_implausible
 from ..scene.scenario import Scenario
 from .one_run import run_once
 from .record import Record
 from .run import Progress
 
+if TYPE_CHECKING:
+    from .pair_run import PairRecord
+
+
+@overload
+def simulate(
+    scenario: Scenario,
+    *,
+    every: int = 1,
+    progress: Progress | None = None,
+    engine: str = "auto",
+    error: float | str | None = None,
+) -> Record: ...
+@overload
+def simulate(scenario: Pair, *, engine: str = "auto") -> PairRecord: ...
+
 
 @checked
 def simulate(
-    scenario: Scenario,
+    scenario: Scenario | Pair,
     *,
     every: Annotated[int, Bound(1, 1_000_000)] = 1,
     progress: Progress | None = None,
     engine: str = "auto",
     error: float | str | None = None,
-) -> Record:
-    """Runs a scenario to its end.
+) -> Any:
+    """Runs a scenario to its end, or a leader and a follower for 2 s.
 
     Args:
-        scenario: what to run.
+        scenario: what to run; of a pair, `simulate_pair` runs longer, pushes otherwise.
         every: keep each every-th sample, and the last.
         progress: called now and then with (simulated time [s], handle x [m]); True ends the run, as
             "interrupted".
@@ -46,6 +63,14 @@ def simulate(
         RuntimeError: the law of its controller raised an exception (`LawFailed`). Interruptions
             such as Ctrl-C are raised unchanged.
     """
+    if isinstance(scenario, Pair):
+        given = {"every": (every, 1), "progress": (progress, None), "error": (error, None)}
+        for name, (value, default) in given.items():
+            if value != default:
+                raise ParameterError(name, value, "must be left out with a pair")
+        from .pair_run import simulate_pair  # imported only for a pair
+
+        return simulate_pair(scenario, engine=engine)
     warn_implausible(scenario)
     if error is not None:
         from .asked_error import simulate_within  # imported only if an error is requested

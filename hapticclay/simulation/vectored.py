@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..kernel import layout, mover, path, records, scene
+from ..kernel import layout, mover, movers, path, records, scene
 from ..kernel.native import machine
 from ..kernel.row import CHUNK, SHOWN, one
 from ..kernel.rows import ROW
@@ -40,7 +40,7 @@ class VectoredRuns:
         self.times, self.rooms = np.zeros(n), np.zeros(n, np.int64)
         self.prepares = np.zeros(n, bool)  # which cannot advance together
         self.takes_gain = np.zeros(n, bool)  # whose gains are nothing but two numbers of the model
-        self.movers = [mover.Movers() for _ in range(workers)]
+        self.movers = [movers.Movers() for _ in range(workers)]
         self.pool: ThreadPoolExecutor | None = None
         native = engine == "native"
         self.models: Any = np.zeros(n * native, layout.dtype_of(records.Model))

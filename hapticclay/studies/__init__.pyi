@@ -16,6 +16,8 @@ from .identification import Noise as Noise
 from .identification import identify as identify
 from .impedance import MeasuredImpedance as MeasuredImpedance
 from .impedance import measure_impedance as measure_impedance
+from .joint_runs import JointRuns as JointRuns
+from .joint_runs import joint_runs as joint_runs
 from .labs import Lab as Lab
 from .labs import lab as lab
 from .log_report import LogReport as LogReport

@@ -11,8 +11,9 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..columns.finding import UNITS, candidates
+from ..columns.heads import Head
 from ..columns.log import Log
-from ..columns.stamps import Stamps
+from ..columns.stamps import Stamps, times_of
 from ..display import table_of
 from ..errors import ParameterError
 from ..results import Result
@@ -32,10 +33,14 @@ class LogReport(Result):
     """What a log holds.
 
     Attributes:
-        log: the log.
-        time: name of the column of time; "" where none or several can be meant.
+        name: of the file.
+        form: its format, in words.
+        rows: number of rows.
+        time: name of the column of time; "" without one.
         table: name, unit, range and remark of each column.
-        stamps: the column of time; None without one.
+        t: time [s], (n,); None without one.
+        columns: columns of numbers by name and unit, in SI units where theirs is known, (n,) each.
+        notes: of the reader, one sentence each.
         warnings: what is suspicious, one sentence each.
         commands: commands to go on with.
     """
@@ -44,16 +49,25 @@ class LogReport(Result):
     written_as = "columns"
     printed = {"columns": ()}
 
-    log: Log
+    name: str
+    form: str
+    rows: int
     time: str
     table: dict[str, list[Any]]
-    stamps: Stamps | None
+    t: np.ndarray | None
+    columns: dict[str, np.ndarray]
+    notes: tuple[str, ...]
     warnings: tuple[str, ...]
     commands: tuple[str, ...]
 
+    @property
+    def stamps(self) -> Stamps | None:
+        """Steps of the time; None without one."""
+        return None if self.t is None else Stamps(self.t)
+
     def headline(self) -> str:
         """Name, format, rows and rate, in one line."""
-        parts = [f"{self.log.path.name}: {self.log.table.form}", f"{self.log.rows} rows"]
+        parts = [f"{self.name}: {self.form}", f"{self.rows} rows"]
         if self.stamps is not None and self.stamps.step > 0.0:
             parts.append(f"{self.stamps.duration:.6g} s at {self.stamps.rate:.6g} Hz")
         return ", ".join(parts)
@@ -69,7 +83,7 @@ class LogReport(Result):
         if self.stamps is not None:
             table = _stamps_table(self.stamps)
             lines.append("time: " + ", ".join(f"{k} {v[0]:.6g}" for k, v in table.items()))
-        lines += [f"note: {x}" for x in self.log.table.notes]
+        lines += [f"note: {x}" for x in self.notes]
         lines += [f"warning: {x}" for x in self.warnings]
         return [*lines, *(f"go on with: {x}" for x in self.commands)]
 
@@ -102,24 +116,37 @@ def log_report(log: Log) -> LogReport:
     if stamps is not None and stamps.even < 1.0:
         share = 100.0 * (1.0 - stamps.even)
         warnings.append(f"{share:.3g} % of the steps are off by more than 5 %: {TREATED}")
-    rows, accepted = [], _accepted(log)
+    rows, accepted, columns = [], _accepted(log), {}
     for place, head in enumerate(log.table.heads):
         size, unit, faults = _unit(log, place, accepted.get(head.text, ()))
         x = log.table.loose_numbers(place)
         kept = x[np.isfinite(x)] * size
         low, high = (float(kept.min()), float(kept.max())) if len(kept) else (math.nan, math.nan)
         rows.append((head.text, unit, low, high, "; ".join([*faults, *_remarks(x)])))
+        if len(kept) and head.text != time:
+            columns[_label(head, unit)] = size * x
     table = table_of(("column", "unit", "lowest", "highest", "remarks"), rows)
-    return LogReport(log, time, table, stamps, tuple(warnings), tuple(_commands(log, time)))
+    t = None if stamps is None else stamps.t
+    said = tuple(log.table.notes), tuple(warnings), tuple(_commands(log, time))
+    name, form = log.path.name, log.table.form
+    return LogReport(name, form, log.rows, time, table, t, columns, *said)
+
+
+def _label(head: Head, unit: str) -> str:
+    """Name of a column with the unit in which it is shown."""
+    si = unit.rpartition("shown in ")[2]
+    if not si or not parse_unit(si) or unit == "none: SI":
+        return head.text
+    return f"{head.name if head.unit else next(iter(head.last_words()))[0]} [{si}]"
 
 
 def _stamps(log: Log, time: str) -> tuple[Stamps | None, list[str]]:
     """The stamps of a log, and what is suspicious in them."""
     try:
-        stamps = Stamps(log.values(time, ("s",)))
+        t, out = times_of(log, time)
     except ParameterError as error:
         return None, [f"{time} is no time: {error.bound}"]
-    t, out = stamps.t, []
+    stamps = Stamps(t)
     if len(gaps := stamps.gaps):
         longest = float(np.max(stamps.steps))
         out.append(
@@ -151,7 +178,7 @@ def _beside(log: Log, stamps: Stamps, other: str) -> str:
     rest = x[good] - start - rate * stamps.t[good]
     return (
         f"a second clock, {other}: it runs {1e6 * (rate - 1.0):+.0f} ppm fast beside the first, "
-        f"with a deviation of {np.std(rest):.2g} s; the first is used"
+        f"with a deviation of {np.std(rest):.2g} s; name the one to use by --columns t=NAME"
     )
 
 

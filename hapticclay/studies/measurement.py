@@ -17,6 +17,7 @@ import numpy as np
 from ..arguments import checked, named
 from ..columns.finding import find
 from ..columns.log import Log, open_log
+from ..columns.stamps import times_of
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
 from ..units import parse_unit
@@ -157,17 +158,19 @@ class Measurement:
 def measured(log: Log, names: Mapping[str, str], between: Between = "spline") -> Measurement:
     """The measurement in some columns of a log, `between` whose rows the input is as said."""
     cells, notes = {}, []
+    cells["t"], more = times_of(log, names["t"])
+    notes += more
     for key, name in names.items():
+        if key == "t":
+            continue
         cells[key] = log.values(name, UNITS[key]) if key in UNITS else log.raw(name)
     raw, turn, at = unwrapped(log.raw(names["output"]))
     if len(at):
         cells["output"] = raw * log.size(log.place(names["output"]), UNITS["output"])[0]
         notes.append(wrap_note(turn, at, cells["t"]))
     made = even_columns(cells, between)
-    notes += made.notes
-    return Measurement(
-        **made.columns, name=log.path.name, notes=tuple(notes), rotary=_is_rotary(log, names)
-    )
+    given: dict[str, Any] = {**made.columns, "notes": (*notes, *made.notes)}
+    return Measurement(**given, name=log.path.name, rotary=_is_rotary(log, names))
 
 
 def _is_rotary(log: Log, names: Mapping[str, str]) -> bool:

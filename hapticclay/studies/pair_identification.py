@@ -167,7 +167,7 @@ def identify_pair(
         bound = f"must last {40.0 / band:.3g} s or more for fits up to {band:.3g} Hz"
         raise ParameterError("log", f"{len(log.t) * log.Ts:.3g} s", bound)
     law, fit = fit_law(Motion(log.t, log.follower, log.leader, log.follower_torque), band, level)
-    numbers, warnings = _law_numbers("", law, fit), []
+    numbers, warnings = _law_numbers("", law, fit), list(log.notes)
     if fit.rms > MISFIT * float(np.std(log.follower_torque)):
         share = fit.rms / float(np.std(log.follower_torque))
         warnings.append(f"the law leaves {100.0 * share:.2g} % of the follower's torque")

@@ -14,11 +14,12 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..columns.heads import powers_of
-from ..columns.log import open_log
+from ..columns.log import Log, open_log
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
 from ..files import MOST_TABLE, read_bytes
 from ..units import parse_unit
+from .even_columns import even_columns, unwrapped, wrap_note
 from .measurement import LARGEST_VALUE, LEAST_ROWS, _check_sampling
 
 COLUMNS = {  # columns of a log and their contents
@@ -41,6 +42,7 @@ SPELLINGS = {  # of a column's name in lower case without its sign
     "follower_torque": ("follower_torque", "tau_rs", "tau_s", "tau_f"),
     "force": ("force", "f_e", "fe", "tau_e"),
 }
+OUTPUT = {"follower": "output"}  # the motion by which it is judged whether stamps are late
 OPTIONAL = ("leader_torque", "force")
 LABEL = re.compile(r"[^()]*\(([^()]*)\)\s*(.*)")  # "Lever positions (rad) master, slave"
 
@@ -60,6 +62,7 @@ class PairLog:
         leader_torque: torque of the leader's motor [N.m], (n,); None if it was not logged.
         force: torque of the follower on what it touches [N.m], (n,); None without a sensor.
         name: name in titles and files.
+        notes: what was done to the rows of a file, one sentence each.
 
     Raises:
         ParameterError: a column is not such an array, is too short or not finite; the motion is
@@ -76,6 +79,7 @@ class PairLog:
     leader_torque: np.ndarray | None = None
     force: np.ndarray | None = None
     name: str = "pair"
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self):
         for column in COLUMNS:
@@ -95,30 +99,60 @@ class PairLog:
 
     @classmethod
     @checked
-    def load(cls, path: str | Path, columns: Mapping[str, str] | None = None) -> PairLog:
-        """Reads a log: text, a binary format, or a scope of Simulink in a MATLAB file.
+    def load(
+        cls,
+        path: str | Path,
+        columns: Mapping[str, str] | None = None,
+        units: Mapping[str, str] | None = None,
+        counts: Mapping[str, Any] | None = None,
+    ) -> PairLog:
+        """Reads a log: text, a binary format of docs/logs.md, or a scope of Simulink.
 
         A column is found by its name: leader or master, follower or slave, tau_rm and tau_rs for
         the torques, F_e for the force, and `COLUMNS`. A minus ahead of a name means that the column
-        holds the negative, as "-tau_rm" in a plot of forces against each other.
+        holds the negative, as "-tau_rm" in a plot of forces against each other. Rows at uneven
+        times are resampled, with a note.
 
         Args:
             path: the file.
             columns: names in the file of t, leader, follower, leader_torque, follower_torque and
                 force, with a minus for a column that holds the negative.
+            units: unit of a column by name, in place of what the file says, as {"q1": "deg"}.
+            counts: of an encoder's column by name: counts a turn, or the size of a count.
 
         Raises:
             ParameterError: the file cannot be read, a column is missing, or as `PairLog`.
         """
-        for key in dict(columns or {}):
+        file, given = Path(path), dict(columns or {})
+        for key in given:
             choice("columns", key, tuple(COLUMNS))
-        file = Path(path)
         try:
-            table = (file.suffix.lower() == ".mat" and _scope(file)) or _sheet(file, columns or {})
+            plain = not (units or counts) and file.suffix.lower() == ".mat"
+            if plain and (table := _scope(file)):
+                found: dict[str, Any] = _chosen(file, table, given)
+                return cls(**found, name=file.stem)
+            return logged(open_log("path", file, units, counts), given)
         except OSError as error:
             bound = f"must be a readable file ({error.strerror})"
             raise ParameterError("path", str(path), bound) from None
-        return cls(**_chosen(file, table, columns or {}), name=file.stem)
+
+
+def logged(log: Log, columns: Mapping[str, str]) -> PairLog:
+    """The pair in the columns of a log, at even times."""
+    wanted = {_plain(w): key for key, words in SPELLINGS.items() for w in words}
+    wanted |= {_plain(w): key for key, w in columns.items()}
+    found = {}
+    for i, head in enumerate(log.table.heads):
+        if key := wanted.get(_plain(head.text), wanted.get(_plain(head.name))):
+            found[head.name] = log.size(i, UNITS[key])[0] * log.table.numbers(i)
+    cells, notes = _chosen(log.path, found, columns), []
+    for side in ("leader", "follower"):
+        cells[side], turn, at = unwrapped(cells[side])
+        notes += [wrap_note(turn, at, cells["t"])] if len(at) else []
+    made = even_columns({OUTPUT.get(key, key): x for key, x in cells.items()})
+    names = {new: key for key, new in OUTPUT.items()}
+    even: dict[str, Any] = {names.get(key, key): x for key, x in made.columns.items()}
+    return PairLog(**even, name=log.path.stem, notes=(*notes, *made.notes))
 
 
 def _column(name: str, value: Any, t: Any) -> np.ndarray:
@@ -161,19 +195,6 @@ def _chosen(
 
 def _plain(name: str) -> str:
     return name.strip().lstrip("-").strip().lower()
-
-
-def _sheet(file: Path, columns: Mapping[str, str]) -> dict[str, np.ndarray]:
-    """The columns of a CSV file that a log has, by name without its unit."""
-    log = open_log("path", file)
-    wanted = {_plain(w): key for key, words in SPELLINGS.items() for w in words}
-    wanted |= {_plain(w): key for key, w in columns.items()}
-    found = {}
-    for i, head in enumerate(log.table.heads):
-        if _plain(head.name) in wanted:
-            size, _ = log.size(i, UNITS[wanted[_plain(head.name)]])
-            found[head.name] = size * log.table.numbers(i)
-    return found
 
 
 def _scope(file: Path) -> dict[str, np.ndarray]:

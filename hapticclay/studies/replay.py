@@ -77,13 +77,21 @@ class Recording:
 
     @classmethod
     @checked
-    def load(cls, path: str | Path, columns: Mapping[str, str] | None = None) -> Recording:
+    def load(
+        cls,
+        path: str | Path,
+        columns: Mapping[str, str] | None = None,
+        units: Mapping[str, str] | None = None,
+        counts: Mapping[str, Any] | None = None,
+    ) -> Recording:
         """Reads a log, text or binary; units stand in the heads, as "x [mm]".
 
         Args:
             path: the file.
             columns: names in the file of t, x, y, fx and fy; by default these. A coordinate that is
                 missing beside the other is 0.
+            units: unit of a column by name, in place of what the file says, as {"x": "mm"}.
+            counts: of an encoder's column by name: the size of a count, as "0.01 mm".
 
         Raises:
             ParameterError: the file cannot be read, lacks a column that was named, the time, or
@@ -92,18 +100,21 @@ class Recording:
         for key in dict(columns or {}):
             choice("columns", key, tuple(COLUMNS))
         try:
-            log = open_log("path", path)
+            return recorded(open_log("path", path, units, counts), dict(columns or {}))
         except OSError as error:
             bound = f"must be a readable file ({error.strerror})"
             raise ParameterError("path", str(path), bound) from None
-        given = dict(columns or {})
-        names = {k: given.get(k, k) for k in COLUMNS if k in given or k == "t" or _has(log, k)}
-        cells = {key: log.values(name, UNITS[key]) for key, name in names.items()}
-        p, f = (_pair(cells, x, y) for x, y in (AXES, ("fx", "fy")))
-        if p is None and f is None:
-            bound = f"must have a motion or a force: name its columns, as x=NAME of {log.names}"
-            raise ParameterError("columns", str(path), bound)
-        return cls(cells["t"], p, f, Path(path).stem)
+
+
+def recorded(log: Log, columns: Mapping[str, str]) -> Recording:
+    """The recording in the columns of a log."""
+    names = {k: columns.get(k, k) for k in COLUMNS if k in columns or k == "t" or _has(log, k)}
+    cells = {key: log.values(name, UNITS[key]) for key, name in names.items()}
+    p, f = (_pair(cells, x, y) for x, y in (AXES, ("fx", "fy")))
+    if p is None and f is None:
+        bound = f"must have a motion or a force: name its columns, as x=NAME of {log.names}"
+        raise ParameterError("columns", str(log.path), bound)
+    return Recording(cells["t"], p, f, log.path.stem)
 
 
 def _has(log: Log, name: str) -> bool:

@@ -63,6 +63,9 @@ class Loop(LinearLoop):
         """
         if not isinstance(scenario, Scenario):
             raise ParameterError("scenario", scenario, "must be a Scenario")
+        if not scenario.is_closed_form:
+            bound = "must be the one in closed form: hapticclay arm judges arms from files"
+            raise ParameterError("arm", scenario.arm, bound)
         if scenario.controller is not None:
             bound = "must be None: see hc.theory.controller_stability for a controller of your own"
             raise ParameterError("controller", scenario.controller, bound)

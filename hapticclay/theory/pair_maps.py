@@ -214,4 +214,6 @@ def _link(link: Link, kind: Any) -> Link:
         return link
     scale = (link.scale[0], 1.0) if kind == "position-position" else link.scale
     rates = link.rates or kind == "waves"
-    return replace(link, kind=kind, scale=scale, rates=rates, impedance=None)
+    local = link.local_force if kind in ("position-force", "four-channel") else (0.0, 0.0)
+    changes = {"scale": scale, "rates": rates, "impedance": None, "local_force": local}
+    return replace(link, kind=kind, **changes)

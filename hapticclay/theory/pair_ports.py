@@ -142,8 +142,9 @@ def pair_transparency(
     along = _along(pair, axis)
     top = 0.5 / pair.Ts
     f = np.geomspace(LOWEST, HIGHEST * top, POINTS) if frequency is None else np.array(frequency)
-    if not f.max() < top:
-        raise ParameterError("frequency", float(f.max()), f"must be below {top:g} Hz")
+    if not len(f) or not f.max() < top:
+        bound = f"must be one or more frequencies below {top:g} Hz"
+        raise ParameterError("frequency", f.tolist(), bound)
     loop = build.loop()
     omega = 2.0 * math.pi * f
     Y, at = loop.admittance(omega, along), loop.admittance(np.array([2.0 * math.pi * AT]), along)

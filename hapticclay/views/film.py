@@ -20,14 +20,17 @@ from ..errors import ParameterError, choice, integer, number
 from ..files import atomic
 from ..kernel.engine import mujoco
 from ..live.status import held_words
+from ..model.constants import AXES
 from ..simulation.record import Record
 from ..studies.removal import TOOL, Tool
 from .stage import CAMERAS, Stage
+from .stick_stage import StickStage
 
 FRAME_RATES = {".mp4": 30, ".webp": 20, ".gif": 20}  # [1/s], by kind of file
 LEAST_ASPECT = 1.2  # aspect ratio for which the cameras of room.xml are designed
 PLOTS_SHARE = 0.375  # of the width
 FONT_WIDTH = 175  # [pixels] of a picture by which its title grows by half of its usual size
+SLOW = 0.2  # speed below which a title has four digits of the time
 ONE_LINE_WIDTH = 240  # [pixels] of a picture from which its title is one line
 SOFT_SAMPLES, SOFT_SHADOW = 4, 2048  # a pixel; width of the shadow map [pixels]
 GL_ON = ("enable", "enabled", "on", "true", "1")  # values of MUJOCO_GL
@@ -46,6 +49,7 @@ class FilmOptions:
         plots: whether plots grow on the right, if there is room: from 320 x 100.
         smooth: whether edges and shadows are softened, which doubles the time.
         tool: at the handle.
+        magnify: times that the motion of an arm from a file about its median pose is shown.
     """
 
     camera: str = "room"
@@ -54,6 +58,7 @@ class FilmOptions:
     plots: bool = True
     smooth: bool = False
     tool: Tool = TOOL
+    magnify: float = 1.0
 
 
 FILM_OPTIONS = FilmOptions()
@@ -62,7 +67,9 @@ FILM_OPTIONS = FilmOptions()
 class Lens:
     """Renders a stage without a display."""
 
-    def __init__(self, stage: Stage, width: int, height: int, camera: str, smooth: bool = False):
+    def __init__(
+        self, stage: Stage | StickStage, width: int, height: int, camera: str, smooth: bool = False
+    ):
         """Opens an OpenGL context."""
         self.stage = stage
         model = stage.model
@@ -142,6 +149,7 @@ def ready(out: Path, options: FilmOptions = FILM_OPTIONS) -> tuple[str, FilmOpti
     """Checks that a film can be made on this machine; call it before a long run."""
     kind = choice("out", out.suffix.lower(), tuple(FRAME_RATES))
     speed = number("speed", options.speed, 1e-3, 1e3, above=True)
+    number("magnify", options.magnify, 1e-3, 1e9)
     width, height = (
         integer(f"size[{name}]", n, 160, 4096)
         for name, n in zip(("w", "h"), options.size, strict=True)
@@ -188,12 +196,13 @@ def frames(
         share = 2 * round(0.5 * PLOTS_SHARE * width)
         if plots_fit(share, height):
             beside, running = share, RunningPlots(record, share, height)
-    stage = Stage(record.scenario, options.tool)
+    stage = stage_of(record, options)
     camera = choice("camera", options.camera, CAMERAS)
     lens = Lens(stage, width - beside, height, camera, options.smooth)
     image = np.empty((height, width, 3), dtype=np.uint8)
-    held = record.held().tolist()
+    held = record.held()[:, : len(AXES)].tolist()
     recorded = None if record.ground is None else record.extra.get("removed")
+    digits = 2 if options.speed > SLOW else 4
     gap = "   " if width - beside >= ONE_LINE_WIDTH else "\n"
     try:
         done = 0
@@ -201,7 +210,9 @@ def frames(
             stage.carve(_thinned(record.p[done:n]))
             stage.pose(record.q[n - 1])
             stage.push(record.fe[n - 1], all(held[n - 1]))
-            title = f"t = {record.t[n - 1]:.2f} s"
+            title = f"t = {record.t[n - 1]:.{digits}f} s"
+            if options.magnify != 1.0:
+                title += f"{gap}motion x {options.magnify:.0f}"
             if stage.field >= 0:
                 volume = stage.removal.volume if recorded is None else float(recorded[n - 1])
                 title += f"{gap}removed {1e6 * volume:.1f} cm3"
@@ -214,6 +225,16 @@ def frames(
             yield image
     finally:
         lens.close()
+
+
+def stage_of(record: Record, options: FilmOptions) -> Any:
+    """The scene of a record: the arm in closed form and its clay, or a stick figure."""
+    if record.scenario.is_closed_form:
+        if options.magnify != 1.0:
+            bound = "must be 1 for the arm in closed form"
+            raise ParameterError("magnify", options.magnify, bound)
+        return Stage(record.scenario, options.tool)
+    return StickStage(record, options.magnify)
 
 
 def samples_shown(record: Record, speed: float, rate: int) -> np.ndarray:

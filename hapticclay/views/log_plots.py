@@ -18,17 +18,13 @@ DRAWN = 20_000  # rows that are drawn of a longer log
 @figure_style()
 def log_plot(report: LogReport) -> Figure:
     """Plots the columns of a log over time, and the steps between its stamps below."""
-    log, names = report.log, [x for x in report.log.names if x != report.time]
-    places = [log.place(x) for x in names if log.names.count(x) == 1]
-    columns = {log.names[i]: log.table.loose_numbers(i) for i in places}
-    columns = {name: x for name, x in columns.items() if np.isfinite(x).any()}
-    shown = list(columns)[:MOST]
+    shown = list(report.columns)[:MOST]
     stamps = report.stamps
-    t = np.arange(log.rows) if stamps is None else stamps.t
+    t = np.arange(report.rows) if stamps is None else stamps.t
     figure, axes = stacked(max(len(shown), 1) + (stamps is not None), 1.0 + 1.15 * len(shown))
     every = max(len(t) // DRAWN, 1)
     for ax, name in zip(axes, shown, strict=False):
-        ax.plot(t[::every], columns[name][::every], color=BLUE, lw=stroke(0.9))
+        ax.plot(t[::every], report.columns[name][::every], color=BLUE, lw=stroke(0.9))
         label_axes(ax, "", one_line(name, 24))
         ax.yaxis.label.set_size(points(8.0))
     if stamps is not None and len(t) > 1:
@@ -41,7 +37,7 @@ def log_plot(report: LogReport) -> Figure:
         label_axes(axes[-1], "", "step [ms]")
         axes[-1].yaxis.label.set_size(points(8.0))
     label_axes(axes[-1], "row" if stamps is None else "time [s]")
-    left = len(columns) - len(shown)
+    left = len(report.columns) - len(shown)
     set_title(axes[0], report.headline(), f"{left} more columns" if left else "")
     figure.align_ylabels(axes)
     return figure

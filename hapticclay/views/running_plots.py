@@ -22,6 +22,8 @@ FILM_DPI = 100
 TEXT_SIZE = 7.5  # [points]
 LEAST_PANEL = (120, 100)  # width and height [pixels] that the numbers of a running plot need
 ROOMY_PANEL = (180, 110)  # ... and the names of its axes
+MOST_JOINTS = 3  # shown of an arm from a file
+SMALL = 0.05  # [rad or m] motion below this is shown in thousandths
 LEGEND_WIDTH = 230  # [pixels] from which a legend fits beside the title
 
 
@@ -77,7 +79,8 @@ def running_figure(
     count = max(1, min(3, height // LEAST_PANEL[1]))
     roomy = width >= ROOMY_PANEL[0] and height >= ROOMY_PANEL[1] * count
     i = int(np.ptp(record.p[:, 1]) > 1.2 * np.ptp(record.p[:, 0]))
-    plans = _running_panels(record, i, roomy)[:count]
+    closed_form = record.scenario.is_closed_form
+    plans = (_running_panels(record, i, roomy) if closed_form else _joint_panels(record))[:count]
     figure = Figure(figsize=(width / FILM_DPI, height / FILM_DPI), dpi=FILM_DPI)
     panels: Any = figure.subplots(count, 1, squeeze=False)[:, 0]
     for ax, plan in zip(panels, plans, strict=True):
@@ -88,9 +91,9 @@ def running_figure(
         for _, color, name in plan.curves:
             ax.plot([], [], color=color, lw=stroke(1.4), label=name)
     viscous = is_viscous(record.scenario)
-    for ax in panels[: 2 if viscous else 1]:
+    for ax in panels[: (2 if viscous else 1) * closed_form]:
         shade_clay(ax, *shades(record, AXES[i]))
-    for ax in panels[1:2]:
+    for ax in panels[1 : 1 + closed_form]:
         _running_laws(ax, record, i)
     for ax in panels[2:]:
         shade_held(ax, held_spans(record, AXES[i]))
@@ -137,6 +140,27 @@ def _running_panels(r: Record, i: int, roomy: bool) -> tuple[Panel, ...]:
         panel(x, v, where, name, r.scenario.name, (v, BLUE, f"v$_{axis}$")),
         second,
         panel(r.t, np.append(1.15 * usual, 0.0), "time [s]", "force [N]", "", *forces),
+    )
+
+
+def _joint_panels(r: Record) -> tuple[Panel, ...]:
+    """Joints that move most, their rates, and the handle, over time."""
+    moved = np.ptp(r.q, axis=0)
+    most = sorted(np.argsort(-moved)[:MOST_JOINTS].tolist())
+    names, colors = r.scenario.joints, (BLUE, VERMILION, GREEN)
+    unit, scale = ("mrad", 1e3) if moved.max(initial=0.0) < SMALL else ("rad", 1.0)
+    near, per = ("mm", 1e3) if np.ptp(r.p, axis=0).max(initial=0.0) < SMALL else ("cm", 1e2)
+
+    def panel(name: str, title: str, values: Any, labels: Any) -> Panel:
+        curves = tuple(zip(values, colors, labels, strict=False))
+        return Panel(r.t, np.concatenate(values), ("time [s]", name), title, curves)
+
+    turned = [scale * (r.q[:, j] - r.q[0, j]) for j in most]
+    labels = [names[j] for j in most]
+    return (
+        panel(f"joints [{unit}]", "", turned, labels),
+        panel("rates [rad/s]", "", [r.qd[:, j] for j in most], labels),
+        panel(f"handle [{near}]", "", [*(per * r.p.T)], r.scenario.axes),
     )
 
 

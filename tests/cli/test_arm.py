@@ -67,6 +67,9 @@ def test_friction_fed_forward(tmp_path, capsys):
         ([TWO, *GAINS, "--B", "2"], "give --wall"),
         ([TWO, *GAINS, "--hand", "0.2", "1", "3"], "give --wall"),
         ([TWO, *GAINS, "--seed", "2"], "--poses"),
+        ([TWO, "--wall", "x", "--run"], "needs gains"),
+        ([TWO, *GAINS, "--film", "buzz.webp"], "give --run"),
+        ([TWO, *GAINS, "--run", "--film", "buzz.avi"], ".webp"),
         ([TWO, *GAINS, "--counts", "4096"], "file of --gains"),
         ([TWO, *GAINS, "--velocity", "filter"], "velocity 'filter'"),
         ([TWO, *GAINS, "--dely", "1ms"], "did you mean --delay"),
@@ -79,3 +82,13 @@ def test_refused_in_one_line(words, told, tmp_path, capsys, monkeypatch):
     error = capsys.readouterr().err
     assert told in error and error.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_runs_beside_the_limit(tmp_path, capsys):
+    words = ["arm", TWO, "--Kp", "20", "10", "--Kd", "0.3", "0.1", "--delay", "1ms", "--run"]
+    assert main([*words, "--velocity", "difference", "--out", str(tmp_path)]) == 0
+    text = capsys.readouterr().out
+    assert "runs and theory agree" in text and "as built" in text
+    assert {"runs.json", "runs.png", "as_built.toml"} <= {x.name for x in tmp_path.iterdir()}
+    assert main(["run", str(tmp_path / "as_built.toml"), "--out", str(tmp_path / "run")]) == 0
+    assert "time limit" in capsys.readouterr().out

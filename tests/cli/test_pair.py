@@ -29,14 +29,14 @@ def file(tmp_path):
 
 def test_verdict_map_and_architectures(file, tmp_path, capsys):
     words = ["pair", file, "--compare", "--map", "delay-gain", "--cells", "3", "3"]
-    words += ["--feel", "x"]
+    words += ["--feel", "x", "--run", "0.1"]
     assert main([*words, "--out", str(tmp_path / "out")]) == 0
     text = capsys.readouterr().out
     for told in ("stable at position-position", "first to change: network", "waves", "factor of"):
         assert told in text
     assert {x.name for x in (tmp_path / "out").iterdir()} == {
         f"{name}.{kind}"
-        for name in ("pair", "architectures", "delay_gain", "transparency")
+        for name in ("pair", "architectures", "delay_gain", "transparency", "pair_run")
         for kind in ("json", "png")
     }
     found = json.loads((tmp_path / "out" / "pair.json").read_text())

@@ -239,3 +239,19 @@ def test_a_motion_about_an_axis(tmp_path):
         hc.studies.fit_flow(data)
     with pytest.raises(hc.ParameterError, match="only 'torque"):
         hc.studies.Measurement.load(path, units={"q": "mm"})
+
+
+@pytest.mark.parametrize(
+    "head, size", [("t", 1.0), ("t", 1e3), ("t", 1e6), ("stamp", 1e9), ("t [ms]", 1e3)]
+)
+def test_dates_since_1970_are_taken_from_their_start(head, size, tmp_path):
+    x, y = motion(T)
+    whole = [f"{round(size * 1.7e9) + size * t:.6f}" for t in T]
+    rows = [f"{t},{a!r},{b!r}" for t, a, b in zip(whole, x.tolist(), y.tolist(), strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join([f"{head},f,p", *rows]))
+    data = hc.studies.Measurement.load(tmp_path / "a.csv")
+    # doubles near 1.7e9 s have steps of 2.4e-7 s
+    np.testing.assert_allclose(data.t, T, atol=3e-7)
+    assert "since 1970" in data.notes[0]
+    samples = hc.Samples.of(tmp_path / "a.csv", (head, "f", "p"))
+    np.testing.assert_allclose(samples.t, T, atol=3e-7)

@@ -71,6 +71,10 @@ def test_units_are_shown_as_they_were_read(tmp_path):
     shown = ["ms, shown in s", "in, shown in m", "mm, shown in m", "furlong", "mm, by its name?"]
     assert table["unit"] == shown
     assert "unknown unit 'furlong'" in table["remarks"][3]
+    report = hc.studies.log_report(log)
+    assert [*report.columns] == ["x [m]", "y [m]", "z [furlong]", "w_mm"]
+    again = hc.studies.LogReport.load(report.save(tmp_path / "report.json"))
+    assert again.text() == report.text() and again.plot().axes
     assert table["highest"][1] == pytest.approx(0.0254 * T[-1], rel=1e-12)  # one product
     assert hc.studies.log_report(log).stamps.step == pytest.approx(0.002, rel=1e-9)  # differences
 

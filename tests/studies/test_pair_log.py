@@ -1,5 +1,6 @@
 """Logs of a leader and its follower: exact steps of an axis, gains found again, files read."""
 
+import json
 import math
 import os
 from pathlib import Path
@@ -191,6 +192,36 @@ def test_a_csv_file_is_read_with_units_and_names(tmp_path):
     read = hc.studies.PairLog.load(file, {"leader_torque": "-u1"})
     for name in ("t", "leader", "follower", "leader_torque", "follower_torque", "force"):
         np.testing.assert_allclose(getattr(read, name), getattr(log, name), rtol=1e-13, atol=1e-18)
+
+
+def test_uneven_stamps_and_counts_are_read(tmp_path):
+    """Jittered stamps, an encoder that begins again, and units that the file does not state."""
+    log, rng = synthetic(n=2000), np.random.default_rng(5)
+    t = log.t + rng.uniform(-1e-4, 1e-4, len(log.t))
+    leader = np.interp(t, log.t, log.leader)
+    counts = np.round((leader - 0.05) * 65536 / math.tau) % 65536  # begins again
+    columns = (t, counts, np.degrees(np.interp(t, log.t, log.follower)), t)
+    file = tmp_path / "log.csv"
+    head = "t,leader,follower,tau_s"
+    np.savetxt(file, np.column_stack(columns), "%.17g", ",", header=head, comments="")
+    read = hc.studies.PairLog.load(file, units={"follower": "deg"}, counts={"leader": 65536})
+    assert len(read.notes) == 2 and abs(read.Ts - 5e-4) < 2e-4 / 2000  # jitter of the ends
+    found = np.interp(read.t, t, leader)
+    turns = np.round((read.leader - found).mean() / math.tau) * math.tau
+    # rounding, and splines between jittered rows
+    assert np.abs(read.leader - found - turns + 0.05).max() < 3.0 * math.tau / 65536
+
+
+def test_units_on_the_command_line(tmp_path):
+    log = synthetic(n=2000)
+    file = tmp_path / "log.csv"
+    table = np.column_stack((log.t, np.degrees(log.leader), log.follower, log.follower_torque))
+    np.savetxt(file, table, "%.17g", ",", header="t,q1,follower,tau_s", comments="")
+    words = ["--columns", "leader=q1", "--units", "q1=deg", "--out", str(tmp_path / "out")]
+    assert main(["pair", "--data", str(file), *words]) == 0
+    told = json.loads((tmp_path / "out" / "pair_log.json").read_text())
+    P = next(x for x in told["numbers"] if x["name"] == "P")
+    assert P["value"] == pytest.approx(12.0, rel=0.01)  # a wrong unit is off by 57
 
 
 def test_the_command_writes_and_prints(tmp_path, capsys):

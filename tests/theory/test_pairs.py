@@ -44,6 +44,7 @@ def one(K=400.0, B=50.0, kind="position-position", **kw):
     return hc.Pair(device, device, law, hc.Link(kind), **kw)
 
 
+FELT = ("position-force", "four-channel")  # kinds with force sensors
 HELD = {"leader_operator": hc.Operator(2.0, 2.0, 10.0), "follower_clay": hc.Contact(50.0, 1.0, 3.0)}
 
 
@@ -74,6 +75,7 @@ def drawn(seed, kind=None):
         (Ts * float(random.choice(delay)), Ts * float(random.choice(delay))),
         scale=(random.uniform(0.5, 2.0), 1.0 if kind == "position-position" else 0.7),
         rates=kind == "waves" or bool(random.random() < 0.7),
+        local_force=(0.3, 0.2) if kind in FELT and random.random() < 0.5 else (0.0, 0.0),
         impedance=random.uniform(1.0, 5.0) if kind == "waves" and random.random() < 0.5 else None,
     )
     hand = hc.Operator(*random.uniform(0.1, 3.0, 3)) if random.random() < 0.6 else None
@@ -119,7 +121,7 @@ def end_of(pair, i, forward):
     def end(q, w, F, arrived):
         nonlocal desired
         v = estimate(q, w)
-        own = forward @ q + np.array(law.slopes) * v
+        own = forward @ q + np.array(law.slopes) * v - link.local_force[i] * F
         if acts and law.runs == "host" and link.kind != "waves":
             own = own - Kp * q - Kd * v
         pull, message = np.zeros(n), np.zeros(n)
@@ -291,6 +293,27 @@ def test_only_the_round_trip_matters():
 def test_limits_of_the_pair_of_yokokohji_and_yoshikawa(kind, low, high):
     """1994: 6 kg each, a hand of 2 kg, an object of 3 kg, gains 400 and 50, at 1 kHz."""
     assert low <= hc.theory.pair_limits(one(kind=kind, **HELD)).delay <= high
+
+
+def test_poles_of_yokokohji_and_yoshikawa():
+    """Case 1, force-reflecting servo: roots of its polynomial, as the control sample gets short.
+
+    Master: 6 a + 0.1 v = 2.5 f_m - 3.5 f_s + f_m with f_m = -(2 a + 2 v + 10 x). Slave: 6 a + 0.1 v
+    = 400 (x_m - x) - 50 v - f_s with f_s = 3 a + v + 50 x. -3.115 +- 8.555j, +.003 +- 2.974j.
+    """
+    s = np.polynomial.Polynomial([0.0, 1.0])
+    hand, thing = 2.0 * s**2 + 2.0 * s + 10.0, 3.0 * s**2 + s + 50.0
+    master = 6.0 * s**2 + 0.1 * s + 3.5 * hand
+    want = (master * (6.0 * s**2 + 50.1 * s + 400.0 + thing) + 400.0 * 3.5 * thing).roots()
+    assert sorted(want.round(3).real) == pytest.approx([-3.115, -3.115, 0.003, 0.003])
+    found = []
+    for Ts in (2e-4, 1e-4):
+        link = hc.Link("position-force", scale=(1.0, 3.5), rates=False, local_force=(2.5, 0.0))
+        loop = Build(replace(one(Ts=Ts, **HELD), link=link)).loop()
+        z = loop.eigenvalues[:4]
+        found.append(np.sort_complex(np.log(z) / Ts))
+    # the error of a hold falls with Ts: what is left of it after one step of Richardson is Ts^2
+    np.testing.assert_allclose(2.0 * found[1] - found[0], np.sort_complex(want), atol=1e-4)
 
 
 def test_a_long_delay_is_judged_without_states(monkeypatch):

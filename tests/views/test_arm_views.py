@@ -7,7 +7,12 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.cli.app import main
-from hapticclay.views import record_plots, run_figures
+from hapticclay.scene.text import scenario_rows
+from hapticclay.studies.joint_runs import buzz
+from hapticclay.views import film, record_plots, run_figures
+from hapticclay.views.buzz_film import buzz_of
+from hapticclay.views.film import FilmOptions
+from tests.views.test_film import needs_gl
 
 NAMES = ("planar_2r", "haptic_3", "five_bar", "leader_7")
 
@@ -108,3 +113,91 @@ def test_other_laws_have_no_reference():
     s = dataclasses.replace(scenario("planar_2r"), controller=hc.Controller(law))
     figure = hc.simulate(s).plot()
     assert len(figure.axes[0].lines) == 1
+
+
+def test_sticks_join_joints_and_handle(record):
+    arm = record.scenario.arm
+    shown = arm.mechanism.sticks(arm.q)
+    np.testing.assert_allclose(shown.handle, arm.handle(), atol=1e-12)
+    ends = shown.segments.reshape(-1, 3)
+    assert np.abs(ends - shown.handle).max(axis=1).min() < 1e-12  # a link ends at the handle
+    gap = np.abs(shown.segments[:, 1] - shown.segments[:, 0]).max(axis=1)
+    assert gap.max() > 0.05 and len(shown.joints) >= len(arm.names)
+
+
+def test_links_of_a_stick_figure_keep_their_lengths():
+    """Between joints without slides; the five-bar's closing ends meet to 1e-9 m."""
+    for name in NAMES:
+        arm = hc.MjcfArm(name)
+        rng = np.random.default_rng(1)
+        first = None
+        for _ in range(3):
+            shown = arm.mechanism.sticks(arm.q + rng.normal(0.0, 0.05, len(arm.names)))
+            size = np.linalg.norm(np.diff(shown.segments, axis=1)[:, 0], axis=1)
+            first = size if first is None else first
+            np.testing.assert_allclose(size, first, atol=1e-9)
+
+
+@needs_gl
+def test_films_of_arms(record):
+    shots = [x.copy() for x in film.frames(record, FilmOptions(size=(480, 320), speed=0.5))]
+    assert shots[0].shape == (320, 480, 3) and len(shots) >= 5
+    assert (shots[0] != shots[-1]).any(axis=-1).sum() > 100
+    assert (shots[0].astype(int) @ [1, 0, -1] > 90).sum() > 20  # the handle is orange
+
+
+@needs_gl
+def test_a_buzz_is_slowed_and_magnified():
+    law = hc.JointPD((20.0, 10.0), (0.3, 0.1), velocity="difference")
+    run, mode = buzz(hc.MjcfArm("planar_2r"), law, 1e-3, 1e-3)
+    shown, options = buzz_of(run, mode.frequency)
+    assert options.speed == pytest.approx(1.0 / mode.frequency)
+    assert shown.t[-1] == pytest.approx(8.0 / mode.frequency, rel=1e-2)
+    moved = options.magnify * np.abs(shown.q - np.median(shown.q, axis=0)).max()
+    assert moved == pytest.approx(0.25)
+    near, far = (
+        next(film.frames(shown, FilmOptions(plots=False, magnify=x, size=(200, 160)))).copy()
+        for x in (1.0, options.magnify)
+    )
+    assert (near != far).any()
+
+
+def test_a_film_magnifies_arms_from_files_alone(tmp_path):
+    with pytest.raises(hc.ParameterError, match="magnify = 2.0: must be 1 for the arm in closed"):
+        film.stage_of(hc.simulate(hc.constant_cut(t_max=0.01)), FilmOptions(magnify=2.0))
+    s = scenario("five_bar")
+    apart = dataclasses.replace(s.controller, reference=tuple(s.arm.q + (0.01, -0.01)))
+    wide = hc.simulate(dataclasses.replace(s, controller=apart))
+    with pytest.raises(hc.ParameterError, match="magnify .*chains cannot be closed"):
+        film.stage_of(wide, FilmOptions(magnify=100.0))
+
+
+@pytest.mark.parametrize("render", ["held", "physical"])
+def test_clay_in_the_plane_of_an_arm_that_moves_along_three_axes(render):
+    """Figures of clay are those of the plane; what was removed is the path there times the tool."""
+    clay = hc.slab(hc.Flow(Fy=0.5, b=10.0), 0.0005, 0.1)
+    arm = {"plane": "zx", "friction": (0.0,) * 3}
+    record = hc.simulate(scenario("haptic_3", arm=arm, clay=clay, render=render, operator=None))
+    assert {"velocity", "force", "path", "force_velocity"} <= set(record.plot.all())
+    flat = hc.studies.removed(record)[0]
+    assert flat.shape == record.t.shape and flat[-1] > 0.0
+    assert ("x and y", "z and x of the world") in scenario_rows(record.scenario)
+    for axis in "xy":
+        assert record.plot.velocity(axis).axes and record.plot.force(axis).axes
+
+
+def test_what_needs_the_closed_form_says_so(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    s = scenario("planar_2r")
+    s.save("a.toml")
+    dataclasses.replace(s, name="b").save("b.toml")
+    hc.simulate(s).save("record")
+    for words, told in (
+        (["compare", "a.toml", "b.toml"], "hapticclay arm judges arms from files"),
+        (["impedance", "a.toml"], "hapticclay arm judges arms from files"),
+        (["view", "./record"], "hapticclay video films arms from files"),
+        (["view", "a.toml", "--web"], "control"),
+    ):
+        assert main(words) == 2
+        error = capsys.readouterr().err
+        assert told in error and error.count("\n") == 1

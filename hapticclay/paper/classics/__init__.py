@@ -9,9 +9,11 @@ from .classic import Classic
 
 CLASSICS = (  # one module of this folder each, by year
     "niemeyer1991",
+    "lawrence1993",
     "yokokohji1994",
     "colgate1997",
     "hannaford2002",
+    "ryu2004",
     "abbott2005",
     "diolaiti2006",
     "hulin2006",

@@ -12,7 +12,7 @@ from ...scene.link import Link
 from ...studies.chart import Chart, curve
 from ..ledger import Row, row
 from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Progress, holds
-from .sampled_pair import follower_wave, free_run, leader_wave, wave_ends
+from .sampled_pair import Seen, follower_wave, free_run, leader_wave, wave_ends
 from .yokokohji1994 import KD, TS, sampled
 
 DELAYS, QUICK_DELAYS = (1, 50, 500, 3000), (1, 500)  # samples, one way
@@ -86,8 +86,8 @@ def felt(b: float) -> np.ndarray:
     there, back = deque([0.0] * ONE_WAY), deque([0.0] * ONE_WAY)
     out = []
     for _ in range(ROUND_TRIPS * 2 * ONE_WAY):
-        force, u = leader(0.0, SPEED, 0.0, back.popleft())
-        _, w = follower(0.0, 0.0, 0.0, there.popleft())
+        force, u = leader(Seen(0.0, SPEED, 0.0, 0.0), back.popleft())
+        _, w = follower(Seen(0.0, 0.0, 0.0, 0.0), there.popleft())
         there.append(u)
         back.append(w)
         out.append(-force)
@@ -285,8 +285,8 @@ CLASSIC = Classic(
     "The abstract of 2004 could be read (ijrr.org): passive transmission guarantees stability at "
     "unknown but constant delays of up to several seconds, while wave reflections may interfere. "
     "The articles could not. The wave transformation, u = (b v + F)/sqrt(2 b) and w = (b v - F)/"
-    "sqrt(2 b), is stated in many places; what follows from it is derived here, and so are the "
-    "numbers. The pair is that of yokokohji1994.",
+    "sqrt(2 b), is stated in many places; what follows from it is derived in equations.md, section "
+    "8, and the numbers are ours. The pair is that of yokokohji1994.",
     "Runs from sample to sample at 1 kHz: the arms move exactly under held forces, messages wait "
     "in a queue. The energy of a link is summed up at its ends, force by speed.",
     make,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,17 @@ from ...scene.pair import Contact, Pair
 
 SETTLED = 120.0  # [s] of a run whose growth is measured, in its last half
 
-# From (x, v, F, what arrived) to (force, message); F is the force on what the arm carries.
-End = Callable[[float, float, float, Any], tuple[float, Any]]
+
+class Seen(NamedTuple):
+    """What a host measures at a sample; `F` is the force on what the arm carries [N]."""
+
+    x: float
+    v: float
+    a: float
+    F: float
+
+
+End = Callable[[Seen, Any], tuple[float, Any]]  # to (force, message)
 
 
 class HeldArm:
@@ -25,7 +34,7 @@ class HeldArm:
     Attributes:
         x: position [m].
         v: rate [m/s].
-        felt: force on the load at the sample, just before the new force acts [N].
+        a: acceleration at the sample, just before the new force acts [m/s^2].
     """
 
     def __init__(self, arm: tuple[float, float], load: tuple[float, float, float], Ts: float):
@@ -35,23 +44,27 @@ class HeldArm:
         whole[1] /= self.m
         step = matrix_exponential(whole * Ts)
         (self.xx, self.xv, self.xf), (self.vx, self.vv, self.vf) = step[:2].tolist()
-        self.x = self.v = self.felt = 0.0
+        self.x = self.v = self.a = 0.0
 
     def step(self, force: float) -> None:
         """Moves over a sample."""
         x, v = self.x, self.v
         self.x = self.xx * x + self.xv * v + self.xf * force
         self.v = self.vx * x + self.vv * v + self.vf * force
-        self._feel(force)
+        self._accelerate(force)
 
     def let_go(self, x: float) -> None:
         """Places it at rest, under no force."""
         self.x, self.v = x, 0.0
-        self._feel(0.0)
+        self._accelerate(0.0)
 
-    def _feel(self, force: float) -> None:
-        a = (force - self.b * self.v - self.k * self.x) / self.m
-        self.felt = self.load[0] * a + self.load[1] * self.v + self.load[2] * self.x
+    def seen(self) -> Seen:
+        """What its host measures."""
+        m, b, k = self.load
+        return Seen(self.x, self.v, self.a, m * self.a + b * self.v + k * self.x)
+
+    def _accelerate(self, force: float) -> None:
+        self.a = (force - self.b * self.v - self.k * self.x) / self.m
 
 
 def arms_of(pair: Pair) -> tuple[HeldArm, HeldArm]:
@@ -66,22 +79,21 @@ def arms_of(pair: Pair) -> tuple[HeldArm, HeldArm]:
 
 
 def ends_of(pair: Pair) -> tuple[End, End]:
-    """What both hosts compute; a message is (x, v, F), or a wave."""
+    """What both hosts compute; a message is what was seen, or a wave."""
     Kp, Kd, kind = pair.law.Kp[0], pair.law.Kd[0], pair.link.kind
     if kind == "waves":
         b = pair.link.impedance
         return wave_ends(Kp, Kd, float(b) if isinstance(b, (int, float)) else Kd, pair.Ts)
 
-    def led(x: float, v: float, arrived: tuple[float, float, float]) -> float:
-        return Kp * (arrived[0] - x) + Kd * (arrived[1] - v)
+    def led(own: Seen, other: Seen) -> float:
+        return Kp * (other.x - own.x) + Kd * (other.v - own.v)
 
-    def leader(x, v, F, arrived):
-        force = led(x, v, arrived) if kind != "position-force" else 0.0
-        return force - (arrived[2] if kind != "position-position" else 0.0), (x, v, F)
+    def leader(own: Seen, other: Seen) -> tuple[float, Seen]:
+        force = led(own, other) if kind != "position-force" else 0.0
+        return force - (other.F if kind != "position-position" else 0.0), own
 
-    def follower(x, v, F, arrived):
-        pushed = arrived[2] if kind == "four-channel" else 0.0
-        return led(x, v, arrived) - pushed, (x, v, F)
+    def follower(own: Seen, other: Seen) -> tuple[float, Seen]:
+        return led(own, other) - (other.F if kind == "four-channel" else 0.0), own
 
     return leader, follower
 
@@ -102,13 +114,13 @@ def wave_ends(Kp: float, Kd: float, b: float, Ts: float) -> tuple[End, End]:
     """Both ends of a link that carries waves; the follower's law is behind them."""
     desired = 0.0
 
-    def leader(x, v, F, w):
-        force, u = leader_wave(b, v, w)
+    def leader(own: Seen, w: float) -> tuple[float, float]:
+        force, u = leader_wave(b, own.v, w)
         return -force, u
 
-    def follower(x, v, F, u):
+    def follower(own: Seen, u: float) -> tuple[float, float]:
         nonlocal desired
-        force = Kp * (desired - x) + Kd * (math.sqrt(2.0 / b) * u - v)
+        force = Kp * (desired - own.x) + Kd * (math.sqrt(2.0 / b) * u - own.v)
         force /= 1.0 + Kd / b
         rate, w = follower_wave(b, force, u)
         desired += Ts * rate
@@ -117,13 +129,18 @@ def wave_ends(Kp: float, Kd: float, b: float, Ts: float) -> tuple[End, End]:
     return leader, follower
 
 
-def free_run(pair: Pair, delay: int, samples: int) -> np.ndarray:
+def free_run(
+    pair: Pair, delay: int, samples: int, ends: tuple[End, End] | None = None
+) -> np.ndarray:
     """Positions of leader and follower after the leader is let go, shape (samples, 2).
 
-    delay: one way, in samples, one at least.
+    delay: one way, in samples, one at least. ends: other ones than those of the pair's link, with
+    messages of what was seen.
     """
-    arms, ends = arms_of(pair), ends_of(pair)
-    first: Any = 0.0 if pair.link.kind == "waves" else (0.0,) * 3
+    arms = arms_of(pair)
+    waves = ends is None and pair.link.kind == "waves"
+    ends = ends or ends_of(pair)
+    first: Any = 0.0 if waves else Seen(0.0, 0.0, 0.0, 0.0)
     there, back = deque([first] * delay), deque([first] * delay)
     arms[0].let_go(1.0)
     out = []
@@ -131,22 +148,26 @@ def free_run(pair: Pair, delay: int, samples: int) -> np.ndarray:
         out.append((arms[0].x, arms[1].x))
         arrived = back.popleft(), there.popleft()
         for arm, end, message, line in zip(arms, ends, arrived, (there, back), strict=True):
-            force, sent = end(arm.x, arm.v, arm.felt, message)
+            force, sent = end(arm.seen(), message)
             line.append(sent)
             arm.step(force)
     return np.array(out)
 
 
-def growth(pair: Pair, delay: int) -> float:
-    """Rate at which a run grows in the end [1/s]."""
-    x = free_run(pair, delay, round(SETTLED / pair.Ts))
+def growth(
+    pair: Pair, delay: int, settled: float = SETTLED, ends: tuple[End, End] | None = None
+) -> float:
+    """Rate at which a run grows in the last half of a time [1/s]."""
+    x = free_run(pair, delay, round(settled / pair.Ts), ends)
     quarter = len(x) // 4
     before, after = (float(np.sum(x[i * quarter : (i + 1) * quarter] ** 2)) for i in (2, 3))
     return 0.5 * math.log(after / before) / (quarter * pair.Ts)
 
 
-def delay_limit(pair: Pair, near: float) -> float:
+def delay_limit(
+    pair: Pair, near: float, settled: float = SETTLED, ends: tuple[End, End] | None = None
+) -> float:
     """One-way delay at which runs neither grow nor decay [s]: on a line over whole samples."""
-    low = math.floor(near / pair.Ts) - 1
-    rates = [growth(pair, low), growth(pair, low + 3)]
+    low = max(1, math.floor(near / pair.Ts) - 1)
+    rates = [growth(pair, each, settled, ends) for each in (low, low + 3)]
     return pair.Ts * (low + 3.0 * rates[0] / (rates[0] - rates[1]))

@@ -5,8 +5,8 @@
 
 F is the measured torque of an arm on what it carries, at the leader the hand: -F_l is what the hand
 pushes with. Lawrence, Stability and Transparency in Bilateral Teleoperation, IEEE Trans. Robotics
-and Automation 9(5), 1993, with C2 = C3 = 1 and C1 = Cs, C4 = -Cm, without accelerations and local
-force feedback.
+and Automation 9(5), 1993, with C2 = C3 = 1 and C1 = Cs, C4 = -Cm, without accelerations; local
+force feedback C5, C6 as given.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from ...scene.pair import Pair
 from .control import Control, without_states
-from .position_force import reflected
+from .position_force import local_forces, reflected
 from .position_position import references
 
 
@@ -25,5 +25,6 @@ def controls(pair: Pair) -> tuple[Control, Control]:
     one = np.eye(pair.n)
     pushed = np.zeros((pair.n, 3 * pair.n))
     pushed[:, 2 * pair.n :] = -pair.mapping / pair.link.scale[1]
-    leader = without_states(one, to_follower + pushed)
-    return leader, without_states(one, to_leader + reflected(pair))
+    own = local_forces(pair)
+    leader = without_states(one, to_follower + pushed, own[0])
+    return leader, without_states(one, to_leader + reflected(pair), own[1])

@@ -2,7 +2,8 @@
 
     tau_l = -phi T' F_f,  tau_f = Kp (mu T q_l - q_f) + Kd (mu T w_l - w_f)
 
-F_f is the measured torque of the follower on what it touches, phi scales force. The leader has no
+With local force gains g, each arm gets -g F of its own besides. F_f is the measured torque of the
+follower on what it touches, phi scales force. The leader has no
 law of its own: its gains take no part. After Lawrence, Stability and Transparency in Bilateral
 Teleoperation, IEEE Trans. Robotics and Automation 9(5), 1993: the two-channel case C1, C2.
 """
@@ -18,8 +19,16 @@ from .position_position import references
 
 def controls(pair: Pair) -> tuple[Control, Control]:
     """Controls of leader and follower."""
-    one = np.eye(pair.n)
-    return without_states(one, references(pair)[0]), without_states(one, reflected(pair))
+    one, (leader, follower) = np.eye(pair.n), local_forces(pair)
+    there = without_states(one, references(pair)[0], leader)
+    return there, without_states(one, reflected(pair), follower)
+
+
+def local_forces(pair: Pair) -> tuple[np.ndarray, np.ndarray]:
+    """Torque of each arm per its own (q, v, F): C6 and C5 of Lawrence."""
+    none, one = np.zeros((pair.n, 2 * pair.n)), np.eye(pair.n)
+    leader, follower = pair.link.local_force
+    return np.hstack([none, -leader * one]), np.hstack([none, -follower * one])
 
 
 def reflected(pair: Pair) -> np.ndarray:

@@ -1,0 +1,80 @@
+"""A kick of an arm on the engine's terms, under torques that the motors hold."""
+
+from . import joint_friction, joints, kick
+
+
+def move_under(m, s, k):
+    """Motion in a kick under torques of the motors."""
+    kick.load(m, s, k)
+    for i in range(m.axes):
+        k.axis[i].f += m.weight[i]
+    put_momentum(m, s, k)
+    joints.factor_inertia(m, k.H * k.R)
+    if m.acts or is_touched(m, k):
+        joints.put_mobility(m, k)
+        drive(m, s, k)
+    else:
+        drive_alone(m, k)
+
+
+def put_momentum(m, s, k):
+    """Momentum after a kick without friction, and without force at the handle, by joints."""
+    e, n = m.engine, m.joints
+    for i in range(n):
+        x = k.H * (
+            k.tau[i]
+            - e.joint_bias[i]
+            + m.pull[i]
+            - m.spring[i] * s.q[i]
+            - k.L * joints.damping(m, k.o, i)
+        )
+        for j in range(n):
+            x += e.joint_M[i * n + j] * k.o[j]
+        e.moment[i] = x
+
+
+def is_touched(m, k):
+    """Whether the handle has a load that is not that of clay."""
+    load = 0.0
+    for i in range(m.axes):
+        load += abs(k.axis[i].f) + k.axis[i].d
+    return load > 0.0
+
+
+def drive_alone(m, k):
+    """Motion where nothing acts on the handle."""
+    e, n = m.engine, m.joints
+    for i in range(m.axes):
+        o = k.axis[i]
+        o.net = o.fe = 0.0
+    if m.friction:
+        joint_friction.find(m, k)
+    for i in range(n):
+        e.free[i] = e.moment[i] + k.H * k.slip[i]
+    joints.solve(e.lower, 0, e.free, 0, n)
+    joints.put_rates_after(m, k)
+    for i in range(m.axes):
+        o = k.axis[i]
+        o.u = 0.0
+        for j in range(n):
+            o.u += e.joint_J[i * n + j] * k.w[j]
+
+
+def drive(m, s, k):
+    """Motion where something acts on the handle: by the law of the plane."""
+    e, n = m.engine, m.joints
+    if m.friction:
+        joint_friction.find(m, k)
+    for i in range(n):
+        e.free[i] = e.moment[i] + k.H * k.slip[i]
+    joints.solve(e.lower, 0, e.free, 0, n)
+    rate = 1.0 / k.H
+    for i in range(m.axes):
+        o, x = k.axis[i], 0.0
+        for j in range(n):
+            x += e.joint_J[i * n + j] * e.free[j]
+        o.n, o.a, o.rest = rate, rate * x, rate * (x - o.v)
+    k.Sxx, k.Sxy, k.Syy = k.Wxx, k.Wxy, k.Wyy
+    if m.axes > 2:
+        joints.eliminate(k, k.z.d)
+    kick.move(m, s, k)
