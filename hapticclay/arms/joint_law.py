@@ -107,6 +107,16 @@ class JointPD:
         return cls(**{**gain_files.read_gains(file), **changes})
 
 
+def rate_filter(cutoff: float | None, Ts: float) -> tuple[float, float]:
+    """keep and gain of the estimated rate, v_k = keep v_k-1 + gain (q_k - q_k-1).
+
+    cutoff: of the low-pass behind the difference [rad/s]; None for none.
+    """
+    if cutoff is None:
+        return 0.0, 1.0 / Ts
+    return 1.0 / (1.0 + cutoff * Ts), cutoff / (1.0 + cutoff * Ts)
+
+
 def checked_law(law: JointPD, names: Sequence[str]) -> JointPD:
     """The law of an arm's joints.
 

@@ -143,6 +143,8 @@ def run_table(record: Record, paced: bool = False) -> str:
         ways = "y"
     pieces = [(way, piece[way]) for way in ways for piece in record.regions(way)]
     lines = [] if s.is_closed_form else [_joint_table(record), ""]
+    if s.axes[:2] != AXES and s.clay is not None:
+        lines += [f"x and y of the clay: {' and '.join(s.axes[:2])} of the world", ""]
     if s.is_closed_form or s.clay is not None:
         lines += [_stretch_table(s.clay, pieces[:MOST_ROWS]), ""]
     if len(pieces) > MOST_ROWS and (s.is_closed_form or s.clay is not None):

@@ -73,13 +73,29 @@ class Chosen:
     rows_kept: np.ndarray
     notes: tuple[str, ...]
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.table, name)
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.table.path
+
+    @property
+    def heads(self) -> Sequence[Head]:
+        """Names and units of the columns."""
+        return self.table.heads
+
+    @property
+    def form(self) -> str:
+        """The format, in words."""
+        return self.table.form
 
     @property
     def rows(self) -> int:
         """Number of rows."""
         return len(self.rows_kept)
+
+    def refusal(self, bound: str) -> ParameterError:
+        """An error that names the file."""
+        return self.table.refusal(bound)
 
     def numbers(self, place: int) -> np.ndarray:
         """A column of finite numbers, (n,)."""
@@ -141,7 +157,7 @@ def columns_of_array(name: str, x: np.ndarray, n: int, parts: Sequence[str] = ()
 
 def lengths(x: np.ndarray) -> list[int]:
     """Numbers of rows that an array can have."""
-    shape = x.squeeze().shape
+    shape = list(x.squeeze().shape)
     if len(shape) == 2 and min(shape) <= MOST_PARTS:
         return [max(shape)]
     return [shape[0]] if shape and len(shape) < 3 else []

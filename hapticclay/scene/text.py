@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..display import one_line
+from ..model.constants import AXES
 from ..model.hardware import hardware_words
 
 if TYPE_CHECKING:
@@ -35,6 +36,8 @@ def scenario_rows(scenario: Any) -> list[tuple[str, str]]:
     defaults = {f: type(s).__dataclass_fields__[f].default for f in ("arm", "servo", "compensator")}
     if not s.is_closed_form:
         rows.insert(0, ("arm", one_line(f"{s.arm.name}: {', '.join(s.arm.names)}")))
+        if s.axes[:2] != AXES:
+            rows.insert(1, ("x and y", f"{' and '.join(s.axes[:2])} of the world"))
         del defaults["arm"]
     replaced = [name for name, default in defaults.items() if getattr(s, name) != default]
     if replaced:

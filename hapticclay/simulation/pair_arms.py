@@ -63,7 +63,7 @@ def _driven(arm: MjcfArm, drive: JointPD) -> MjcfArm:
             bound = "must have no spring where its drive runs the law"
             raise ParameterError("joint", name, bound)
         joint.stiffness, joint.springref = [Kp, 0.0, 0.0], float(q)
-    damping = dict(zip(arm.names, np.add(arm.damping, drive.Kd).tolist(), strict=True))
+    damping = dict(zip(arm.names, np.add(np.array(arm.damping), drive.Kd).tolist(), strict=True))
     of_arm = {name: getattr(arm, name) for name in ("armature", "friction")}
     per_joint = {k: dict(zip(arm.names, x, strict=True)) for k, x in of_arm.items()}
     own: Any = {"site": arm.site, "joints": arm.names, "pose": dict(arm.pose)}  # type: ignore[arg-type]

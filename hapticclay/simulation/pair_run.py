@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..arms.joint_law import JointPD
+from ..arms.joint_law import rate_filter
 from ..errors import Bound, ParameterError
 from ..model.shapes import Pulse
 from ..model.signals import Signal
@@ -182,7 +182,7 @@ class _Host:
         """The measured rate, as the law estimates it."""
         if self.law.velocity == "exact":
             return qd
-        keep, gain = rate_filter(self.law, self.pair.Ts)
+        keep, gain = rate_filter(self.law.cutoff, self.pair.Ts)
         self.rate = keep * self.rate + gain * (q - self.last_q)
         self.last_q = q
         return self.rate
@@ -211,13 +211,6 @@ class _Host:
             rate = moved / self.run.scenario.dt
             out += (np.array(self.law.Kp) * middle + np.array(self.law.Kd) * rate) @ moved
         return float(out)
-
-
-def rate_filter(law: JointPD, Ts: float) -> tuple[float, float]:
-    """v_k = keep v_k-1 + gain (q_k - q_k-1)."""
-    if law.cutoff is None:
-        return 0.0, 1.0 / Ts
-    return 1.0 / (1.0 + law.cutoff * Ts), law.cutoff / (1.0 + law.cutoff * Ts)
 
 
 class _Run:
@@ -257,7 +250,8 @@ class _Run:
                 break
         columns = [np.array(x) for x in zip(*self.rows, strict=True)]
         names = pairs.joint_names(self.pair.leader)
-        return PairRecord(self.pair.link.kind, names, *columns, ended)
+        fields: Any = self.pair.link.kind, names, *columns, ended
+        return PairRecord(*fields)
 
     def _sample(self, step: int, energy: float) -> None:
         """Both hosts measure, compute and send."""
@@ -308,7 +302,7 @@ class _Run:
     def _advanced(self, host: _Host) -> float:
         """Makes a step of an arm; the energy that controllers took from it [J]."""
         before = host.run.state.q
-        host.run.step(torque=host.torque)
+        host.run.step(torque=host.torque.tolist())
         return host.taken(before, host.run.state.q, host.weight)
 
     def _ended(self) -> str:

@@ -511,6 +511,15 @@ def _mean_and_std(x: np.ndarray) -> dict[str, float] | None:
     return {"mean": float(np.mean(x)), "std": float(np.std(x))} if len(x) else None
 
 
+def in_plane(record: Record) -> Record:
+    """The record along the two axes in which clay and forces lie."""
+    if record.p.shape[1] == len(AXES):
+        return record
+    names = ("p", "v", "fh", "fe", "b", "delta")
+    arrays: Any = {name: getattr(record, name)[:, : len(AXES)] for name in names}
+    return dataclasses.replace(record, **arrays)
+
+
 @checked
 def port_energy(record: Record) -> np.ndarray:
     """Energy that the hand has put into the handle along each axis.

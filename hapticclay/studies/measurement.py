@@ -169,10 +169,8 @@ def measured(log: Log, names: Mapping[str, str], between: Between = "spline") ->
         cells["output"] = raw * log.size(log.place(names["output"]), UNITS["output"])[0]
         notes.append(wrap_note(turn, at, cells["t"]))
     made = even_columns(cells, between)
-    notes += made.notes
-    return Measurement(
-        **made.columns, name=log.path.name, notes=tuple(notes), rotary=_is_rotary(log, names)
-    )
+    given: dict[str, Any] = {**made.columns, "notes": (*notes, *made.notes)}
+    return Measurement(**given, name=log.path.name, rotary=_is_rotary(log, names))
 
 
 def _is_rotary(log: Log, names: Mapping[str, str]) -> bool:

@@ -18,7 +18,7 @@ from ..errors import ParameterError, number
 from ..model.clay import Clay, extent
 from ..model.tool import Tool
 from ..scene.scenario import Scenario
-from ..simulation.record import Record
+from ..simulation.record import Record, in_plane
 
 CELL_SIZE = 2e-3  # [m] largest cell of a picture's map
 PICTURE_CELLS, VOLUME_CELLS = 10, 32  # least number of cells in the tool's width
@@ -154,6 +154,7 @@ def removed(
         depth: depth of the cut [m]; not used in clay that stays cut.
         cell: largest cell of the map [m]; None for 1/32 of the width, which the accuracy requires.
     """
+    record = in_plane(record)
     p = record.p
     tool = Tool(width, depth)
     volume, rate = np.zeros(len(p)), np.zeros(len(p))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import ParameterError, choice
 from ..model.constants import AXES
-from ..simulation.record import Record
+from ..simulation.record import Record, in_plane
 from .outliers import Cleaned, robust_deviation, runs_of
 from .trajectory import (
     LEAST_PER_KNOT,
@@ -78,6 +78,7 @@ def recorded_motion(r: Record, axis: str | None) -> tuple[str, Any, Any, Any, An
     if axis == "path" and not all(x.along_motion for x in yielding):
         raise ParameterError("axis", axis, "must be x or y in clay whose axes yield by themselves")
     index = AXES.index(axis) if axis in AXES else 0
+    r = in_plane(r)
     law, places = clay.laws[index], tuple(r.p.T)
     at = law.index(*places)
     inside = law.some[at]

@@ -16,6 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..arms import joint_law
 from ..errors import ParameterError
 from . import linear_loop
 
@@ -125,9 +126,7 @@ class JointLoop:
     @property
     def rate_filter(self) -> tuple[float, float]:
         """v_k = keep v_k-1 + gain (q_k - q_k-1)."""
-        if self.cutoff is None:
-            return 0.0, 1.0 / self.Ts
-        return 1.0 / (1.0 + self.cutoff * self.Ts), self.cutoff / (1.0 + self.cutoff * self.Ts)
+        return joint_law.rate_filter(self.cutoff, self.Ts)
 
     @cached_property
     def structural(self) -> int:

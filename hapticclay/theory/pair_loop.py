@@ -56,14 +56,13 @@ class PairLoop:
     @property
     def samples_late(self) -> int:
         """Whole samples around the loop."""
-        return self.there + self.back + self.leader.received.late[0]
+        return int(self.there + self.back) + self.leader.received.late[0]
 
     @property
     def states(self) -> int:
         """Order of the map."""
-        return (
-            sum(end.states for end in self.ends) + (self.there + self.back) * self.leader.messages
-        )
+        on_the_way = int(self.there + self.back) * self.leader.messages
+        return sum(end.states for end in self.ends) + on_the_way
 
     # ---- the map
 
@@ -81,8 +80,9 @@ class PairLoop:
         for end in self.ends:
             sides.append(_Side(end, unit[at : at + end.states]))
             at += end.states
-        there = unit[at : at + self.there * m].reshape(self.there, m, self.states)
-        back = unit[at + self.there * m :].reshape(self.back, m, self.states)
+        going, coming = int(self.there), int(self.back)
+        there = unit[at : at + going * m].reshape(going, m, self.states)
+        back = unit[at + going * m :].reshape(coming, m, self.states)
         arrived = self._arrived(sides, there, back)
         sent = [side.message(r) for side, r in zip(sides, arrived, strict=True)]
         rows = [side.next(r) for side, r in zip(sides, arrived, strict=True)]
@@ -238,15 +238,6 @@ class PairLoop:
         Y = columns[:, None] * np.linalg.lstsq(whole, rows[:, None] * pushed, rcond=FREE)[0]
         v = self.leader.columns["v"], self.follower.columns["v"]
         return np.vstack([Y[v[0]], Y[self.leader.size :][v[1]]])
-
-    @cached_property
-    def _inputs(self) -> np.ndarray:
-        size = sum(end.size for end in self.ends) + 2 * self.leader.messages
-        out, n = np.zeros((size, self.n)), self.leader.n
-        for i, end in enumerate(self.ends):
-            at = i * self.leader.size
-            out[at : at + end.size, i * n : i * n + end.n] = end.inputs[:, : end.n]
-        return out
 
     # ---- on the unit circle
 

@@ -333,7 +333,8 @@ class Study:
     def _is_stable(self, loop: PairLoop) -> bool:
         if loop.states <= LARGE:
             return loop.stable()
-        least = self.build.loop((loop.follower.share, loop.leader.share), friction=(0.0, 0.0))
+        none = np.zeros(self.pair.n)
+        least = self.build.loop((loop.follower.share, loop.leader.share), friction=(none, none))
         return Delays(least).count(loop.there + loop.back) == 0
 
     # ---- where the time goes

@@ -111,7 +111,8 @@ def arm_path_plot(record: Record) -> Figure:
     half = (0.5 + MARGIN) * max(float((high - low).max()), 1e-6)
     middle = 0.5 * (low + high)
     unit, scale = length_unit(2.0 * half)
-    size = map_size(6.4, 1.0, 1.0) if len(views) == 1 else figure_size(2, 4.4)
+    wide = figure_size(2, 1.0)
+    size = map_size(6.4, 1.0, 1.0) if len(views) == 1 else (wide[0], 0.42 * wide[0] + 0.6 * wide[1])
     figure = Figure(figsize=size)
     panels = figure.subplots(1, len(views), squeeze=False)[0]
     for ax, (i, j) in zip(panels, views, strict=True):

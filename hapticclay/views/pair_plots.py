@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -69,7 +70,7 @@ def map_plot(found: PairMap) -> Figure:
     ax.fill_between(found.gains, shown, 10.0 * late[-1], color=PALE_GREY, zorder=0)
     ax.plot(found.gains, shown, color=BLUE, label="largest delay")
     gain, delay = np.meshgrid(found.gains, late, indexing="ij")
-    look = dict(ls="none", color=MID_GREY, ms=stroke(3.5), mew=stroke(0.8))
+    look: Any = dict(ls="none", color=MID_GREY, ms=stroke(3.5), mew=stroke(0.8))
     for name, marker, cells in (
         ("unstable", "x", found.unstable > 0),
         ("stable", ".", found.unstable == 0),

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from ..arguments import checked
 from ..errors import ParameterError
-from ..simulation.record import Record, port_energy
+from ..simulation.record import Record, in_plane, port_energy
 from . import arm_plots, path_plots, run_axes, run_figures, run_plots
 from .palette import BLUE, GREEN, ORANGE, PURPLE, VERMILION
 from .panels import add_legend, set_title, single
@@ -54,7 +54,7 @@ class RecordPlots:
     @checked
     def velocity(self, axis: Literal["x", "y", "xy"] | None = None) -> Figure:
         """Velocity over position, with the expected steady speeds (Fig. 8, top; Fig. 10)."""
-        record = self._sampled()
+        record = in_plane(self._sampled())
         axes = axis or run_figures.shown_axes(record.scenario)
         return _with_picture(run_plots.velocity_plot(record, axes))
 
@@ -69,7 +69,7 @@ class RecordPlots:
         In a maneuver, in clay that is not viscous, and if `over` is given, it shows the forces
         (Fig. 11).
         """
-        record = self._sampled()
+        record = in_plane(self._sampled())
         s = record.scenario
         along = axis or run_axes.main_axis(s)
         if over or s.muscle is not None or (s.clay and not s.clay.viscous):

@@ -14,7 +14,7 @@ from ..model.cells import Profile
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
 from ..simulation.columns import COLUMNS, parts_of
-from ..simulation.record import Record
+from ..simulation.record import Record, in_plane
 from . import figure as shown
 from .arm_plots import arm_path_plot, handle_plot, joints_plot
 from .flow_plots import force_velocity_plot
@@ -51,7 +51,7 @@ def _velocity(record: Record) -> Figure | None:
         return None
     if s.muscle is not None and s.clay is None:
         return None
-    return velocity_plot(record, shown_axes(s))
+    return velocity_plot(in_plane(record), shown_axes(s))
 
 
 def _force(record: Record) -> Figure | None:
@@ -59,8 +59,8 @@ def _force(record: Record) -> Figure | None:
     if _bare(s):
         return None
     if s.muscle is not None or not is_viscous(s):
-        return maneuver_plot([record], main_axis(s))
-    return None if _clay_along_both_axes(s) else force_ratio_plot(record, main_axis(s))
+        return maneuver_plot([in_plane(record)], main_axis(s))
+    return None if _clay_along_both_axes(s) else force_ratio_plot(in_plane(record), main_axis(s))
 
 
 def _path(record: Record) -> Figure | None:
@@ -77,13 +77,13 @@ def _path(record: Record) -> Figure | None:
 def _force_position(record: Record) -> Figure | None:
     s = record.scenario
     applies = (s.muscle is not None or record.ground is not None) and not _bare(s)
-    return maneuver_plot([record], main_axis(s), "position") if applies else None
+    return maneuver_plot([in_plane(record)], main_axis(s), "position") if applies else None
 
 
 def _force_velocity(record: Record) -> Figure | None:
     clay = record.scenario.clay
     applies = clay is not None and clay.of_velocity and not clay.viscous
-    return force_velocity_plot(record) if applies and len(record.t) else None
+    return force_velocity_plot(in_plane(record)) if applies and len(record.t) else None
 
 
 def _ground(record: Record) -> Figure | None:

@@ -7,6 +7,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.cli.app import main
+from hapticclay.scene.text import scenario_rows
 from hapticclay.studies.joint_runs import buzz
 from hapticclay.views import film, record_plots, run_figures
 from hapticclay.views.buzz_film import buzz_of
@@ -169,3 +170,34 @@ def test_a_film_magnifies_arms_from_files_alone(tmp_path):
     wide = hc.simulate(dataclasses.replace(s, controller=apart))
     with pytest.raises(hc.ParameterError, match="magnify .*chains cannot be closed"):
         film.stage_of(wide, FilmOptions(magnify=100.0))
+
+
+@pytest.mark.parametrize("render", ["held", "physical"])
+def test_clay_in_the_plane_of_an_arm_that_moves_along_three_axes(render):
+    """Figures of clay are those of the plane; what was removed is the path there times the tool."""
+    clay = hc.slab(hc.Flow(Fy=0.5, b=10.0), 0.0005, 0.1)
+    arm = {"plane": "zx", "friction": (0.0,) * 3}
+    record = hc.simulate(scenario("haptic_3", arm=arm, clay=clay, render=render, operator=None))
+    assert {"velocity", "force", "path", "force_velocity"} <= set(record.plot.all())
+    flat = hc.studies.removed(record)[0]
+    assert flat.shape == record.t.shape and flat[-1] > 0.0
+    assert ("x and y", "z and x of the world") in scenario_rows(record.scenario)
+    for axis in "xy":
+        assert record.plot.velocity(axis).axes and record.plot.force(axis).axes
+
+
+def test_what_needs_the_closed_form_says_so(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    s = scenario("planar_2r")
+    s.save("a.toml")
+    dataclasses.replace(s, name="b").save("b.toml")
+    hc.simulate(s).save("record")
+    for words, told in (
+        (["compare", "a.toml", "b.toml"], "hapticclay arm judges arms from files"),
+        (["impedance", "a.toml"], "hapticclay arm judges arms from files"),
+        (["view", "./record"], "hapticclay video films arms from files"),
+        (["view", "a.toml", "--web"], "control"),
+    ):
+        assert main(words) == 2
+        error = capsys.readouterr().err
+        assert told in error and error.count("\n") == 1
