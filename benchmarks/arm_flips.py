@@ -1,7 +1,8 @@
 """Limits of an arm by theory, and by runs half a percent on either side of each.
 
-    python -m benchmarks.arm_flips leader_7 --Kp 240 240 240 240 24 31 25 --Kd 3 3 3 3 .2 .2 .2 \\
-        --rate 500 --delay 2e-3 --cutoff 90
+    python -m benchmarks.arm_flips [arm.xml --Kp 20 20 --Kd 1 1 --rate 1000 --delay 1e-3 --wall 5]
+
+By default the leader of mjcf/arms under its gains.
 
 A run begins a microradian off, or under 0.1 mN, so that it stays linear; it grows if the third
 differences of its joints from sample to sample do, which hardly see slow motion, in its last
@@ -13,7 +14,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -21,6 +22,10 @@ import numpy as np
 
 import hapticclay as hc
 
+LEADER = (
+    "leader_7 --Kp 240 240 240 240 24 31 25 --Kd 3 3 3 3 .2 .2 .2 --rate 500 --delay 2e-3 "
+    "--cutoff 90 --wall 5"
+)
 SHARE = 5e-3
 OFF = 1e-6  # [rad]
 PUSH = 1e-4  # [N]
@@ -30,14 +35,14 @@ HAND = hc.Operator(0.25, 2.0, 6.0)
 
 def growth(scenario: hc.Scenario) -> float:
     """Growth of the motion in a run [1/s]."""
-    r = hc.simulate(scenario)
-    steps = np.diff(r.q[:: round(scenario.Ts / scenario.dt)], n=3, axis=0)
+    r, Ts = hc.simulate(scenario), scenario.Ts or scenario.dt
+    steps = np.diff(r.q[:: round(Ts / scenario.dt)], n=3, axis=0)
     n = len(steps) // 4
     smooth = np.hanning(n)[:, None]  # that the phase at the ends of a quarter does not count
     before, after = (
         np.sqrt((smooth * x**2).sum()) for x in (steps[2 * n : 3 * n], steps[3 * n : 4 * n])
     )
-    return math.log(after / before) / (n * scenario.Ts)
+    return math.log(after / before) / (n * Ts)
 
 
 def free_run(
@@ -45,7 +50,7 @@ def free_run(
 ) -> hc.Scenario:
     """A run a little off its reference."""
     law = replace(law, reference=tuple(arm.q + OFF))
-    common = dict(force=(0.0, 0.0), t_max=SECONDS, stop_when_unstable=False, dt=Ts)
+    common: dict[str, Any] = dict(force=(0.0, 0.0), t_max=SECONDS, stop_when_unstable=False, dt=Ts)
     io = hc.Hardware(delay=delay) if delay else None
     return hc.Scenario(arm=arm, controller=law, Ts=Ts, hardware=io, **(common | changes))
 
@@ -129,7 +134,8 @@ def wall_flips(
     **changes: Any,
 ) -> Iterator[tuple[str, float, float, float]]:
     """As `flips`, of the stiffest wall along each axis of the handle."""
-    for axis in arm.axes:
+    axes: Any = arm.axes
+    for axis in axes:
         K = hc.theory.wall_limit(arm, axis, B, hand, Ts, delay, velocity).K
         if math.isfinite(K) and K > 0.0:
             runs = (wall_run(arm, axis, K * (1.0 + x), B, hand, Ts, delay, velocity, **changes)
@@ -138,7 +144,7 @@ def wall_flips(
             yield f"wall along {axis}", K, inside, outside
 
 
-def main(given: list[str]) -> int:
+def main(given: Sequence[str]) -> int:
     """Prints the table; 1 if a run is not on the side where theory says."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("arm")
@@ -174,4 +180,4 @@ def main(given: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main(sys.argv[1:] or [*LEADER.split()]))

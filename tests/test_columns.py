@@ -123,6 +123,9 @@ BAD = {
     "points and commas": (changed("0,75;1;2", 4, separator=";"), "not both"),
     "thousands": (changed("0.75;1.234,5;2", 4, separator=";"), "'1.234,5'"),
     "a name twice": (table(np.column_stack((NUMBERS, LOGS)), (*HEAD, "x")).encode(), "once"),
+    "an object of JSON": (b'{"t": [0, 1], "x": [1, 2]}', "JSON is not read"),
+    "objects of JSON": (b'[\n {"t": 0, "x": 1}]', "JSON is not read"),
+    "lines of JSON": (b'{"t": 0, "x": 1}\n{"t": 1, "x": 1}\n', "JSON is not read"),
     "an unknown unit below": (table(NUMBERS, HEAD, units="s,furlong,m").encode(), "furlong"),
     "another quantity below": (table(NUMBERS, HEAD, units="s,V,V").encode(), "V"),
 }

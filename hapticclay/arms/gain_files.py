@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -20,6 +21,7 @@ PAIRS = (  # names of stiffness and damping
 OPENARM = ("LeaderArmParam", "FollowerArmParam")
 OPENARM_JOINTS = 7  # and a gripper
 OPENARM_SLOPE = 0.1  # its friction torque is Fc tanh(0.1 k w)
+MISSPELT = 0.86  # likeness from which an unknown field is one of these, as frictoin; others pass
 OTHERS = (
     "velocity", "cutoff", "runs", "friction", "gravity", "reference", "velocity_bits",
     "velocity_range",
@@ -41,6 +43,11 @@ def read_gains(path: str | os.PathLike[str]) -> dict[str, Any]:
     fields = {"Kp": table[stiffness], "Kd": table[damping]}
     if name in OPENARM:
         return _openarm(fields, table)
+    for key in table:
+        near = difflib.get_close_matches(str(key), OTHERS, n=1, cutoff=MISSPELT)
+        if key not in OTHERS and near:
+            bound = f"no such field; did you mean {near[0]!r}?"
+            raise ParameterError(f"{name}.{key}", table[key], bound)
     return fields | {key: table[key] for key in OTHERS if key in table}
 
 

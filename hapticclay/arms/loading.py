@@ -72,6 +72,7 @@ def load(arm: Any) -> Loaded:
     for field, of in IN_MODEL.items():
         values = getattr(model, of)
         values[dofs] = _per_joint(model, field, getattr(arm, field), joints, values[dofs])
+        _refuse_negative(field, values, model)
         fields[field] = tuple(values[dofs].tolist())
     limits = _file_limits(model, joints)
     given = _per_joint(model, "torque_limit", arm.torque_limit, joints, limits)
@@ -287,6 +288,14 @@ def full_name(field: str, word: Any, names: Sequence[str]) -> str:
     if len(ends) != 1:
         raise _unknown(field, word, names, "a joint")
     return ends[0]
+
+
+def _refuse_negative(field: str, values: np.ndarray, model: Any) -> None:
+    """MuJoCo loads a file whose joints have less than no damping, friction or rotor inertia."""
+    for j in np.flatnonzero(values < 0.0).tolist():
+        name = model.joint(model.dof_jntid[j]).name
+        bound = f"must be >= 0 in the file ({IN_MODEL[field].removeprefix('dof_')})"
+        raise ParameterError(f"{field}[{name}]", float(values[j]), bound)
 
 
 def _pose(model: Any, given: Any, joints: list[int]) -> np.ndarray:

@@ -31,6 +31,7 @@ SAMPLE = 200  # lines by which the separator is found
 WIDE = {b"\xff\xfe\x00\x00": "utf-32", b"\x00\x00\xfe\xff": "utf-32", b"\xff\xfe": "utf-16"}
 WIDE |= {b"\xfe\xff": "utf-16"}
 CONTROL = re.compile(rb"[\x00-\x08\x0e-\x19\x1b-\x1f]")
+JSON = re.compile(r"\s*(\{|\[\s*[\[{])")  # how an object, or a list of them or of rows, begins
 CELL = re.compile(r'"((?:[^"]|"")*)"|(\S+)')  # where spaces separate
 Line = tuple[int, str]
 
@@ -68,6 +69,9 @@ class TextTable:
     @classmethod
     def of_text(cls, field: str, path: Path, text: str, encoding: str) -> TextTable:
         """Reads a text; its form begins with the encoding."""
+        if JSON.match(text):
+            bound = "must be a table: JSON is not read; write a line of names and rows of numbers"
+            raise ParameterError(field, str(path), bound)
         whole = [(i, x) for i, x in enumerate(text.splitlines(), 1) if x.strip(EMPTY)]
         rows, comments = _without_comments(whole)
         if not rows:

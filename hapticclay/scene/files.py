@@ -53,7 +53,16 @@ def read_settings(path: str | os.PathLike[str], name: str = "scenario") -> dict[
             fault = f"byte {error.start} is not UTF-8"
         bound = f"must be {kind}: {fault}"
         raise ParameterError(name, str(path), bound) from None
-    return {"name": file.stem, **with_present_names(data)}
+    data = with_present_names(data)
+    arm = data.get("arm")
+    if isinstance(arm, Mapping) and isinstance(arm.get("file"), str):
+        data = {**data, "arm": {**arm, "file": beside(arm["file"], file.parent)}}
+    return {"name": file.stem, **data}
+
+
+def beside(name: str, folder: Path) -> str:
+    """A file beside one that names it; else the name as it is, which may be one of the package."""
+    return str(folder / name) if (folder / name).is_file() else name
 
 
 def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from ..arms.mjcf_arm import MjcfArm
 from ..errors import ParameterError
 from ..fields import make_part, nodes_of
 from ..model.arm import Arm
-from .files import naming_file, read_settings
+from .files import beside, naming_file, read_settings
 from .virtual_wall import Device
 
 ARMS = ("leader", "follower")
@@ -47,7 +48,8 @@ def _arm(table: Mapping[str, Any], name: str, folder: Path) -> Any:
             if key not in OF_ARM:
                 bound = f"no such field: there are {', '.join(OF_ARM)}"
                 raise ParameterError(f"{name}.{key}", table[key], bound)
-        return MjcfArm(**{**table, "file": _found(str(table["file"]), folder)})
+        with _naming(name):
+            return MjcfArm(**{**table, "file": beside(str(table["file"]), folder)})
     kind = Arm if any(key in nodes_of(Arm) for key in table) else Device
     return make_part(kind, table, path=name)
 
@@ -55,10 +57,14 @@ def _arm(table: Mapping[str, Any], name: str, folder: Path) -> Any:
 def _law(table: Mapping[str, Any], name: str, folder: Path) -> JointPD:
     given = dict(table)
     gains = given.pop("gains", None)
-    start = {} if gains is None else gain_files.read_gains(_found(str(gains), folder))
+    start = {} if gains is None else gain_files.read_gains(beside(str(gains), folder))
     return make_part(JointPD, given, start, path=name)
 
 
-def _found(name: str, folder: Path) -> str:
-    """A file beside that of the pair; else the name as it is, which may be one of the package."""
-    return str(folder / name) if (folder / name).is_file() else name
+@contextlib.contextmanager
+def _naming(table: str) -> Iterator[None]:
+    """Adds the table to the field of an error."""
+    try:
+        yield
+    except ParameterError as error:
+        raise ParameterError(f"{table}.{error.field}", error.value, error.bound) from None

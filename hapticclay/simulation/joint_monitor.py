@@ -91,7 +91,7 @@ class JointMonitor:
         q, rates, tau = rows[:n], rows[n : 2 * n], rows[2 * n : 3 * n]
         good, lost = self._good(rows, q, rates)
         bound = np.abs(tau[:, :good]) >= self.limits[:, None]
-        self._count(rates[:, :good], bound.any(axis=0))
+        self._count(rates[:, :good], np.any(bound, axis=0))
         found = self._unstable(rates[:, :good], bound) if self.monitored else None
         if found is not None:
             at, joint, cause = found
@@ -102,7 +102,8 @@ class JointMonitor:
             self.onset = self.onset or verdict
         if good == rows.shape[1]:
             return good, None
-        return good, self._outcome(*lost[:1], max(first + good - 1, 0), *lost[1:])
+        code, joint, cause = lost
+        return good, self._outcome(code, max(first + good - 1, 0), joint, cause)
 
     def _good(self, rows: np.ndarray, q: np.ndarray, rates: np.ndarray) -> tuple[int, Any]:
         """Number of rows before the first bad one: its code, joint and cause."""

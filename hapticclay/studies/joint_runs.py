@@ -28,7 +28,8 @@ from ..theory.joint_gains import Study
 from ..theory.joint_loop import JointLoop, timing_words
 
 BESIDE = 0.005  # share of the common limit at which runs are made on either side
-PART = 2  # physics steps a control sample: growth is off by about 1e-5 of the angular frequency
+PARTS = 8, 4  # physics steps a control sample, of a serial arm and of a closed chain
+LEAST_STEP = 1e-6  # [s]
 SIZE, LEAST_SIZE = 1e-4, 1e-8  # [rad] of the motion at the start; of one that grows in few samples
 GROWN, DECAYED = 30.0, 150.0  # a run ends where the motion has grown or decayed by so much ...
 PERIODS, LONGEST = 30.0, 4.0  # ... or after so many periods, or at this time [s]
@@ -37,7 +38,7 @@ A_PERIOD = 12  # samples of a period from which modes are read
 ROWS, LEAST_ROWS = 96, 12  # of the Hankel matrix, of all joints and of one
 RANKED = 1e-5  # smaller singular values are nonlinear motion
 AGREEMENT = 0.1  # of the expected growth or decay ...
-SLACK = 1e-4  # ... and of the angular frequency: ten times what such a step leaves
+SLACK = 1e-4  # ... and of the angular frequency: what such a step leaves, of damped light joints
 ROOM = 2.0  # times SIZE that a joint must have to either end of its range
 ALIKE = 0.95  # of the largest motion: a joint that moves so much is not another one
 OFFSET, BUILT = 0.01, 1.0  # [rad] of the reference, and length [s], of the run as built
@@ -265,11 +266,17 @@ def near_limit(arm: MjcfArm, law: JointPD, Ts: float, delay: float, factor: floa
         arm=free,
         controller=replace(scaled, reference=tuple(reference.tolist())),
         Ts=Ts,
-        dt=Ts / PART,
+        dt=Ts / _parts(arm, Ts),
         t_max=span,
         hardware=Hardware(delay=delay) if delay else None,
         stop_when_unstable=False,
     )
+
+
+def _parts(arm: MjcfArm, Ts: float) -> int:
+    """Physics steps in a control sample."""
+    most = PARTS[bool(arm.mechanism.following)]
+    return max(1, min(most, int(Ts / LEAST_STEP)))
 
 
 def _length(mode: Mode, Ts: float) -> tuple[float, float]:

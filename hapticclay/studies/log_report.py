@@ -108,8 +108,8 @@ def log_report(log: Log) -> LogReport:
     """
     found = candidates(log, "time")
     time = found[0] if found else ""
-    stamps, warnings = None, []
-    if time:
+    stamps, warnings = None, [] if log.rows else ["there are no rows of numbers"]
+    if time and log.rows:
         stamps, warnings = _stamps(log, time)
     if stamps is not None:
         warnings += [_beside(log, stamps, other) for other in found[1:]]
@@ -237,7 +237,7 @@ def _commands(log: Log, time: str) -> list[str]:
     """Commands that the columns suit."""
     found = {x: candidates(log, x) for x in ("force", "position", "command")}
     file = shlex.quote(str(log.path))
-    if not time or not found["position"]:
+    if not log.rows or not time or not found["position"]:
         return []
     place = found["position"][0]
     out = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ import numpy as np
 from ..arguments import checked, named
 from ..columns.heads import powers_of
 from ..columns.log import Log, open_log
-from ..display import brief
+from ..display import brief, one_line
 from ..errors import ParameterError, array_of, choice
 from ..files import MOST_TABLE, read_bytes
 from ..units import parse_unit
@@ -129,7 +129,7 @@ class PairLog:
         try:
             plain = not (units or counts) and file.suffix.lower() == ".mat"
             if plain and (table := _scope(file)):
-                found: dict[str, Any] = _chosen(file, table, given)
+                found: dict[str, Any] = _chosen(file, table, given, list(table))
                 return cls(**found, name=file.stem)
             return logged(open_log("path", file, units, counts), given)
         except OSError as error:
@@ -145,7 +145,7 @@ def logged(log: Log, columns: Mapping[str, str]) -> PairLog:
     for i, head in enumerate(log.table.heads):
         if key := wanted.get(_plain(head.text), wanted.get(_plain(head.name))):
             found[head.name] = log.size(i, UNITS[key])[0] * log.table.numbers(i)
-    cells, notes = _chosen(log.path, found, columns), []
+    cells, notes = _chosen(log.path, found, columns, log.names), []
     for side in ("leader", "follower"):
         cells[side], turn, at = unwrapped(cells[side])
         notes += [wrap_note(turn, at, cells["t"])] if len(at) else []
@@ -173,19 +173,19 @@ def _column(name: str, value: Any, t: Any) -> np.ndarray:
 
 
 def _chosen(
-    file: Path, table: Mapping[str, np.ndarray], columns: Mapping[str, str]
+    file: Path, table: Mapping[str, np.ndarray], columns: Mapping[str, str], names: Sequence[str]
 ) -> dict[str, np.ndarray]:
-    """Columns of a log from those of a file, each with its sign."""
+    """Columns of a log from those of a file, whose names are told, each with its sign."""
     plain = {_plain(name): name for name in table}
     out = {}
     for key in COLUMNS:
         words = (columns[key],) if key in columns else SPELLINGS[key]
         found = next((w for w in words if _plain(w) in plain), None)
         if found is None and key in columns:
-            choice(f"columns.{key}", columns[key], tuple(table))
+            choice(f"columns.{key}", columns[key], tuple(names))
         if found is None and key not in OPTIONAL:
             bound = f"must have the {COLUMNS[key]}; name its column {key}=NAME of"
-            raise ParameterError("columns", str(file), f"{bound} {', '.join(table)}")
+            raise ParameterError("columns", str(file), f"{bound} {one_line(', '.join(names), 200)}")
         if found is not None:
             own = plain[_plain(found)]
             negative = found.startswith("-") if key in columns else own.startswith("-")

@@ -189,7 +189,8 @@ class Delays:
             values = joint_crossings.branches(values)
             gap = _log_size(values) - samples * np.log(z)[:, None]
             real = (np.abs(values.imag) <= REAL * np.abs(values)) & (values.real > 0.0)
-            i, branch = np.nonzero((gap[:-1] * gap[1:] < 0.0) & real[:-1] & real[1:])
+            below = gap < 0.0  # a zero on the grid counts once
+            i, branch = np.nonzero((below[:-1] != below[1:]) & real[:-1] & real[1:])
             starts = zip(z[i].tolist(), values[i, branch].tolist(), strict=True)
             found += [_refined(self.loop, at, x, 0, samples) for at, x in starts]
         return found

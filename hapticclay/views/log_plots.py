@@ -31,7 +31,9 @@ def log_plot(report: LogReport) -> Figure:
         look = {"color": MID_GREY, "ls": "none", "marker": "o", "ms": stroke(1.2)}
         axes[-1].plot(t[1:], 1e3 * stamps.steps, rasterized=True, **look)
         steps, usual = 1e3 * stamps.steps, 1e3 * stamps.step
-        axes[-1].set_ylim(min(0.0, 1.1 * steps.min()), max(1.2 * usual, 1.1 * steps.max()))
+        ahead = 1.2 * usual if usual > 0.0 else 0.0  # NaN where time never goes ahead
+        low, high = min(0.0, 1.1 * steps.min()), max(ahead, 1.1 * steps.max())
+        axes[-1].set_ylim(low, high if high > low else 1.0)
         label_axes(axes[-1], "", "step [ms]")
         axes[-1].yaxis.label.set_size(points(8.0))
     label_axes(axes[-1], "row" if stamps is None else "time [s]")

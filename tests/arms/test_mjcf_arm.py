@@ -186,6 +186,14 @@ REFUSED = {
     "too many positions": (xml(BODY.format(SITE)), {"pose": [0.0, 1.0]}, "for each joint"),
     "a pose that is NaN": (xml(BODY.format(SITE)), {"pose": [math.nan]}, "finite"),
     "negative armature": (xml(BODY.format(SITE)), {"armature": [-1.0]}, ">= 0"),
+    **{
+        f"{name} of the file below 0": (
+            xml(BODY.format(SITE).replace("<joint", f'<joint {name}="-1"')),
+            {},
+            rf"\[j\] = -1.0: must be >= 0 in the file \({name}\)",
+        )
+        for name in ("armature", "damping", "frictionloss")
+    },
     "a unit of another kind": (xml(BODY.format(SITE)), {"damping": ["1 m"]}, "m"),
     "no joint": (
         xml('<body><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>' + SITE + "</body>"),

@@ -155,7 +155,7 @@ def test_instability_is_a_result_with_advice(capsys, tmp_path):
         ),
         (["stability", "--axs", "y"], ["--axs: no option of stability; did you mean --axis?"]),
         (["sweep", "--grd", "b=1:2:3"], ["did you mean --grid?"]),
-        (["identify", "extra"], ["unexpected argument 'extra' of identify"]),
+        (["identify", "nowhere.csv", "extra"], ["unexpected argument 'extra' of identify"]),
         (["version", "--b"], ["--b: no option of version; see hapticclay version --help"]),
         (
             ["video", "--speed", "2", "constnat"],
@@ -676,7 +676,7 @@ def test_bad_parts_and_files_are_one_line_and_exit_2(capsys, tmp_path, monkeypat
 def test_the_names_of_all_fields_are_listed(capsys):
     code, out, err = run(capsys, "fields")
     assert (code, err) == (0, "") and max(map(len, out.splitlines())) <= 100
-    assert "arm.l1 = 0.24  [m]  0.001 to 100\n    length of link 1" in out
+    assert "arm.l1 = 0.24  [m]  0.001 to 100\n    of arm: length of link 1" in out
     assert "servo.y.S.damping = 32.4  [1/s]" in out and "integrator = fast  fast | accurate" in out
     lines = out.splitlines()
     heads = [i for i, line in enumerate(lines) if line[0] != " "]

@@ -207,11 +207,11 @@ def arms(method, **common):
     clay = Clay(law, Profile((0.001,), (3.0, 8.0), "y"))
     out = {}
     for i, (card, plane) in enumerate(
-        (("planar_2r", None), ("five_bar", None), ("haptic_3", "zx"))
+        (("planar_2r", None), ("five_bar", None), ("haptic_3", "zx"), ("leader_7", "yz"))
     ):
         arm = hc.MjcfArm(card, plane=plane, torque_limit=[3.0] * len(hc.MjcfArm(card).names))
         n = len(arm.names)
-        kind = ("difference", "filter", "exact")[i]
+        kind = ("difference", "filter", "exact", "filter")[i]
         law = hc.JointPD(
             (4.0,) * n, (0.05,) * n, velocity=kind, cutoff=90.0 if kind == "filter" else None,
             reference=tuple(arm.q + 0.1), friction=((0.05, 20.0, 0.001),) * n,
@@ -223,7 +223,7 @@ def arms(method, **common):
             hardware=hc.Hardware(encoder=4096, delay=1.3e-3, dac_bits=12, jitter=2e-5),
         )  # fmt: skip
         out[card] = hc.Scenario(**parts | common)
-    return out
+    return out | {"own law": dataclasses.replace(out["planar_2r"], controller=OWN)}
 
 
 KINDS = {

@@ -6,6 +6,7 @@ import math
 import os
 import tomllib
 from fractions import Fraction
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -807,3 +808,19 @@ def test_a_scene_of_an_arm_from_a_file_returns_from_its_file(tmp_path):
     t = hc.Scenario.load(s.save(tmp_path / "arm.toml"))
     assert t.controller == law and t.arm.armature == arm.armature and t.arm.pose == arm.pose
     assert np.array_equal(t.arm.mass_matrix(), arm.mass_matrix())
+
+
+def test_an_arm_is_found_beside_the_scenario_that_names_it(tmp_path, monkeypatch):
+    """From any folder; a file of the same name in the present one is not taken in its place."""
+    arms = Path(hc.__file__).parents[1] / "mjcf" / "arms"
+    (tmp_path / "rig").mkdir()
+    (tmp_path / "rig" / "arm.xml").write_text((arms / "haptic_3.xml").read_text())
+    (tmp_path / "arm.xml").write_text((arms / "planar_2r.xml").read_text())
+    (tmp_path / "rig" / "run.toml").write_text(
+        'control = "sampled"\n[arm]\nfile = "arm.xml"\n'
+        "[controller]\nKp = [1, 1, 1]\nKd = [0.01, 0.01, 0.01]\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    assert len(hc.Scenario.load("rig/run.toml").arm.names) == 3
+    monkeypatch.chdir(tmp_path / "rig")
+    assert hc.Scenario.load("run.toml").arm.file == "arm.xml"

@@ -110,3 +110,17 @@ def test_counts(tmp_path):
     np.testing.assert_allclose(turn.values("x", ("m",)), 1e-5 * T, rtol=4e-16)
     with pytest.raises(hc.ParameterError, match="counts.q"):
         log.stating(None, {"q": "fast"})
+
+
+@pytest.mark.parametrize("times", [range(200, 0, -1), [3] * 200])
+def test_time_that_never_goes_ahead_is_drawn(times, tmp_path):
+    file = tmp_path / "log.csv"
+    file.write_text("t,x\n" + "".join(f"{t},{i % 7}\n" for i, t in enumerate(times)))
+    assert app.main(["columns", str(file), "--out", str(tmp_path / "out")]) == 0
+    assert (tmp_path / "out" / "columns.png").stat().st_size
+
+
+def test_a_log_without_rows_says_so(tmp_path):
+    (tmp_path / "log.csv").write_text("t,force,pos\n")
+    report = hc.studies.log_report(hc.Log.read(tmp_path / "log.csv"))
+    assert report.warnings == ("there are no rows of numbers",) and not report.commands

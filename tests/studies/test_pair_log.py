@@ -278,3 +278,10 @@ def test_the_rig(name, letter, rms, as_set):
     assert found.simulated_rms == pytest.approx(rms, rel=0.04)
     if found.architecture == "position-force":
         assert 1.0 <= found["force scale"].value <= 1.008
+
+
+@pytest.mark.parametrize("columns", [None, {"leader": "d"}])
+def test_a_missing_column_is_told_with_all_that_there_are(columns, tmp_path):
+    (tmp_path / "log.csv").write_text("t,a,b,c\n" + "".join(f"{i},1,2,3\n" for i in range(50)))
+    with pytest.raises(hc.ParameterError, match="t, a, b, c"):
+        hc.studies.PairLog.load(tmp_path / "log.csv", columns)

@@ -340,6 +340,8 @@ def test_gains_under_the_names_of_projects(tmp_path):
         ("g.json", '{"Kp": ["x"], "Kd": [1]}', "finite number"),
         ("g.json", '{"Kp": [-1], "Kd": [1]}', ">= 0"),
         ("g.toml", "Kp = [nan]\nKd = [1]", "finite number"),
+        ("g.toml", "Kp = [1]\nKd = [1]\ncutof = 90", "gains.cutof.*did you mean 'cutoff'"),
+        ("g.toml", "Kp = [1]\nKd = [1]\nfrictoin = [[1, 1, 1]]", "did you mean 'friction'"),
     ],
 )
 def test_gains_that_are_refused(tmp_path, name, text, told):

@@ -4,6 +4,7 @@ import math
 import os
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -523,6 +524,28 @@ def test_a_pair_from_a_file(tmp_path):
     pair = hc.Pair.load(tmp_path / "pair.toml")
     assert pair.leader is pair.follower and pair.law == DRIVE
     assert pair.link.delays == (4e-3, 5e-3) and pair.follower_clay == hc.Contact(B=90.0, axis="z")
+
+
+def test_a_file_that_a_pair_names_is_told_by_its_table(tmp_path):
+    (tmp_path / "pair.toml").write_text(
+        '[leader]\nfile = "leader_7"\n[follower]\nfile = "leader7"\n[law]\nKp = [1]\nKd = [1]\n'
+    )
+    with pytest.raises(hc.ParameterError, match=r"^follower\.file = 'leader7'"):
+        hc.Pair.load(tmp_path / "pair.toml")
+
+
+def test_a_real_eigenvalue_on_the_grid_is_found():
+    """A loop around whose only eigenvalue is z^N at an angle of the search, to the last bit."""
+    from hapticclay.theory import pair_delays
+
+    grid = 1.0 + np.geomspace(pair_delays.AT_REST, 0.3, pair_delays.BY_FACTORS // 4)
+    pairs = ((z, z**n, n) for n in (10, 20, 30) for z in grid[10:-1].tolist())
+    z, x, samples = next(p for p in pairs if np.log(p[1]) == p[2] * np.log(p[0]))
+    loop = SimpleNamespace(
+        free=False, there=1, back=1, around=lambda angles: np.full((len(angles), 1, 1), x)
+    )
+    found = pair_delays.Delays(loop)._on_axis(samples)
+    assert found == [pytest.approx(z, abs=1e-13)]
 
 
 @pytest.mark.parametrize(
