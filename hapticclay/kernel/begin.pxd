@@ -6,6 +6,7 @@ from . cimport arm
 from . cimport borders
 from . cimport groove
 from . cimport hardware
+from . cimport joint_law
 from . cimport joints
 from . cimport memory
 from . cimport methods

@@ -13,6 +13,7 @@ cdef double converted(Model m, double f) noexcept nogil
 cdef double encoded(Model m, long i, double q) noexcept nogil
 cdef void differenced(Model m, State s, double *q, double *w) noexcept nogil
 cdef void note_angles(Model m, State s) noexcept nogil
+cdef double given(Model m, long i, double tau) noexcept nogil
 cdef void drive(Model m, State s, double *tau) noexcept nogil
 cdef (double, double) couple(Model m, State s, Kick k, double bx, double by) noexcept nogil
 cdef double guarded(Model m, State s, Kick k, long i, double f) noexcept nogil

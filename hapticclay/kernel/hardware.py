@@ -79,10 +79,14 @@ def note_angles(m, s):
 
 
 def drive(m, s, tau):
-    """Gives torques to the motors, within their limits and after the converter."""
+    """Gives torques to the motors."""
     for i in range(m.joints):
-        t = arm.clipped(tau[i], m.limit[i])
-        s.next.tau[i] = law.quantize(t, m.dac_bits, m.dac_range[i])
+        s.next.tau[i] = given(m, i, tau[i])
+
+
+def given(m, i, tau):
+    """Torque of a motor, within its limit and after the converter [N.m]."""
+    return law.quantize(arm.clipped(tau, m.limit[i]), m.dac_bits, m.dac_range[i])
 
 
 # ---- the rendered clay ---------------------------------------------------------------------------

@@ -12,5 +12,6 @@ cdef long EXACT, DIFFERENCE, FILTER
 cdef void respond(Model m, State s, Kick k) noexcept nogil
 cdef void measure_rates(Model m, State s) noexcept nogil
 cdef void see_pose(Model m, State s) noexcept nogil
+cdef void hold_weight(Model m, State s) noexcept nogil
 cdef void feed_gravity(Model m, Kick k) noexcept nogil
 cdef void render(Model m, State s, Kick k) noexcept nogil

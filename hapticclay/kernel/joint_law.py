@@ -64,6 +64,16 @@ def see_pose(m, s):
             e.scratch_bias[i] = e.scratch_forces[m.dof[i]]
 
 
+def hold_weight(m, s):
+    """Lets the motors hold arm and hand against gravity from the start on."""
+    for i in range(m.joints):
+        s.angles[i], s.k.tau[i] = hardware.encoded(m, i, s.q[i]), 0.0
+    see_pose(m, s)
+    feed_gravity(m, s.k)
+    for i in range(m.joints):
+        s.now.tau[i] = hardware.given(m, i, s.k.tau[i])
+
+
 def feed_gravity(m, k):
     """Adds the torques that hold arm and hand against gravity."""
     e, n = m.engine, m.joints

@@ -378,3 +378,13 @@ def test_energy_is_balanced_to_second_order(card):
         left.append(abs(e["residual"]) / e["throughput"])
         assert e["joint_dampers"] >= 0.0 and e.get("friction", 0.0) >= 0.0
     assert left[2] < 2e-3 and left[2] < 0.4 * left[0] + 1e-7, left
+
+
+def test_a_late_law_holds_the_weight_from_the_start():
+    """Until its first torque arrives the motors hold those of the pose: nothing moves."""
+    arm = hc.MjcfArm("leader_7")
+    law = hc.JointPD((5.0,) * 7, (0.1,) * 7)
+    late = hc.Hardware(delay=3.3e-3)
+    r = hc.simulate(hc.Scenario(arm=arm, controller=law, Ts=2e-3, t_max=0.05, hardware=late))
+    # rounding of torques of 2.6 N.m over an inertia of 0.02 kg.m^2, in 0.05 s: 1e-16
+    assert np.abs(r.q - arm.q).max() < 1e-14 and np.abs(r.tau - r.tau[0]).max() < 1e-12

@@ -94,7 +94,7 @@ class Motion:
         """
         kp, kd, reference = map(np.array, law)
         n, x = self.model.nv, np.concatenate((self.start, 0.0 * self.start))
-        past, queue, out = self.start[self.own], [np.zeros(len(kp))] * delay, []
+        past, queue, out = self.start[self.own], [self.held(self.start)] * delay, []
         for _ in range(samples):
             q = x[:n][self.own]
             out.append(q)
