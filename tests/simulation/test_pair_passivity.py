@@ -68,9 +68,9 @@ def test_without_a_reserve_it_stands_still():
     assert found.leader.max() > 0.05 and not np.any(found.follower) and not np.any(found.energy)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [7, 10, 108])
 def test_random_links_stay_above_the_bound(seed):
-    """A share of the study of 200 links."""
+    """Of the study of 200 links: position-force twice, four-channel; all three use the reserve."""
     assert least(seed).guarded >= -2.0
 
 
