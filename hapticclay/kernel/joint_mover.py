@@ -59,7 +59,8 @@ class JointMover(Mover):
         model = self.model
         made.factor, made.move = mujoco.mj_factorM, mujoco.mj_step2
         made.scratch, made.site, made.body = self.scratch, self.site, self.body
-        made.freedoms, made.pivots = model.nv, memoryview(self.pivots)
+        made.freedoms = model.nv
+        made.pivots = memoryview(self.pivots)  # pyright: ignore[reportArgumentType]
         whole = self.places["M"].reshape(model.nv, model.nv)
         J, Jdot = (self.places[name].reshape(3, model.nv) for name in ("J", "Jdot"))
         of = getattr(mujoco, JACOBIANS[self.kind])

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..arms.joint_law import JointPD
 from ..formulas import compensator as form
 from ..formulas import groove as groove_law
 from ..formulas import pieces
@@ -202,7 +203,7 @@ def put_sampler(
     if own is not None:
         caller = LawCaller(own, m.joints, m.axes)
         m.own, m.buffer_size, arrays["buffer"] = 1, len(own.state), caller.numbers
-    elif s.controller is not None:
+    elif isinstance(s.controller, JointPD):
         from . import joint_scene  # imported only for a law of joints
 
         joint_scene.put_law(m, s.controller)

@@ -268,6 +268,29 @@ class Scenario:
         return isinstance(self.arm, Arm)
 
     @property
+    def planar_arm(self) -> Arm:
+        """The two-link arm in closed form.
+
+        Raises:
+            ParameterError: the arm is from a file.
+        """
+        if not isinstance(self.arm, Arm):
+            bound = "must be the two-link arm in closed form here"
+            raise ParameterError("arm", self.arm, bound)
+        return self.arm
+
+    @property
+    def file_arm(self) -> MjcfArm:
+        """The arm from a file.
+
+        Raises:
+            ParameterError: the arm is in closed form.
+        """
+        if not isinstance(self.arm, MjcfArm):
+            raise ParameterError("arm", self.arm, "must be an arm from a file here")
+        return self.arm
+
+    @property
     def free_mobility(self) -> float:
         """Largest acceleration of the handle per unit of force, without a hand [1/kg]."""
         if isinstance(self.arm, Arm):
@@ -403,7 +426,7 @@ def _check_arm(s: Scenario) -> None:
     if len(arm.names) > MOST_JOINTS:
         raise ParameterError("arm", arm.name, f"must have at most {MOST_JOINTS} joints in runs")
     arm.mechanism.runnable()
-    limits = arm.torque_limit
+    limits: Any = arm.torque_limit
     if isinstance(law, JointPD) and law.runs == "drive" and any(map(math.isfinite, limits)):
         bound = "must be none where drives run the law, whose limits are not simulated"
         raise ParameterError("arm.torque_limit", limits, bound)

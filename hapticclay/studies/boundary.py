@@ -100,7 +100,7 @@ class PushedLoop(Loop):
             render=loop.render,
             inertia_shaping=scenario.inertia_shaping,
             torque_limit=scenario.torque_limit,
-            arm=scenario.arm,
+            arm=scenario.planar_arm,
             k=loop.k,
         )
 

@@ -107,7 +107,7 @@ class JointRuns(Result):
 
     def tables(self) -> Tables:
         """One row per run."""
-        return {
+        rows: dict[str, dict[str, Any]] = {
             "runs": {
                 "all Kp times": self.factor,
                 "joint": self.joint,
@@ -119,6 +119,7 @@ class JointRuns(Result):
                 "agrees": ["yes" if x else "no" for x in self.agrees],
             }
         }
+        return rows
 
     def contents(self) -> dict[str, Any]:
         """The table, with both limits and the run as built."""

@@ -148,11 +148,12 @@ class Measurement:
         Raises:
             ParameterError: time goes back, or as `Measurement`.
         """
-        given = {"t": t, "input": input, "output": output}
+        given: dict[str, Any] = {"t": t, "input": input, "output": output}
         given |= {} if reference is None else {"reference": reference}
         columns = {key: _column(key, x, t) for key, x in given.items()}
         made = even_columns(columns, "hold" if held else "spline")
-        return cls(**made.columns, name=name, notes=made.notes)
+        even: Any = made.columns
+        return cls(**even, name=name, notes=made.notes)
 
 
 def measured(log: Log, names: Mapping[str, str], between: Between = "spline") -> Measurement:

@@ -64,10 +64,10 @@ class Handle:
         if not (size > 0.0 and math.isfinite(size)):
             raise ParameterError("normal", normal, "must have a direction")
         x, y = scenario.origin[0] + place[0], scenario.origin[1] + place[1]
-        low, high = scenario.arm.reach
+        low, high = scenario.planar_arm.reach
         if not low < math.hypot(x, y) < high:
             raise ParameterError("place", place, "must lie within the reach of the arm")
-        inertia = np.linalg.inv(linear_loop.mobility_at(scenario.arm, x, y))
+        inertia = np.linalg.inv(linear_loop.mobility_at(scenario.planar_arm, x, y))
         hands = [astuple(hand or NO_HAND) for hand in scenario.operators]
         mass, damping, stiffness = np.array(hands).T
         return cls(inertia + np.diag(mass), damping, stiffness, np.array(normal) / size)

@@ -191,6 +191,8 @@ def controller_stability(
     made = scenario.controller
     if made is None:
         raise ParameterError("controller", None, "must be given: gain_limit is for the paper's own")
+    if not isinstance(made, Controller):
+        raise ParameterError("controller", made, "must be your own: joint_limits judges this law")
     if b is not None:
         dampings = [b]
     else:

@@ -201,7 +201,7 @@ def friction_cycle(
     fed = [Fed(Fc, k, loop, counts) for Fc, k, _ in law.friction]
     joints = [Joint(loop, j, arm.friction[j], fed[j]) for j in range(loop.n)]
     found = [cycle for joint in joints for cycle in joint.cycles()]
-    columns = list(zip(*found, strict=True)) or [()] * len(_Cycle._fields)
+    columns: Any = list(zip(*found, strict=True)) or [()] * len(_Cycle._fields)
     bare = [name for name, x in zip(arm.names, joints, strict=True) if x.fed.Fc and not x.coulomb]
     told = f"no Coulomb friction at {', '.join(bare)}: all that is fed forward is excess"
     return FrictionCycle(
@@ -237,7 +237,7 @@ class Fed:
 
     def __init__(self, Fc: float, k: float, loop: JointLoop, counts: int | None):
         self.Fc, self.k = Fc, k
-        self._table: tuple[np.ndarray, np.ndarray] | None = None
+        self._table: Any = None  # true rates [rad/s], and the mean torque at them [N.m]
         if counts is not None and Fc and k:
             self._table = self._mean(loop, 2.0 * math.pi / counts)
 

@@ -215,7 +215,7 @@ def _mobility(s: Scenario, p: tuple[float, float]) -> np.ndarray:
     """Gains of Sh of both axes at a place, shape (2, 2) [1/kg]."""
     if s.inertia_shaping:
         return np.diag([servo.S.gain for servo in s.servo])
-    return linear_loop.mobility_at(s.arm, s.origin[0] + p[0], s.origin[1] + p[1])
+    return linear_loop.mobility_at(s.planar_arm, s.origin[0] + p[0], s.origin[1] + p[1])
 
 
 def _environment(s: Scenario, b: tuple[float, float]) -> list[list[Polynomial]]:

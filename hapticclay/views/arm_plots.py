@@ -118,7 +118,7 @@ def arm_path_plot(record: Record) -> Figure:
     for ax, (i, j) in zip(panels, views, strict=True):
         corners = [scale * (middle[[i, j]] + sign * half) for sign in (-1.0, 1.0)]
         if s.clay and j == 1:
-            clay_map(ax, s.clay, *corners, scale)
+            clay_map(ax, s.clay, corners[0], corners[1], scale)
         draw_path(ax, scale * record.p[:, [i, j]], "handle")
         label_axes(ax, f"position {axes[i]} [{unit}]", f"position {axes[j]} [{unit}]")
         ax.set(aspect="equal", xlim=(corners[0][0], corners[1][0]))

@@ -80,7 +80,7 @@ def friction_plot(found: FrictionCycle) -> Figure:
     rates = 2.0 * math.pi * found.first_frequency * found.first_amplitude
     rates = np.where(np.isnan(rates), found.rate, rates)  # of a drift
     for kind, rate in zip(found.kind, rates, strict=True):
-        face = {} if kind == "threshold" else {"mfc": BLACK}
+        face: dict[str, Any] = {} if kind == "threshold" else {"mfc": BLACK}
         ax.plot(rate, 0.0, **(hollow(BLACK, size=5.0) | face))
     level(ax)
     ends = found.line_rate.min(), found.line_rate.max()

@@ -102,7 +102,7 @@ class Page:
         self._console.quiet = self._quiet
 
     def _scene(self) -> None:
-        add, size = self.server.scene, room_scale(self.session.scenario.arm)
+        add, size = self.server.scene, room_scale(self.session.scenario.planar_arm)
         camera = self.server.initial_camera
         camera.position = (0.21 * size, -0.66 * size, 0.64 * size)
         camera.look_at, camera.fov = (0.18 * size, 0.15 * size, -0.04), 0.60

@@ -69,7 +69,7 @@ class Stage:
         if scenario.clay is not None:
             low, high = (np.add(scenario.origin, (grid.x[k], grid.y[k])) for k in (0, -1))
             block = Block(low, high, len(grid.y), len(grid.x), THICKNESS, self._colors())
-        self.model = picture(scenario.arm, block, (tool.width, tool.depth))
+        self.model = picture(scenario.planar_arm, block, (tool.width, tool.depth))
         self.data = mujoco.MjData(self.model)
         self.field = 0 if block else -1
         self.place: tuple[float, float] | None = None

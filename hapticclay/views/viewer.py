@@ -95,7 +95,9 @@ class Pane:
         """Shows answers until the process ends."""
         body = self.stage.model.body("tool").id
         with viewer.lock():
-            scale = room_scale(self.stage.scenario.arm)  # texts cover the left, plots the right
+            scale = room_scale(
+                self.stage.scenario.planar_arm
+            )  # texts cover the left, plots the right
             viewer.cam.lookat[:] = (0.252 * scale, 0.17 * scale, -0.03)
             viewer.cam.distance, viewer.cam.azimuth, viewer.cam.elevation = (
                 1.05 * scale,
