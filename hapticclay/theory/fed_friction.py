@@ -199,12 +199,13 @@ def friction_cycle(
     linear = replace(law, friction=tuple((0.0, 0.0, Fv) for _, _, Fv in law.friction))
     loop = study.remade(law=linear)
     fed = [Fed(Fc, k, loop, counts) for Fc, k, _ in law.friction]
-    joints = [Joint(loop, j, arm.friction[j], fed[j]) for j in range(loop.n)]
+    rubbed: Any = arm.friction
+    joints = [Joint(loop, j, rubbed[j], fed[j]) for j in range(loop.n)]
     found = [cycle for joint in joints for cycle in joint.cycles()]
     columns: Any = list(zip(*found, strict=True)) or [()] * len(_Cycle._fields)
     bare = [name for name, x in zip(arm.names, joints, strict=True) if x.fed.Fc and not x.coulomb]
     told = f"no Coulomb friction at {', '.join(bare)}: all that is fed forward is excess"
-    return FrictionCycle(
+    values: tuple[Any, ...] = (
         arm.names,
         loop.Ts,
         loop.delay,
@@ -223,6 +224,7 @@ def friction_cycle(
         np.array([joint.growth for joint in joints]),
         (*study.assumed()[:-1], *([told] if bare else []), OTHERS, LEFT_OUT),
     )
+    return FrictionCycle(*values)
 
 
 # ---- what is fed forward -------------------------------------------------------------------------
@@ -251,7 +253,7 @@ class Fed:
         keep, gain = loop.rate_filter
         per_sample = np.geomspace(FEW * (1.0 - keep), MANY, RATES)
         read = np.floor(np.outer(per_sample, np.arange(COUNTED)))
-        rates = lfilter([gain * count, -gain * count], [1.0, -keep], read, axis=1)
+        rates: Any = lfilter([gain * count, -gain * count], [1.0, -keep], read, axis=1)
         mean = self._law(rates[:, COUNTED // 2 :]).mean(axis=1)
         return per_sample * count / loop.Ts, mean
 
