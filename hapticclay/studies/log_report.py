@@ -25,6 +25,7 @@ FEW = 3  # places that a remark names
 STUCK = 0.02  # share of the rows, in a run at the largest or smallest value, that is suspicious
 TREATED = "identify and fit say what they do about it (docs/logs.md)"
 LEAST = 20  # rows in which columns are judged
+MOST_COLUMNS = 1000  # of a report: a log has tens
 
 
 @named
@@ -105,7 +106,16 @@ def log_report(log: Log) -> LogReport:
 
     Args:
         log: the log.
+
+    Raises:
+        ParameterError: it has more than 1000 columns.
     """
+    if len(log.names) > MOST_COLUMNS:
+        bound = (
+            f"must have at most {MOST_COLUMNS} columns, has {len(log.names)} of {log.rows} rows: "
+            "are rows and columns exchanged?"
+        )
+        raise ParameterError("file", str(log.path), bound)
     found = candidates(log, "time")
     time = found[0] if found else ""
     stamps, warnings = None, [] if log.rows else ["there are no rows of numbers"]
@@ -116,9 +126,10 @@ def log_report(log: Log) -> LogReport:
     if stamps is not None and stamps.even < 1.0:
         share = 100.0 * (1.0 - stamps.even)
         warnings.append(f"{share:.3g} % of the steps are off by more than 5 %: {TREATED}")
-    rows, accepted, columns = [], _accepted(log), {}
+    rows, accepted, columns, unknown = [], _accepted(log), {}, set()
     for place, head in enumerate(log.table.heads):
         size, unit, faults = _unit(log, place, accepted.get(head.text, ()))
+        unknown |= {head.text} if faults else set()
         x = log.table.loose_numbers(place)
         kept = x[np.isfinite(x)] * size
         low, high = (float(kept.min()), float(kept.max())) if len(kept) else (math.nan, math.nan)
@@ -127,7 +138,7 @@ def log_report(log: Log) -> LogReport:
             columns[_label(head, unit)] = size * x
     table = table_of(("column", "unit", "lowest", "highest", "remarks"), rows)
     t = None if stamps is None else stamps.t
-    said = tuple(log.table.notes), tuple(warnings), tuple(_commands(log, time))
+    said = tuple(log.table.notes), tuple(warnings), tuple(_commands(log, time, unknown))
     name, form = log.path.name, log.table.form
     return LogReport(name, form, log.rows, time, table, t, columns, *said)
 
@@ -233,11 +244,12 @@ def _remarks(x: np.ndarray) -> list[str]:
     return out
 
 
-def _commands(log: Log, time: str) -> list[str]:
-    """Commands that the columns suit."""
-    found = {x: candidates(log, x) for x in ("force", "position", "command")}
+def _commands(log: Log, time: str, unknown: set[str]) -> list[str]:
+    """Commands that the columns suit, those of unknown units aside."""
+    every = {x: candidates(log, x) for x in ("force", "position", "command")}
+    found = {x: [name for name in names if name not in unknown] for x, names in every.items()}
     file = shlex.quote(str(log.path))
-    if not log.rows or not time or not found["position"]:
+    if not log.rows or not time or time in unknown or not found["position"]:
         return []
     place = found["position"][0]
     out = []

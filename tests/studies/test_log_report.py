@@ -124,3 +124,17 @@ def test_a_log_without_rows_says_so(tmp_path):
     (tmp_path / "log.csv").write_text("t,force,pos\n")
     report = hc.studies.log_report(hc.Log.read(tmp_path / "log.csv"))
     assert report.warnings == ("there are no rows of numbers",) and not report.commands
+
+
+def test_columns_of_unknown_units_are_in_no_command(tmp_path):
+    path = tmp_path / "log.csv"
+    rows = [f"{0.001 * i},{i},{2 * i}" for i in range(30)]
+    path.write_text("\n".join(["t [s],force [blub],pos [mm]", *rows]))
+    assert hc.studies.log_report(hc.Log.read(path)).commands == ()
+
+
+def test_a_table_on_its_side_is_refused_in_a_line(tmp_path):
+    path = tmp_path / "side.csv"
+    path.write_text("\n".join(",".join(f"{i + j}.5" for i in range(1500)) for j in range(3)))
+    with pytest.raises(hc.ParameterError, match="are rows and columns exchanged"):
+        hc.studies.log_report(hc.Log.read(path))
