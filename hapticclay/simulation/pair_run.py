@@ -19,6 +19,7 @@ from ..scene import pair as pairs
 from ..scene.pair import Pair
 from ..theory.architectures import ARCHITECTURES
 from ..theory.architectures.control import Control
+from . import stepwise
 from .pair_arms import run_arm, run_scene
 from .pair_passivity import Port
 from .stepwise import Simulation
@@ -256,8 +257,10 @@ class _Run:
             if step % self.parts == 0:
                 self._sample(step, energy)
             self._act(step, ACT)
-            energy += sum(map(self._advanced, self.hosts))
-            ended = self._ended()
+            ended = self._beyond()
+            if not ended:
+                energy += sum(map(self._advanced, self.hosts))
+                ended = self._ended()
             if ended:
                 break
         columns = [np.array(x) for x in zip(*self.rows, strict=True)]
@@ -322,6 +325,13 @@ class _Run:
         taken = host.taken(before, host.run.state.q, host.weight)
         host.port.taken += taken
         return taken
+
+    def _beyond(self) -> str:
+        """Which host asks for more torque than any motor has, "" for none."""
+        for name, host in zip(("leader", "follower"), self.hosts, strict=True):
+            if not np.abs(host.torque).max() <= stepwise.MOST:
+                return f"{name} diverged: torques beyond {stepwise.MOST:g} N.m"
+        return ""
 
     def _ended(self) -> str:
         for name, host in zip(("leader", "follower"), self.hosts, strict=True):

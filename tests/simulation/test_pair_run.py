@@ -131,3 +131,10 @@ def test_energy_is_what_the_arms_lost():
 def test_refused(made, told):
     with pytest.raises(hc.ParameterError, match=told):
         hc.simulate_pair(made(), 0.01)
+
+
+def test_a_pair_that_diverges_ends_and_says_so():
+    device = hc.Device(mass=0.1, damper=0.0)
+    pair = hc.Pair(device, device, hc.JointPD((4000.0,), (1.0,)), hc.Link(delay=0.05))
+    found = hc.simulate_pair(pair, t_max=6.0)
+    assert found.grows and "diverged" in found.ended and found.t[-1] < 6.0
