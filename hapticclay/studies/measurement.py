@@ -75,8 +75,8 @@ class Measurement:
         for column in COLUMNS:
             value = getattr(self, column)
             if value is not None or column != "reference":
-                object.__setattr__(self, column, _column(column, value, self.t))
-        _check_sampling(self.t)
+                object.__setattr__(self, column, column_of(column, value, self.t))
+        check_sampling(self.t)
         for column in ("input", "output", "reference"):
             value = getattr(self, column)
             if value is not None and np.ptp(value) == 0.0:
@@ -150,7 +150,7 @@ class Measurement:
         """
         given: dict[str, Any] = {"t": t, "input": input, "output": output}
         given |= {} if reference is None else {"reference": reference}
-        columns = {key: _column(key, x, t) for key, x in given.items()}
+        columns = {key: column_of(key, x, t) for key, x in given.items()}
         made = even_columns(columns, "hold" if held else "spline")
         even: Any = made.columns
         return cls(**even, name=name, notes=made.notes)
@@ -200,7 +200,7 @@ def named_columns(log: Log, given: Mapping[str, str], **meanings: str) -> dict[s
     return {key: names[key] for key in COLUMNS if key in names}
 
 
-def _column(name: str, value: Any, t: Any) -> np.ndarray:
+def column_of(name: str, value: Any, t: Any) -> np.ndarray:
     """A column as an array of floats, as long as t."""
     x = array_of(name, value, "must be an array of numbers")
     if x.ndim != 1 or len(x) < LEAST_ROWS:
@@ -216,7 +216,7 @@ def _column(name: str, value: Any, t: Any) -> np.ndarray:
     return x
 
 
-def _check_sampling(t: np.ndarray) -> None:
+def check_sampling(t: np.ndarray) -> None:
     """Refuse steps that differ from the mean step."""
     mean = (t[-1] - t[0]) / (len(t) - 1)
     if not mean > 0.0:

@@ -16,11 +16,11 @@ from ..arguments import checked, named
 from ..columns.heads import powers_of
 from ..columns.log import Log, open_log
 from ..display import brief, one_line
-from ..errors import ParameterError, array_of, choice
+from ..errors import ParameterError, choice
 from ..files import MOST_TABLE, read_bytes
 from ..units import parse_unit
 from .even_columns import even_columns, unwrapped, wrap_note
-from .measurement import LARGEST_VALUE, LEAST_ROWS, _check_sampling
+from .measurement import LEAST_ROWS, check_sampling, column_of
 
 COLUMNS = {  # columns of a log and their contents
     "t": "time [s]",
@@ -85,8 +85,8 @@ class PairLog:
         for column in COLUMNS:
             value = getattr(self, column)
             if value is not None or column not in OPTIONAL:
-                object.__setattr__(self, column, _column(column, value, self.t))
-        _check_sampling(self.t)
+                object.__setattr__(self, column, column_of(column, value, self.t))
+        check_sampling(self.t)
         for column in ("leader", "follower", "follower_torque"):
             value = getattr(self, column)
             if np.ptp(value) == 0.0:
@@ -153,20 +153,6 @@ def logged(log: Log, columns: Mapping[str, str]) -> PairLog:
     names = {new: key for key, new in OUTPUT.items()}
     even: dict[str, Any] = {names.get(key, key): x for key, x in made.columns.items()}
     return PairLog(**even, name=log.path.stem, notes=(*notes, *made.notes))
-
-
-def _column(name: str, value: Any, t: Any) -> np.ndarray:
-    x = array_of(name, value, "must be an array of numbers")
-    if x.ndim != 1 or len(x) < LEAST_ROWS:
-        bound = f"must be one column of {LEAST_ROWS} samples or more"
-        raise ParameterError(name, f"shape {x.shape}", bound)
-    if len(x) != len(t):
-        raise ParameterError(name, f"{len(x)} samples", f"must be as long as t, {len(t)} samples")
-    if not np.all(np.abs(x) <= LARGEST_VALUE):
-        row = int(np.argmin(np.abs(x) <= LARGEST_VALUE))
-        bound = f"must be a finite number within +- {LARGEST_VALUE:g}"
-        raise ParameterError(f"{name}[{row}]", float(x[row]), bound)
-    return x
 
 
 # ---- files ---------------------------------------------------------------------------------------
