@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from ..arguments import checked, part
 from ..errors import Bound, ParameterError
 from . import gain_files
+from .mjcf_arm import MjcfArm
 
 MOST_GAIN = 1e9
 FRICTION = ("Fc", "k", "Fv")  # of the torque Fc tanh(k w) + Fv w
@@ -115,6 +116,13 @@ def rate_filter(cutoff: float | None, Ts: float) -> tuple[float, float]:
     if cutoff is None:
         return 0.0, 1.0 / Ts
     return 1.0 / (1.0 + cutoff * Ts), cutoff / (1.0 + cutoff * Ts)
+
+
+def compensated(arm: Any, law: JointPD | None) -> bool:
+    """Whether the host of an arm feeds gravity forward: as its law says, or the arm."""
+    if law is not None and law.gravity is not None:
+        return law.gravity
+    return isinstance(arm, MjcfArm) and arm.gravity == "compensated"
 
 
 def checked_law(law: JointPD, names: Sequence[str]) -> JointPD:

@@ -334,7 +334,7 @@ def _check_mechanism(mechanism: Mechanism, names: Sequence[str]) -> None:
             "more can move under the constraints of the file"
         )
         raise ParameterError("joints", list(names), bound)
-    inertia = mechanism.inertia(mechanism.pose[mechanism.dofs])
+    inertia = mechanism.at(mechanism.pose[mechanism.dofs]).inertia
     if not np.linalg.eigvalsh(inertia).min() > LIGHTEST:
         light = names[int(np.diag(inertia).argmin())]
         bound = (

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 import threading
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,6 +40,14 @@ class Linear(NamedTuple):
     stiffness: np.ndarray
     gravity_stiffness: np.ndarray
     weight_stiffness: np.ndarray
+    jacobian: np.ndarray
+
+
+class Resting(NamedTuple):
+    """Terms of an arm at rest, n joints, as in `Linear`."""
+
+    inertia: np.ndarray
+    damping: np.ndarray
     jacobian: np.ndarray
 
 
@@ -107,14 +116,12 @@ class Mechanism:
         Raises:
             ParameterError: constraints cannot be satisfied there.
         """
-        inertia, follow = self.inertia(q), self._follow()
-        damping = follow.T @ (self._model.dof_damping[:, None] * follow)
-        jacobian = self._jacobian() @ follow
+        inertia, damping, jacobian = self.at(q)
         springs, gravity, weight = self._stiffness(q)
         return Linear(inertia, damping, springs, gravity, weight, jacobian)
 
-    def inertia(self, q: np.ndarray) -> np.ndarray:
-        """M, rotors included [kg.m^2 or kg], shape (n, n).
+    def at(self, q: np.ndarray) -> Resting:
+        """Places the arm, and returns its inertia, dampers and Jacobian there.
 
         Raises:
             ParameterError: constraints cannot be satisfied there.
@@ -122,7 +129,8 @@ class Mechanism:
         self._at(q)
         whole, follow = np.zeros((self._model.nv,) * 2), self._follow()
         self._mujoco.mj_fullM(self._model, self._data, whole)
-        return follow.T @ whole @ follow
+        damping = follow.T @ (self._model.dof_damping[:, None] * follow)
+        return Resting(follow.T @ whole @ follow, damping, self._jacobian() @ follow)
 
     def handle(self, q: np.ndarray) -> np.ndarray:
         """Position of the handle in the frame of the world [m], shape (3,)."""
@@ -131,6 +139,7 @@ class Mechanism:
 
     # ---- runs
 
+    @cached_property
     def axes(self) -> list[int]:
         """Axes of the world along which the handle can move, here or at poses nearby."""
         rng = np.random.default_rng(0)
@@ -197,16 +206,6 @@ class Mechanism:
     def put(self, position: np.ndarray) -> None:
         """Puts all joints of the model to positions at which its constraints hold [rad or m]."""
         self._place(position)
-
-    def at(self, q: np.ndarray) -> Linear:
-        """Places the arm, and returns its inertia, dampers and Jacobian there."""
-        self._at(q)
-        whole, follow = np.zeros((self._model.nv,) * 2), self._follow()
-        self._mujoco.mj_fullM(self._model, self._data, whole)
-        none = np.zeros((len(self.dofs),) * 2)
-        damping = follow.T @ (self._model.dof_damping[:, None] * follow)
-        jacobian = self._jacobian() @ follow
-        return Linear(follow.T @ whole @ follow, damping, none, none, none, jacobian)
 
     def moving(self, w: np.ndarray) -> Moving:
         """Terms of the arm's motion where `at` put it, at rates of its joints [rad/s]."""

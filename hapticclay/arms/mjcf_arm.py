@@ -116,7 +116,7 @@ class MjcfArm:
             ParameterError: the arm has no handle, or it does not move along the plane.
         """
         self.check_handle()
-        found = "".join("xyz"[i] for i in self.mechanism.axes())
+        found = "".join("xyz"[i] for i in self.mechanism.axes)
         plane = self.plane or (found + "".join(c for c in "xyz" if c not in found))[:2]
         return plane + "".join(c for c in found if c not in plane)
 
@@ -140,7 +140,7 @@ class MjcfArm:
         Raises:
             ParameterError: as `linear`.
         """
-        return self.mechanism.inertia(self._place(q))
+        return self.mechanism.at(self._place(q)).inertia
 
     def gravity_stiffness(self, q: Sequence[float] | np.ndarray | None = None) -> np.ndarray:
         """Change of the gravity torques with the joint positions [N.m/rad], shape (n, n).
@@ -163,7 +163,7 @@ class MjcfArm:
             ParameterError: as `linear`, or the arm has no handle.
         """
         self.check_handle()
-        return self.linear(q).jacobian
+        return self.mechanism.at(self._place(q)).jacobian
 
     def handle(self, q: Sequence[float] | np.ndarray | None = None) -> np.ndarray:
         """Position of the handle in the world [m], shape (3,).

@@ -23,21 +23,16 @@ class ClosedChain:
     """
 
     def __init__(self, scenario: Scenario, places: dict[str, np.ndarray]):
-        arm: Any = scenario.arm
+        arm: Any = scenario.file_arm
         of, n = arm.mechanism, len(arm.names)
         self.chain = Mechanism(copy.copy(of.model), of.dofs, of.site, of.pose)
         self.rows = ["xyz".index(c) for c in arm.axes]
         self.pose, self.rates = places["pose"][:n], places["pose"][n:]
-        self.inertia, self.dampers = (
-            places["joint_M"].reshape(n, n),
-            places["joint_D"].reshape(n, n),
-        )
+        self.inertia = places["joint_M"].reshape(n, n)
+        self.dampers = places["joint_D"].reshape(n, n)
         self.own_dampers = np.diag(arm.damping)
-        self.J, self.bias, self.C = (
-            places["joint_J"].reshape(3, n),
-            places["joint_bias"],
-            places["joint_c"],
-        )
+        self.J = places["joint_J"].reshape(3, n)
+        self.bias, self.C = places["joint_bias"], places["joint_c"]
         self.scratch_J, self.held = places["scratch_J"].reshape(3, n), places["scratch_bias"]
         self.handle, self.scratch_handle = np.zeros(3), np.zeros(3)
         self.springs = [np.array(x) for x in of.springs]

@@ -27,7 +27,7 @@ class JointMover(Mover):
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)
-        arm: Any = scenario.arm
+        arm: Any = scenario.file_arm
         mechanism = arm.mechanism
         self.home = mechanism.pose
         self.kind, self.site = mechanism.site
@@ -52,7 +52,7 @@ class JointMover(Mover):
         self.closed = chain.at_pose, chain.at_rates, chain.at_scratch
 
     def build(self, scenario: Scenario) -> Any:
-        return scenario.arm.mechanism.runnable()  # type: ignore[union-attr]
+        return scenario.file_arm.mechanism.runnable()
 
     def fill_plain(self, made: Any) -> None:
         super().fill_plain(made)

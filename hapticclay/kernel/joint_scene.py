@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arms.joint_law import JointPD
+from ..arms.joint_law import JointPD, compensated
 from ..scene.scenario import Scenario
 from . import joint_law, records
 
@@ -15,7 +15,7 @@ RATES = {"exact": joint_law.EXACT, "difference": joint_law.DIFFERENCE, "filter":
 
 def put_arm(m: Any, arrays: dict[str, np.ndarray], s: Scenario) -> None:
     """An arm from a file: joints, axes of its handle, dampers, springs and friction."""
-    arm: Any = s.arm
+    arm: Any = s.file_arm
     n, axes = len(arm.names), ["xyz".index(c) for c in arm.axes]
     m.general, m.joints, m.axes = 1, n, len(axes)
     m.closed = int(bool(arm.mechanism.following))
@@ -34,14 +34,12 @@ def put_arm(m: Any, arrays: dict[str, np.ndarray], s: Scenario) -> None:
 
 def put_weight(m: Any, s: Scenario, axes: list[int]) -> None:
     """Weight of the hand, and whether the law holds it and the arm."""
-    mechanism: Any = s.arm.mechanism  # type: ignore[union-attr]
+    mechanism = s.file_arm.mechanism
     weighs, gravity = mechanism.weighs, np.array(mechanism.model.opt.gravity)[axes]
     hand = s.operators[0]
     m.weight[: len(axes)] = ((hand.mass if hand and weighs else 0.0) * gravity).tolist()
-    law, holds = s.controller, s.arm.gravity == "compensated"  # type: ignore[union-attr]
-    if isinstance(law, JointPD) and law.gravity is not None:
-        holds = law.gravity
-    m.feeds_gravity = int(holds and weighs)
+    law = s.controller if isinstance(s.controller, JointPD) else None
+    m.feeds_gravity = int(compensated(s.arm, law) and weighs)
 
 
 def put_law(m: Any, law: JointPD) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ..arms.joint_law import JointPD
@@ -12,15 +10,14 @@ from .scenario import Scenario
 
 def torque_limits(s: Scenario) -> np.ndarray:
     """Largest torque of each motor [N.m], infinite for none, shape (n,)."""
-    arm: Any = s.arm
-    return np.array(s.torque_limit if s.is_closed_form else arm.torque_limit)
+    return np.array(s.torque_limit if s.is_closed_form else s.file_arm.torque_limit)
 
 
 def references(s: Scenario) -> np.ndarray | None:
     """Joint positions to which the law pulls [rad], shape (n,); None where no law does."""
-    law, arm = s.controller, s.arm
+    law = s.controller
     if not isinstance(law, JointPD):
         return None
     if law.reference is not None:
         return np.array(law.reference)
-    return None if s.is_closed_form else arm.q  # type: ignore[union-attr]
+    return None if s.is_closed_form else s.file_arm.q

@@ -177,13 +177,6 @@ def _plain(inertia: np.ndarray, damping: np.ndarray, jacobian: np.ndarray) -> Li
     return Linear(inertia, damping, none, none, none, jacobian)
 
 
-def compensated(arm: Any, law: JointPD) -> bool:
-    """Whether the host of an arm feeds gravity forward."""
-    if law.gravity is not None:
-        return law.gravity
-    return isinstance(arm, MjcfArm) and arm.gravity == "compensated"
-
-
 def notes_of(arm: Any) -> tuple[str, ...]:
     """What an arm leaves open, a sentence each."""
     return arm.notes if isinstance(arm, MjcfArm) else (UNKNOWN_ROTOR,)

@@ -14,7 +14,7 @@ def stored(scenario: Scenario, m: Any, s: Any) -> tuple[float, float]:
 
     That of the arm at rest at its start is 0.
     """
-    arm: Any = scenario.arm
+    arm = scenario.file_arm
     n = m.joints
     w = np.array(s.w[:n])
     q = np.array(s.q[:n]) - s.before * w  # where the kick was

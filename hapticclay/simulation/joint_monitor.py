@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arms.joint_law import JointPD
+from ..arms.joint_law import JointPD, compensated
 from ..model.operator import NO_HAND
 from ..scene.scenario import Scenario
 from ..theory.joint_gains import joint_loop
@@ -76,7 +76,7 @@ class JointMonitor:
     def __init__(self, scenario: Scenario, monitored: bool = True):
         self.scenario = scenario
         self.monitored = monitored and not (scenario.driven and is_stable_at_start(scenario))
-        arm: Any = scenario.arm
+        arm = scenario.file_arm
         self.names, self.ranges = arm.names, arm.ranges
         self.limits = np.array(arm.torque_limit)
         self.onset: Outcome | None = None
@@ -176,11 +176,11 @@ class JointMonitor:
 
 def is_stable_at_start(scenario: Scenario) -> bool:
     """Whether the loop of the joints is stable at the arm's pose; so is one that is not known."""
-    arm: Any = scenario.arm
+    arm = scenario.file_arm
     law, hand = scenario.controller, scenario.operators[0]
     if not isinstance(law, JointPD):
         return True
     linear = held_arm(arm.linear(), hand or NO_HAND)
     delay = scenario.hardware.delay if scenario.hardware else 0.0
-    compensated = arm.gravity == "compensated" if law.gravity is None else law.gravity
-    return joint_loop(linear, law, scenario.Ts or scenario.dt, delay, compensated).stable()
+    feeds = compensated(arm, law)
+    return joint_loop(linear, law, scenario.Ts or scenario.dt, delay, feeds).stable()

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..arms.joint_law import rate_filter
+from ..arms.joint_law import compensated, rate_filter
 from ..errors import Bound, ParameterError
 from ..model.shapes import Pulse
 from ..model.signals import Signal
@@ -151,14 +151,14 @@ class _Host:
 
     def __init__(self, pair: Pair, i: int, control: Control, run: Simulation):
         self.pair, self.i, self.control, self.run = pair, i, control, run
-        self.arm, self.law = run.scenario.arm, pair.laws[i]
-        self.axes = ["xyz".index(c) for c in self.arm.axes]  # type: ignore[union-attr]
+        self.arm, self.law = run.scenario.file_arm, pair.laws[i]
+        self.axes = ["xyz".index(c) for c in self.arm.axes]
         self.start = run.state.q.copy()
         self.own, self.other = np.zeros(pair.n), np.zeros(pair.n)
         self.arrived = np.zeros(len(control.message))  # waves; others pull as they arrive
         self.newest, self.x = -1, np.zeros(control.states)
         self.last_q, self.rate = np.zeros(pair.n), np.zeros(pair.n)
-        self.held = pairs.compensated(pair.arms[i], self.law)
+        self.held = compensated(pair.arms[i], self.law)
         self.acts = i == 1 or ARCHITECTURES[pair.link.kind].leader_law
         self.weight = self._weight(self.start)
         self.port = Port(pairs.linear_arm(pair.arms[i]).inertia, pair.Ts, pair.link.reserve)
@@ -166,7 +166,7 @@ class _Host:
 
     def _weight(self, q: np.ndarray) -> np.ndarray:
         """Torque against the arm's weight."""
-        mechanism: Any = self.arm.mechanism  # type: ignore[union-attr]
+        mechanism = self.arm.mechanism
         if not (self.held and mechanism.weighs):
             return np.zeros(len(q))
         mechanism.at(q)

@@ -218,7 +218,7 @@ class Run:
         s, m = self.row.s, self.row.m
         if m.general:
             q = np.array(s.q[: m.joints]) + h * np.array(s.w[: m.joints])
-            x, y = self.scenario.arm.handle(q)[list(m.row[:2])] - np.array(m.at[:2])  # type: ignore[union-attr]
+            x, y = self.scenario.file_arm.handle(q)[list(m.row[:2])] - np.array(m.at[:2])
             return float(x), float(y)
         return arm.place(self.row.m, s.q[0] + h * s.w[0], s.q[1] + h * s.w[1])
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import checked, named
-from ..arms.joint_law import JointPD
+from ..arms.joint_law import JointPD, compensated
 from ..arms.mjcf_arm import MjcfArm
 from ..errors import ParameterError
 from ..model.hardware import Hardware
@@ -316,8 +316,7 @@ def holding(arm: MjcfArm, law: JointPD) -> np.ndarray:
     """
     arm.mechanism.at(arm.q)
     pull = arm.mechanism.moving(np.zeros(len(arm.names))).bias
-    if law.gravity if law.gravity is not None else arm.gravity == "compensated":
-        arm.mechanism.at(arm.q)
+    if compensated(arm, law):
         pull = pull - arm.mechanism.weights()
     pulled, Kp = np.abs(pull) > 1e-9, np.array(law.Kp)
     if np.any(pulled & (Kp <= 0.0)):

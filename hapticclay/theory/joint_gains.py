@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..arms.joint_law import JointPD, checked_law
+from ..arms.joint_law import JointPD, checked_law, compensated
 from ..arms.mechanism import Linear
 from ..arms.mjcf_arm import MjcfArm
 from ..results import Result, Tables
@@ -326,7 +326,7 @@ class Study:
         self.Ts, self.delay = Ts, delay
         self._known: dict[tuple[int, float, float], tuple[Linear, JointLoop]] = {}
         self.arm, self.law = arm, checked_law(law, arm.names)
-        self.compensated = arm.gravity == "compensated" if law.gravity is None else law.gravity
+        self.compensated = compensated(arm, law)
         self.linear = arm.linear(q)
         self.loop = self.remade()
         self.circle = Circle(self.loop)

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from ..arguments import checked, named
-from ..arms.joint_law import JointPD
+from ..arms.joint_law import JointPD, compensated
 from ..arms.mechanism import Linear
 from ..arms.mjcf_arm import MjcfArm
 from ..errors import Bound, ParameterError
@@ -156,14 +156,15 @@ def wall_limit(
     if not np.abs(along).max() > STILL:
         raise ParameterError("axis", axis, "must be one along which the handle can move")
     none = (0.0,) * len(arm.names)
-    law, compensated = JointPD(none, none, velocity=velocity), arm.gravity == "compensated"
+    law = JointPD(none, none, velocity=velocity)
+    feeds = compensated(arm, law)
     square = np.outer(along, along)
 
     def rendered(K: float, **changes: Any) -> JointLoop:
         now = {"linear": linear, "law": law, "Ts": Ts, "delay": delay} | changes
-        return joint_loop(**now, compensated=compensated).feeding(K * square, B * square)
+        return joint_loop(**now, compensated=feeds).feeding(K * square, B * square)
 
-    loop = joint_loop(linear, law, Ts, delay, compensated)
+    loop = joint_loop(linear, law, Ts, delay, feeds)
     mass = float(1.0 / (along @ np.linalg.solve(linear.inertia, along)))
     limit = _limit(loop, along, B)
     over = [x for numbers in joint_changes.numbers(linear, delay, Ts) for x in numbers]
@@ -184,7 +185,7 @@ def wall_limit(
         by_delay,
         line_B,
         np.nan_to_num(line_K, nan=0.0, posinf=math.inf),
-        (*arm.notes, gravity_words(compensated), IGNORED),
+        (*arm.notes, gravity_words(feeds), IGNORED),
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arms.joint_law import JointPD
+from ..arms.joint_law import JointPD, compensated
 from ..arms.mechanism import Linear
 from ..arms.mjcf_arm import MjcfArm
 from ..errors import ParameterError
@@ -79,7 +79,7 @@ class Build:
         law, arm = pair.laws[i], pair.arms[i]
         none = np.zeros(pair.n)
         gains = (none, none) if i == 0 and not self.architecture.leader_law else None
-        known = pairs.compensated(arm, law)
+        known = compensated(arm, law)
         loop = joint_loop(linear, law, pair.Ts, pair.delay, known, gains)
         if slopes is None:
             return loop

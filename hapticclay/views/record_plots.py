@@ -121,7 +121,7 @@ def energies(record: Record) -> dict[str, np.ndarray]:
         "clay": work((record.fe * record.v).sum(axis=1)),
     }
     if not record.scenario.is_closed_form:
-        arm: Any = record.scenario.arm
+        arm = record.scenario.file_arm
         lost = np.array(arm.damping) * record.qd**2 + np.array(arm.friction) * np.abs(record.qd)
         return out | {"joints": work(lost.sum(axis=1)), "stored": _stored(record)}
     I1, I2 = record.scenario.arm.links[2:4]
@@ -131,7 +131,7 @@ def energies(record: Record) -> dict[str, np.ndarray]:
 
 def _stored(record: Record) -> np.ndarray:
     """Energy of motion, weight and springs that an arm from a file has gained [J]."""
-    mechanism: Any = record.scenario.arm.mechanism  # type: ignore[union-attr]
+    mechanism = record.scenario.file_arm.mechanism
     shown = spread(np.arange(len(record.t)), MOST_STORED)
     found = np.array([mechanism.energy(record.q[k], record.qd[k]) for k in shown])
     return np.interp(record.t, record.t[shown], found - found[0])

@@ -29,7 +29,7 @@ class StickStage:
     field = -1  # without clay
 
     def __init__(self, record: Record, magnify: float = 1.0):
-        arm: Any = record.scenario.arm
+        arm = record.scenario.file_arm
         self._arm, self._magnify = arm, magnify
         self._rest = np.median(record.q, axis=0) if magnify != 1.0 else np.zeros(len(arm.names))
         chosen = np.unique(np.linspace(0, len(record.q) - 1, POSES).astype(int))
