@@ -5,6 +5,7 @@ from . cimport joints
 
 cdef (double, double) place(Model m, double q1, double q2) noexcept nogil
 cdef (double, double) here(Model m, State s) noexcept nogil
+cdef void put_handle(Model m, State s, Kick k) noexcept nogil
 cdef void handle_at(Model m, Kick k, double q1, double q2, double r1, double r2) noexcept nogil
 cdef void turning(Kick k, double r1, double r2) noexcept nogil
 cdef void at_rates(Kick k, double w1, double w2) noexcept nogil

@@ -21,6 +21,14 @@ def here(m, s):
     return place(m, s.q[0], s.q[1])
 
 
+def put_handle(m, s, k):
+    """The handle where the arm is, at the rates of its joints."""
+    if m.general:
+        joints.handle_at(m, s, k)
+    else:
+        handle_at(m, k, s.q[0], s.q[1], s.w[0], s.w[0] + s.w[1])
+
+
 def handle_at(m, k, q1, q2, r1, r2):
     """The handle at a sample, with rates r1 and r2 of the links before the kick."""
     u, x, y = k.u, k.x, k.y

@@ -7,7 +7,6 @@ from . cimport borders
 from . cimport groove
 from . cimport hardware
 from . cimport joint_law
-from . cimport joints
 from . cimport memory
 from . cimport methods
 from . cimport sampled

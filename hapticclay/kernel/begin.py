@@ -10,7 +10,6 @@ from . import (
     groove,
     hardware,
     joint_law,
-    joints,
     memory,
     methods,
     sampled,
@@ -63,10 +62,7 @@ def put_clay(m, s, px, py):
     """The clay around the handle."""
     ix, iy = regions.region_of(m.table, (px, py))
     k, seen = s.k, s.seen
-    if m.general:
-        joints.handle_at(m, s, k)
-    else:
-        arm.handle_at(m, k, s.q[0], s.q[1], s.w[0], s.w[0] + s.w[1])
+    arm.put_handle(m, s, k)
     borders.enter(m, s, ix, iy, k.x.p, k.y.p, -1, 1.0)
     viscous.age(s)
     if m.groove:

@@ -43,36 +43,32 @@ def is_touched(m, k):
 
 def drive_alone(m, k):
     """Motion where nothing acts on the handle."""
-    e, n = m.engine, m.joints
     for i in range(m.axes):
         o = k.axis[i]
         o.net = o.fe = 0.0
+    put_free_rates(m, k)
+    joints.put_rates_after(m, k)
+    for i in range(m.axes):
+        k.axis[i].u = joints.along(m, m.engine.joint_J, i, k.w, 0)
+
+
+def put_free_rates(m, k):
+    """Joint rates after a kick with its friction, without force at the handle."""
+    e, n = m.engine, m.joints
     if m.friction:
         joint_friction.find(m, k)
     for i in range(n):
         e.free[i] = e.moment[i] + k.H * k.slip[i]
     joints.solve(e.lower, 0, e.free, 0, n)
-    joints.put_rates_after(m, k)
-    for i in range(m.axes):
-        o = k.axis[i]
-        o.u = 0.0
-        for j in range(n):
-            o.u += e.joint_J[i * n + j] * k.w[j]
 
 
 def drive(m, s, k):
     """Motion where something acts on the handle: by the law of the plane."""
-    e, n = m.engine, m.joints
-    if m.friction:
-        joint_friction.find(m, k)
-    for i in range(n):
-        e.free[i] = e.moment[i] + k.H * k.slip[i]
-    joints.solve(e.lower, 0, e.free, 0, n)
+    e = m.engine
+    put_free_rates(m, k)
     rate = 1.0 / k.H
     for i in range(m.axes):
-        o, x = k.axis[i], 0.0
-        for j in range(n):
-            x += e.joint_J[i * n + j] * e.free[j]
+        o, x = k.axis[i], joints.along(m, e.joint_J, i, e.free, 0)
         o.n, o.a, o.rest = rate, rate * x, rate * (x - o.v)
     k.Sxx, k.Sxy, k.Syy = k.Wxx, k.Wxy, k.Wyy
     if m.axes > 2:

@@ -88,11 +88,7 @@ def render(m, s, k):
     e, after, n = m.engine, s.next, m.joints
     if m.general:
         joints.place(m, k, e.scratch_handle)
-        for i in range(2):
-            o = k.axis[i]
-            o.v = 0.0
-            for j in range(n):
-                o.v += e.scratch_J[i * n + j] * s.rates[j]
+        joints.handle_velocity(m, k, e.scratch_J, s.rates)
     else:
         arm.handle_at(m, k, s.angles[0], s.angles[1], s.rates[0], s.rates[0] + s.rates[1])
     fx, fy = laws.force_for_controller(m, s, k)

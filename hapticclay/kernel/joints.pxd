@@ -8,7 +8,9 @@ cdef void gather(Model m, double *J, double *A) noexcept nogil
 cdef void turn(Model m, Kick k, double *rates, double *g, double h) noexcept nogil
 cdef void put_centripetal(Model m, Kick k) noexcept nogil
 cdef void place(Model m, Kick k, double *of) noexcept nogil
-cdef void handle_velocity(Model m, Kick k, double *rates) noexcept nogil
+cdef void handle_velocity(Model m, Kick k, double *J, double *rates) noexcept nogil
+@cython.locals(out=cython.double)
+cdef double along(Model m, double *J, long i, double *x, long at) noexcept nogil
 cdef void handle_at(Model m, State s, Kick k) noexcept nogil
 cdef (double, double) place_after(Model m, State s, double after) noexcept nogil
 cdef void before_kick(Model m, State s, Kick k) noexcept nogil
@@ -22,7 +24,6 @@ cdef void factor_inertia(Model m, double h) noexcept nogil
 cdef void factor(double *A, long at, long n) noexcept nogil
 cdef void solve(double *L, long of, double *x, long at, long n) noexcept nogil
 cdef void put_mobility(Model m, Kick k) noexcept nogil
-@cython.locals(x=cython.double)
 cdef double mobility(Model m, long i, long j) noexcept nogil
 cdef void eliminate(Kick k, double d) noexcept nogil
 @cython.locals(x=cython.double)

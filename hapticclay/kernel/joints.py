@@ -87,21 +87,25 @@ def place(m, k, of):
         k.axis[i].p = of[m.row[i]] - m.at[i]
 
 
-def handle_velocity(m, k, rates):
-    """Velocity of the handle at joint rates."""
-    e, n = m.engine, m.joints
+def handle_velocity(m, k, J, rates):
+    """Velocity of the handle at joint rates, by its Jacobian."""
     for i in range(m.axes):
-        o = k.axis[i]
-        o.v = 0.0
-        for j in range(n):
-            o.v += e.joint_J[i * n + j] * rates[j]
+        k.axis[i].v = along(m, J, i, rates, 0)
+
+
+def along(m, J, i, x, at):
+    """Row i of a Jacobian times rates or accelerations of the joints: x from `at` on."""
+    out = 0.0
+    for j in range(m.joints):
+        out += J[i * m.joints + j] * x[at + j]
+    return out
 
 
 def handle_at(m, s, k):
     """The handle after a step."""
     sense(m, s)
     place(m, k, m.engine.handle)
-    handle_velocity(m, k, s.w)
+    handle_velocity(m, k, m.engine.joint_J, s.w)
 
 
 def place_after(m, s, after):
@@ -150,7 +154,7 @@ def from_event(m, s, k):
 
 def at_event(m, k):
     """The handle after the kick to an event."""
-    handle_velocity(m, k, k.w)
+    handle_velocity(m, k, m.engine.joint_J, k.w)
 
 
 # ---- a kick --------------------------------------------------------------------------------------
@@ -217,10 +221,8 @@ def put_mobility(m, k):
 
 def mobility(m, i, j):
     """Acceleration of the handle along one axis per force along another [1/kg]."""
-    e, n, x = m.engine, m.joints, 0.0
-    for r in range(n):
-        x += e.joint_J[i * n + r] * e.Y[j * n + r]
-    return x
+    e = m.engine
+    return along(m, e.joint_J, i, e.Y, j * m.joints)
 
 
 def eliminate(k, d):
@@ -282,10 +284,8 @@ def prepare_sensor(m, s, k):
     put_mobility(m, k)
     for i in range(m.axes):
         o = k.axis[i]
-        o.n, o.rest = 1.0, 0.0
-        for j in range(n):
-            o.rest += e.joint_J[i * n + j] * e.free[j]
-        o.a = o.rest
+        o.n = 1.0
+        o.a = o.rest = along(m, e.joint_J, i, e.free, 0)
     if m.axes > 2:
         z = k.z
         z.f = m.weight[2] - hand.resistance(m, z.p, z.v, z.c, 2)

@@ -6,7 +6,6 @@ from . cimport arm
 from . cimport borders
 from . cimport ends
 from . cimport hits
-from . cimport joints
 from . cimport laws
 from . cimport march
 from . cimport memory

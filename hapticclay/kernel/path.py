@@ -12,7 +12,6 @@ from . import (
     borders,
     ends,
     hits,
-    joints,
     laws,
     march,
     memory,
@@ -82,10 +81,7 @@ def take(m, s, after, target):
         viscous.age(s)
         if m.special:
             k = s.e  # not needed any more
-            if m.general:
-                joints.handle_at(m, s, k)
-            else:
-                arm.handle_at(m, k, s.q[0], s.q[1], s.w[0], s.w[0] + s.w[1])
+            arm.put_handle(m, s, k)
             laws.moved(m, s, k.x.p, k.y.p, k.x.v, k.y.v, after)
     t = s.t + after
     if target - t <= 1e-9 * m.dt:
