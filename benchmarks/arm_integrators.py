@@ -8,6 +8,8 @@ A bisection on the common factor of all Kp asks of each integrator and step whet
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -56,8 +58,13 @@ def grows(
         sizes.append(np.abs(data.qpos - arm.q).max())
         if not sizes[-1] < 1e-2:
             return True
-    quarter = len(sizes) // 4
-    return max(sizes[-quarter:]) > max(sizes[-2 * quarter : -quarter])
+    return outgrows(np.array(sizes))
+
+
+def outgrows(sizes: np.ndarray) -> bool:
+    """Whether deviations are larger in the last quarter of a run than in the one before."""
+    n = len(sizes) // 4
+    return bool(sizes[-n:].max() > sizes[-2 * n : -n].max())
 
 
 def limit(arm: hc.MjcfArm, integrator: str, substeps: int, late: bool, guess: float) -> float:
@@ -65,12 +72,20 @@ def limit(arm: hc.MjcfArm, integrator: str, substeps: int, late: bool, guess: fl
     low, high = 0.5 * guess, 8.0 * guess
     if not grows(arm, high * KP, integrator, substeps, late):
         return np.inf
+    return bisected(lambda x: grows(arm, x * KP, integrator, substeps, late), low, high)
+
+
+def bisected(is_over: Callable[[float], bool], low: float, high: float) -> float:
+    """Factor between two at which runs begin to grow."""
     for _ in range(HALVINGS):
-        middle = np.sqrt(low * high)
-        low, high = (
-            (low, middle) if grows(arm, middle * KP, integrator, substeps, late) else (middle, high)
-        )
-    return float(np.sqrt(low * high))
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if is_over(middle) else (middle, high)
+    return math.sqrt(low * high)
+
+
+def step_words(substeps: int) -> str:
+    """A step as a part of the sample."""
+    return "Ts" if substeps == 1 else f"Ts/{substeps}"
 
 
 def main() -> None:
@@ -86,8 +101,7 @@ def main() -> None:
             cells.append(
                 "no limit found" if np.isinf(found) else f"{100 * (found / exact - 1):+.1f} %"
             )
-        step = "Ts" if substeps == 1 else f"Ts/{substeps}"
-        print(f"| {name} | {step} | {cells[0]} | {cells[1]} |", flush=True)
+        print(f"| {name} | {step_words(substeps)} | {cells[0]} | {cells[1]} |", flush=True)
 
 
 if __name__ == "__main__":

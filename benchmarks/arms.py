@@ -47,17 +47,12 @@ def grows(arm: hc.MjcfArm, factor: float, substeps: int) -> bool:
     record = hc.simulate(scenario(arm, factor, substeps, SECONDS))
     last = record.scenario.controller.reference  # type: ignore[union-attr]
     size = np.abs(record.q - np.array(last)).max(axis=1)
-    n = len(size) // 4
-    return record.outcome.code == "diverged" or size[-n:].max() > size[-2 * n : -n].max()
+    return record.outcome.code == "diverged" or engine.outgrows(size)
 
 
 def limit(arm: hc.MjcfArm, substeps: int, guess: float) -> float:
     """Factor of all Kp at which runs begin to grow."""
-    low, high = 0.5 * guess, 2.0 * guess
-    for _ in range(engine.HALVINGS):
-        middle = np.sqrt(low * high)
-        low, high = (low, middle) if grows(arm, middle, substeps) else (middle, high)
-    return float(np.sqrt(low * high))
+    return engine.bisected(lambda x: grows(arm, x, substeps), 0.5 * guess, 2.0 * guess)
 
 
 # ---- run time ------------------------------------------------------------------------------------
@@ -119,11 +114,6 @@ def resolution() -> float:
     return float((8.0 / 0.5) ** (0.5 / 2**engine.HALVINGS) - 1.0)
 
 
-def step_words(substeps: int) -> str:
-    """A step as a part of the sample."""
-    return "Ts" if substeps == 1 else f"Ts/{substeps}"
-
-
 def error_words(error: float | None) -> str:
     """An error in per cent."""
     return "no limit found" if error is None else f"{100.0 * error:+.2f} %"
@@ -134,7 +124,7 @@ def sections(data: dict[str, Any]) -> list[str]:
     cells = [
         [
             r["method"],
-            step_words(r["steps"]),
+            engine.step_words(r["steps"]),
             error_words(r["error"]),
             common.milliseconds(r["time"]),
         ]
