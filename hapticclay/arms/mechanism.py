@@ -153,11 +153,7 @@ class Mechanism:
         return np.flatnonzero(moves > STILL).tolist()
 
     def runnable(self) -> Any:
-        """A copy of the model in which nothing acts but inertia and weight.
-
-        Raises:
-            ParameterError: the weight of a part of the arm is compensated in the file.
-        """
+        """A copy of the model in which nothing acts but inertia and weight."""
         model, bits = copy.copy(self._model), self._mujoco.mjtDisableBit
         for name in ("CONSTRAINT", "SENSOR", "EULERDAMP"):
             model.opt.disableflags |= getattr(bits, f"mjDSBL_{name}")
@@ -173,19 +169,26 @@ class Mechanism:
 
     @property
     def weighs(self) -> bool:
-        """Whether weights act.
+        """Whether weights act."""
+        return not any(self._shares_of_weight())
+
+    def check_weight(self) -> None:
+        """Refuses to run an arm that weighs in parts.
 
         Raises:
-            ParameterError: only in a part of the arm.
+            ParameterError: the weight of a part of the arm is compensated in the file.
         """
+        shares = self._shares_of_weight()
+        if shares not in ([], [0.0], [1.0]):
+            bound = "must be 0 or 1 in runs, the same for all bodies"
+            raise ParameterError("gravcomp", shares, bound)
+
+    def _shares_of_weight(self) -> list[float]:
+        """Shares of the bodies' weights that are compensated: without gravity, 1."""
         model, off = self._model, self._mujoco.mjtDisableBit.mjDSBL_GRAVITY
         if model.opt.disableflags & off or not np.any(model.opt.gravity):
-            return False
-        shares = np.unique(model.body_gravcomp[1:][model.body_mass[1:] > 0.0])
-        if np.any(shares) and not np.array_equal(shares, [1.0]):
-            bound = "must be 0 or 1 in runs, the same for all bodies"
-            raise ParameterError("gravcomp", shares.tolist(), bound)
-        return not np.any(shares)
+            return [1.0]
+        return np.unique(model.body_gravcomp[1:][model.body_mass[1:] > 0.0]).tolist()
 
     @property
     def springs(self) -> tuple[np.ndarray, np.ndarray]:

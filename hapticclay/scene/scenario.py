@@ -425,7 +425,7 @@ def _check_arm(s: Scenario) -> None:
             raise ParameterError(name, getattr(s, name), bound)
     if len(arm.names) > MOST_JOINTS:
         raise ParameterError("arm", arm.name, f"must have at most {MOST_JOINTS} joints in runs")
-    arm.mechanism.runnable()
+    arm.mechanism.check_weight()
     limits: Any = arm.torque_limit
     if isinstance(law, JointPD) and law.runs == "drive" and any(map(math.isfinite, limits)):
         bound = "must be none where drives run the law, whose limits are not simulated"
