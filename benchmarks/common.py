@@ -99,6 +99,23 @@ def note(out: Path, name: str, data: dict[str, Any]) -> None:
         f.write((json.dumps(data, indent=1, allow_nan=False) + "\n").encode())
 
 
+def publish(out: Path | None, name: str, rows: list[dict[str, Any]], page: str) -> None:
+    """Print a page and, with a folder, write it and its rows, with the machine.
+
+    Args:
+        out: the folder.
+        name: of both files.
+        rows: of the data; a number that was not found is NaN.
+        page: the page.
+    """
+    print(page)
+    if out:
+        with files.atomic(out / f"{name}.json") as f:
+            f.write((json.dumps({"machine": machine(), "rows": rows}, indent=1) + "\n").encode())
+        with files.atomic(out / f"{name}.md") as f:
+            f.write(page.encode())
+
+
 def parser(doc: str | None) -> argparse.ArgumentParser:
     """Return the command line that all benchmarks share: --out.
 

@@ -10,7 +10,6 @@ With a folder, writes fit.md and fit.json. 200 seeds take some twenty minutes of
 from __future__ import annotations
 
 import functools
-import json
 import math
 import multiprocessing
 import statistics
@@ -23,7 +22,6 @@ from tabulate import tabulate
 from tqdm import tqdm
 
 import hapticclay as hc
-from hapticclay import files
 
 from . import common
 
@@ -184,13 +182,7 @@ def main(seeds: int = 200, processes: int = 2, out: Path | None = None) -> list[
         show = functools.partial(tqdm, total=seeds, disable=None)
         rows = [r for some in show(pool.map(trials, range(seeds))) for r in some]
     found = summary(rows)
-    print(page(found))
-    if out:
-        with files.atomic(out / "fit.json") as f:
-            data = {"machine": common.machine(), "rows": found}
-            f.write((json.dumps(data, indent=1) + "\n").encode())
-        with files.atomic(out / "fit.md") as f:
-            f.write(page(found).encode())
+    common.publish(out, "fit", found, page(found))
     return found
 
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import functools
 import importlib
-import json
 import math
 import multiprocessing
 import statistics
@@ -26,7 +25,6 @@ from tabulate import tabulate
 from tqdm import tqdm
 
 import hapticclay as hc
-from hapticclay import files
 from hapticclay.studies import identification
 
 from . import common
@@ -147,20 +145,8 @@ def main(seeds: int = 200, processes: int = 2, out: Path | None = None) -> list[
         rows = [
             r for some in tqdm(pool.map(one, range(seeds)), total=seeds, disable=None) for r in some
         ]
-    return deliver(rows, out)
-
-
-def deliver(rows: list[dict[str, Any]], out: Path | None = None) -> list[dict[str, Any]]:
-    """Prints the summary of rows of `one` and, with a folder, writes both files."""
     found = summary(rows)
-    print(page(found))
-    if out:
-        with files.atomic(out / "intervals.json") as f:
-            f.write(
-                (json.dumps({"machine": common.machine(), "rows": found}, indent=1) + "\n").encode()
-            )
-        with files.atomic(out / "intervals.md") as f:
-            f.write(page(found).encode())
+    common.publish(out, "intervals", found, page(found))
     return found
 
 

@@ -10,7 +10,6 @@ time.
 
 from __future__ import annotations
 
-import json
 import math
 import statistics
 from collections.abc import Callable
@@ -22,7 +21,6 @@ from tabulate import tabulate
 from tqdm import tqdm
 
 import hapticclay as hc
-from hapticclay import files
 
 from . import common
 
@@ -160,13 +158,7 @@ def main(seeds: int = 300, out: Path | None = None) -> list[dict[str, Any]]:
     """Measures, prints and, with a folder, writes both files."""
     rows = [one(seed, log) for seed in tqdm(range(seeds), disable=None) for log in LOGS]
     found = summary(rows)
-    print(page(found))
-    if out:
-        with files.atomic(out / "logs.json") as f:
-            data = {"machine": common.machine(), "rows": found}
-            f.write((json.dumps(data, indent=1) + "\n").encode())
-        with files.atomic(out / "logs.md") as f:
-            f.write(page(found).encode())
+    common.publish(out, "logs", found, page(found))
     return found
 
 
