@@ -166,12 +166,12 @@ def test_units_of_no_force_or_length_are_refused(unit, tmp_path):
     path = tmp_path / "log.csv"
     for name in (f"x [{unit}]", f"x ({unit})", f"x [{unit}] filtered"):
         path.write_text(table(NUMBERS, ("t", name, "y")))
-        with pytest.raises(hc.ParameterError, match="unit|not in"):
+        with pytest.raises(hc.ParameterError, match="must be in|not in"):
             hc.Samples.csv(path, ("t", name, "y"))
-        with pytest.raises(hc.ParameterError, match="unit|not in"):
+        with pytest.raises(hc.ParameterError, match="must be in|not in"):
             hc.studies.Measurement.load(path, {"input": name, "output": "y"})
     path.write_text(table(NUMBERS, ("t", f"x [{unit}]", "y")))
-    with pytest.raises(hc.ParameterError, match="unit|not in"):
+    with pytest.raises(hc.ParameterError, match="must be in|not in"):
         Trajectory.of_file(path)
 
 
