@@ -33,6 +33,7 @@ LOST = 0.05  # ... if no larger share of all rows is missing
 TICK = 0.02  # of the duration: stamps of a coarser clock are no times of rows
 TURNS = (math.tau, 360.0)  # at which angles begin again [rad, deg]
 WRAP = 0.1  # of a turn: jumps at a wrap differ from the turn by less ...
+HELD_SPANS = 20  # between changes of a column by which one that is held is known
 INSIDE, SLACK = 0.5, 1e-3  # ... all steps that go on are smaller, and like those around to this
 Between = Literal["spline", "linear", "hold"]
 Columns = dict[str, np.ndarray]
@@ -91,6 +92,15 @@ def unwrapped(x: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
         if jumps.any() and span <= turn * (1.0 + 1e-6) and _go_on(on, jumps, turn):
             return _along(x, steps - on), turn, np.flatnonzero(jumps) + 1
     return x, 0.0, np.zeros(0, dtype=int)
+
+
+def held_rows(x: np.ndarray) -> int:
+    """Rows over which a column is held, where it changes only every so many; 1 for any other."""
+    spans = np.diff(np.flatnonzero(np.diff(x)))
+    if len(spans) < HELD_SPANS or (shortest := int(spans.min())) < 2:
+        return 1
+    whole = np.all(spans % shortest == 0) and np.mean(spans == shortest) > 0.5
+    return shortest if whole else 1
 
 
 def _along(x: np.ndarray, jumps: np.ndarray) -> np.ndarray:

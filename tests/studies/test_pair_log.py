@@ -285,3 +285,32 @@ def test_a_missing_column_is_told_with_all_that_there_are(columns, tmp_path):
     (tmp_path / "log.csv").write_text("t,a,b,c\n" + "".join(f"{i},1,2,3\n" for i in range(50)))
     with pytest.raises(hc.ParameterError, match="t, a, b, c"):
         hc.studies.PairLog.load(tmp_path / "log.csv", columns)
+
+
+def sines(*parts):
+    """A log of the exact law 12 e + 0.1 de/dt, its error e of sines of (size, omega)."""
+    T = 5e-4
+    t = T * np.arange(8000)
+    leader = 0.09 * np.sin(4.4 * t) + 0.05 * np.sin(12.0 * t + 1.0) + 0.02 * np.sin(27.0 * t)
+    e = sum(a * np.sin(w * t) for a, w in parts)
+    torque = 12.0 * e + 0.1 * sum(a * w * np.cos(w * t) for a, w in parts)
+    return hc.studies.PairLog(t, leader, leader - e, torque, -torque)
+
+
+def test_an_error_of_one_sine_has_no_gains():
+    """Gain and phase are two numbers; P, D and lag are three."""
+    found = hc.studies.identify_pair(sines((2e-3, 30.0)))
+    for name in ("P", "D", "leader P", "leader D"):
+        assert math.isnan(found[name].low) and math.isnan(found[name].high)
+    assert sum("not told apart" in x for x in found.warnings) == 2
+
+
+@pytest.mark.parametrize("second", [(1e-3, 33.0), (2e-5, 90.0)])
+def test_an_error_of_two_sines_has_gains(second):
+    """Close ones, and one of a hundredth; differences in place of a rate are 0.25 ms late."""
+    found = hc.studies.identify_pair(sines((2e-3, 30.0), second))
+    assert not any("not told apart" in x for x in found.warnings)
+    assert found["P"].value == pytest.approx(12.0, rel=5e-3)
+    for name in ("P", "D"):
+        half = 0.5 * (found[name].high - found[name].low)
+        assert 0.0 < half < 0.02 * found[name].value
