@@ -208,16 +208,16 @@ def trajectory_of(words: tuple[str, ...]) -> Trajectory | None:
     if len(words) == 1 and Path(words[0]).suffix.lower() == ".csv":
         return Trajectory.of_file(words[0])
     axes = LINES.get(len(words), 0)
+    units = ("m",) * 2 * axes + ("m/s",) if axes else ("m",) * len(words)
     try:
-        places = [number_in("hand", w, "m") for w in words[: 2 * axes or None]]
-        speed = number_in("hand", words[-1], "m/s") if axes else 0.0
+        x = [number_in("hand", w, unit) for w, unit in zip(words, units, strict=True)]
     except ParameterError:  # a wrong unit
         raise
     except ValueError:
-        places = []
-    if len(words) in (2, 3) and places:
-        return Trajectory.to(tuple(places))
-    begin, end = tuple(places[:axes]), tuple(places[axes:])
+        x = []
+    if len(x) in (2, 3):
+        return Trajectory.to(tuple(x))
+    begin, end, speed = tuple(x[:axes]), tuple(x[axes:-1]), sum(x[-1:])
     if axes and begin != end:
         number("hand speed", speed, 1e-6, FASTEST, unit="m/s")
         return Trajectory((0.0, math.dist(begin, end) / speed), (begin, end))
