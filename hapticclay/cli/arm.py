@@ -119,10 +119,7 @@ class ArmCommand:
         record, mode = buzz(arm, law, *timing)
         shown, options = buzz_film.buzz_of(record, mode.frequency)
 
-        def progress(images: Any, count: int) -> Any:
-            return iter(console.progress_bar(images, total=count, desc="film", unit="frame"))
-
-        print(f"written to {film.film(shown, self.film, options, progress)}")
+        print(f"written to {film.film(shown, self.film, options, console.film_progress)}")
 
     def _answers(self, arm: MjcfArm) -> Any:
         """The limits of the gains, of a wall, and over poses: those that are asked for."""

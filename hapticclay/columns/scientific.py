@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import warnings
 import zipfile
 from collections.abc import Sequence
@@ -11,7 +12,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError, needing
+from ..files import MOST_READ, read_bytes
 from .array_tables import ArrayTable, Container
+from .matlab_elements import check_elements, is_version_5
 
 UNIT_NAMES = ("units", "unit", "Units", "Unit")
 DEEPEST = 12  # groups in one another
@@ -22,8 +25,11 @@ def matlab(field: str, path: Path, table: str = "") -> ArrayTable:
     """A MAT file of version 4 to 7.2: arrays and structures, and the scopes of Simulink."""
     from scipy.io import loadmat
 
+    content = read_bytes(path, MOST_READ)
+    if is_version_5(content):
+        check_elements(content)
     with warnings.catch_warnings(action="ignore"):
-        data = loadmat(path, simplify_cells=True)
+        data = loadmat(io.BytesIO(content), simplify_cells=True)
     data = {k: x for k, x in data.items() if not k.startswith("__")}
     if opaque := [k for k, x in data.items() if _is_opaque(x)]:
         data = {k: x for k, x in data.items() if k not in opaque}
