@@ -24,7 +24,7 @@ from .run import LONGEST_SESSION
 from .verdict import LiveVerdict
 
 SHOWN = 10.0  # [s] of the plots
-STIFFNESS = 10.0  # of a session's own hand, as a multiple of the spring of Th
+STIFFNESS = 50.0  # of a session's own hand, as a multiple of the spring of Th
 
 
 class PairFrame(NamedTuple):

@@ -71,7 +71,7 @@ class PairPage(LivePage):
         middle, wide = 0.5 * (low + high), float((high - low).max())
         camera, (back, _) = self.server.initial_camera, look(AZIMUTH, ELEVATION)
         camera.look_at, camera.fov = tuple(middle), 0.60
-        camera.position = tuple(middle + 2.3 * wide * back)
+        camera.position = tuple(middle + 2.9 * wide * back)
         self._light()
         floor = float(low[2]) - 0.06 * size
         self._table((*middle[:2], floor), 6.0 * wide, 6.0 * wide, 0.1)
