@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..results import Result
     from ..scene.pair import Pair
 
-OF_THEORY = ("delay", "kind", "Ts", "map", "compare", "cells", "feel", "run")
+OF_THEORY = ("delay", "kind", "Ts", "map", "compare", "cells", "feel", "run", "film")
 OF_LOGS = ("columns", "band", "level", "units", "counts", "table", "where")
 
 
@@ -47,6 +47,8 @@ class PairCommand:
             objects the pair is stable.
         run: Also run the pair for this time [s], under the muscle of the hand that the file gives;
             by default a push of 1 N for 50 ms.
+        film: Film of that run, of at least 8 s, in which small motion is magnified: .mp4, .webp or
+            .gif.
         data: Log of one axis, in place of a file of the pair, in any format that is read, or a
             scope of Simulink: time [s], both positions [rad], torques of both motors and the force
             on the follower [N.m].
@@ -68,6 +70,7 @@ class PairCommand:
     cells: Annotated[tuple[int, int], Bound(2, 200, names=("gains", "delays"))] = (20, 20)
     feel: Literal["x", "y", "z"] | None = None
     run: Annotated[float | None, Bound(0.0, 1e4, "s", above=True)] = None
+    film: Path | None = None
     data: Path | None = None
     columns: tuple[str, ...] = ()
     band: Annotated[float, Bound(0.1, 1e5, "Hz")] = 80.0
@@ -80,6 +83,7 @@ class PairCommand:
         Unused(("data",), "is in place of a file of the pair: give one of the two", ("file",)),
         Unused(OF_THEORY, "is for a file of the pair, not for a log", ("data",)),
         Unused(OF_LOGS, "is for a log: give --data", (), ("data",)),
+        Unused(("film",), "shows a run: give --run", (), ("run",)),
         Unused(("cells",), "is for a map: give --map delay-gain", (), ("map",)),
     )
 
@@ -92,9 +96,26 @@ class PairCommand:
         pair = self._pair(self.file)
         out = self.out or Path("out", "pair", self.file.stem)
         writable(out)
-        for found in list(self._answers(pair)):  # all is computed before a file is written
+        if self.film is not None:
+            from ..views.film import ready
+
+            writable(self.film.parent)
+            ready(self.film)
+        answers = list(self._answers(pair))  # all is computed before a file is written
+        for found in answers:
             console.deliver(found, out, self.figures)
+        if self.film is not None:
+            self._filmed(answers, self.film)
         return 0
+
+    def _filmed(self, answers: Sequence[Result], file: Path) -> None:
+        from ..simulation.pair_record import PairRecord
+        from ..views import film, pair_stage
+
+        for record in answers:
+            if isinstance(record, PairRecord):
+                options = film.FilmOptions(**pair_stage.look_of(record))
+                print(f"written to {film.film(record, file, options, console.film_progress)}")
 
     def _identified(self, data: Path) -> int:
         from ..studies.pair_identification import identify_pair

@@ -57,6 +57,9 @@ def test_options_replace_what_the_file_says(file, tmp_path, capsys):
         (["{}", "--kind", "wave"], "did you mean 'waves'"),
         (["{}", "--cells", "3", "3"], "give --map"),
         (["{}", "--map", "gain"], "delay-gain"),
+        (["{}", "--film", "pair.mp4"], "give --run"),
+        (["{}", "--run", "0.1", "--film", "pair.avi"], "must be one of .mp4, .webp, .gif"),
+        (["{}", "--run", "0.1", "--delay", "0.00031415", "--film", "x.webp"], "whole parts"),
         (["{}", "--dely", "1ms"], "did you mean --delay"),
     ],
 )
