@@ -80,7 +80,7 @@ class DeviceCommand:
     action: Loose[Literal["serve", "report"]]
     source: Loose[Path | None] = None
     arm: str | None = None
-    rate: Annotated[float | None, Bound(0.0, 1e5, "Hz", above=True)] = None
+    rate: Annotated[float | None, Bound(1.0, 1e5, "Hz")] = None
     operator: walls.Hand | None = None
     protocol: Literal["inverse", "rosbridge"] = "inverse"
     port: int | None = None

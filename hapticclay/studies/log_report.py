@@ -20,6 +20,7 @@ from ..results import Result
 from ..units import Powers, parse_unit, si_unit
 from .even_columns import held_rows, unwrapped
 from .outliers import runs_of, times
+from .pair_log import is_pair
 
 FEW = 3  # places that a remark names
 STUCK = 0.02  # share of the rows, in a run at the largest or smallest value, that is suspicious
@@ -272,6 +273,8 @@ def _commands(log: Log, time: str, unknown: set[str]) -> list[str]:
     every = {x: candidates(log, x) for x in ("force", "position", "command")}
     found = {x: [name for name in names if name not in unknown] for x, names in every.items()}
     file = shlex.quote(str(log.path))
+    if is_pair(log) and not unknown:
+        return [f"hapticclay pair --data {file}"]
     if not log.rows or not time or time in unknown or not found["position"]:
         return []
     place = found["position"][0]
