@@ -19,6 +19,7 @@ from hypothesis import Phase, settings
 os.environ.setdefault("MPLBACKEND", "agg")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: workers share the cores
 
+gc.set_threshold(20_000, 20, 20)  # modules and figures are many objects and little garbage
 from tests.hunt import EXAMPLES, HUNTS, MORE  # noqa: E402
 
 try:
