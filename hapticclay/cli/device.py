@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from ..errors import Bound, ParameterError, number, number_in
 from ..files import writable
-from . import console
+from . import console, walls
+from .arm_options import ArmOptions
 from .device_options import deliver_loops, write_report
 from .options import Loose
 from .run import deliver_record
@@ -26,11 +27,14 @@ if TYPE_CHECKING:
 WAIT = 0.1  # [s] between two looks at whether the session is to end
 LONGEST = 1e9  # [s] longest session
 PERIOD = 0.005  # [s] of a message, by default
+RATE = 1000.0  # [Hz] of the control of an arm from a file, by default
+OF_ARM = "site", "joints", "pose", "armature", "damping", "friction", "gravity"  # its options
+LINES = {5: 2, 7: 3}  # axes of a line from point to point, by its number of words with the speed
 
 
 @dataclass(frozen=True)
 class DeviceCommand:
-    """Serve the simulated arm as a haptic device, or report on the loop of a client.
+    """Serve a simulated arm as a haptic device, or report on the loop of a client.
 
     Programs for a real device connect over a WebSocket, read the position of the handle and send
     forces. The forces move the arm together with a simulated hand. `device serve` runs until
@@ -42,6 +46,11 @@ class DeviceCommand:
         action: serve or report.
         source: To serve: a scenario file, whose arm, hand and hardware are used; by default the
             paper's arm and hand. To report: the folder of a session.
+        arm: MJCF or URDF file of an arm to serve, or the name of one of the package: planar_2r,
+            five_bar, haptic_3, leader_7. Its handle moves along x, y and z of its world.
+        rate: Control rate of that arm [Hz], by default 1000.
+        operator: Mass, damper and spring of the hand that holds the handle [kg, N.s/m, N/m]; by
+            default those of the paper, 0.25 2 6, and 0.25 5 200 at the arm of a file.
         protocol: inverse is that of a Haply Inverse3; rosbridge has topics of CRTK and of a Touch's
             drivers, as JSON for ROS programs.
         port: Port to listen on, 0 for a free one; by default that of the protocol, 10001 or 9090.
@@ -51,9 +60,10 @@ class DeviceCommand:
             same messages give the same run.
         period: Simulated time that one message advances the arm, with --clock tick [s]; by default
             5 ms.
-        hand: Target of the hand: x y [m]; or x0 y0 x1 y1 and a speed [m/s] for a line; or a CSV
-            file with the columns t, x, y. By default the hand rests at the start.
-        plane: Plane of the device in which the arm moves.
+        hand: Target of the hand from the start: x y, or x y z [m]; or two such points and a speed
+            [m/s] for a line; or a CSV file with the columns t, x, y, and perhaps z. By default the
+            hand rests at the start.
+        plane: Plane of the device in which the two-link arm moves.
         buttons: CSV file with the columns t, a, b, c, home (0 or 1): buttons over time.
         clay: Add the clay of the scenario to the client's force.
         device_id: Identifier of the Inverse3, hexadecimal.
@@ -63,11 +73,15 @@ class DeviceCommand:
         out: Folder for the record, the exchanges and the report; by default out/device, for a
             report out/loop.
         plots: Draw the plots.
+        mechanism: The arm of --arm.
         figures: Formats and style of the plots.
     """
 
     action: Loose[Literal["serve", "report"]]
     source: Loose[Path | None] = None
+    arm: str | None = None
+    rate: Annotated[float | None, Bound(1.0, 1e5, "Hz")] = None
+    operator: walls.Hand | None = None
     protocol: Literal["inverse", "rosbridge"] = "inverse"
     port: int | None = None
     host: str = "127.0.0.1"
@@ -84,10 +98,13 @@ class DeviceCommand:
     duration: Annotated[float | None, Bound(0.0, LONGEST, "s")] = None
     out: Path | None = None
     plots: bool = True
+    mechanism: ArmOptions = ArmOptions()
     figures: console.FigureOptions = console.FigureOptions()
 
     unused: ClassVar[tuple[Unused, ...]] = (
         Unused(("period",), "is for --clock tick: give it too", (), ("clock=tick",)),
+        Unused(("arm", "operator"), "is in the scenario file: give one of the two", ("source",)),
+        Unused(("rate", *OF_ARM), "is of an arm from a file: give --arm", (), ("arm",)),
     )
 
     def __call__(self) -> int:
@@ -124,7 +141,7 @@ class DeviceCommand:
             self.origin,
         )
         return serve(
-            served_scenario(self.source),
+            self._scenario(),
             host=self.host,
             port=PORTS[self.protocol] if self.port is None else self.port,
             clock=self.clock,
@@ -135,6 +152,20 @@ class DeviceCommand:
             clay=self.clay,
             inverse3=shown,
         )
+
+    def _scenario(self) -> Scenario:
+        """What is served: a scenario file, an arm from a file, or the paper's arm and hand."""
+        from ..model.operator import Operator
+        from ..ports.device import held_scenario
+        from ..scene.scenario import Scenario
+
+        if self.source is not None:
+            return Scenario.load(self.source)
+        hand = walls.operator_of(self.operator)
+        if self.arm is not None:
+            arm = self.mechanism.arm(self.arm)
+            return held_scenario(arm, 1.0 / (self.rate or RATE), hand)
+        return Scenario(name="device", operator=hand or Operator(), force=(0.0, 0.0), length=None)
 
     def _deliver(self, server: DeviceServer, out: Path, planned: bool) -> int:
         """Writes and prints what happened; `planned` where the session lasted its duration."""
@@ -168,16 +199,6 @@ class DeviceCommand:
         return 0
 
 
-def served_scenario(source: Path | None) -> Scenario:
-    """What is served: a scenario file, or the paper's arm and hand."""
-    from ..model.operator import Operator
-    from ..scene.scenario import Scenario
-
-    if source is None:
-        return Scenario(name="device", operator=Operator(), force=(0.0, 0.0), length=None)
-    return Scenario.load(source)
-
-
 def trajectory_of(words: tuple[str, ...]) -> Trajectory | None:
     """Where the hand wants to be, from the words of an option."""
     from ..ports.device import FASTEST, Trajectory
@@ -186,19 +207,19 @@ def trajectory_of(words: tuple[str, ...]) -> Trajectory | None:
         return None
     if len(words) == 1 and Path(words[0]).suffix.lower() == ".csv":
         return Trajectory.of_file(words[0])
-    units = ("m", "m", "m", "m", "m/s")
+    axes = LINES.get(len(words), 0)
+    units = ("m",) * 2 * axes + ("m/s",) if axes else ("m",) * len(words)
     try:
-        x = [number_in("hand", w, unit) for w, unit in zip(words, units, strict=False)]
+        x = [number_in("hand", w, unit) for w, unit in zip(words, units, strict=True)]
     except ParameterError:  # a wrong unit
         raise
     except ValueError:
         x = []
-    x = x if len(x) == len(words) else []
-    if len(x) == 2:
-        return Trajectory.to((x[0], x[1]))
-    if len(x) == 5 and x[:2] != x[2:4]:
-        number("hand speed", x[4], 1e-6, FASTEST, unit="m/s")
-        way = math.dist(x[:2], x[2:4])
-        return Trajectory((0.0, way / x[4]), ((x[0], x[1]), (x[2], x[3])))
-    bound = "must be x y, or x0 y0 x1 y1 and a speed above 0, or a CSV file"
+    if len(x) in (2, 3):
+        return Trajectory.to(tuple(x))
+    begin, end, speed = tuple(x[:axes]), tuple(x[axes:-1]), sum(x[-1:])
+    if axes and begin != end:
+        number("hand speed", speed, 1e-6, FASTEST, unit="m/s")
+        return Trajectory((0.0, math.dist(begin, end) / speed), (begin, end))
+    bound = "must be x y, or x0 y0 x1 y1 and a speed above 0, with z for three axes; or a CSV file"
     raise ParameterError("hand", " ".join(words), bound)

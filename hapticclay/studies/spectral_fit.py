@@ -11,6 +11,7 @@ import numpy as np
 from ..arguments import checked
 from ..errors import Bound, ParameterError, numbers_of
 from ..fields import Axis
+from .even_columns import held_rows
 from .identification import (
     COEFFICIENT_NAMES,
     COHERENT,
@@ -45,6 +46,7 @@ NEIGHBOURS = 20  # lines to each side over which noise is averaged, at most
 WEIGHT_ROUNDS = 4  # of fit and noise; the weights settle in two
 
 Delay = Annotated[float, Bound(-1.0, 1.0, "s")]
+HELD = "the input changes only every {} rows, as a computer holds it: state it by held (--held)"
 Timing = tuple[bool, float]  # whether the input is held, and the delay of the position [s]
 # frequency [Hz], response, its deviation, coherence
 Averaged = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -95,6 +97,8 @@ def identify_data(
             f"the position jumps and does not return at t = {times(data.t[place.steps])} s: "
             "identify the parts one by one"
         )
+    if not held and what != "Th" and (rows := held_rows(columns.input)) > 1:
+        warnings.append(HELD.format(rows))
     columns = columns._replace(output=place.x)
     timing = held, delay
     found, left_out = _without_wrong_readings(what, columns, data, band, timing)
