@@ -1,6 +1,6 @@
 """A kick of an arm on the engine's terms, under torques that the motors hold."""
 
-from . import joint_friction, joints, kick
+from . import joint_friction, joints, kick, springs
 
 
 def move_under(m, s, k):
@@ -65,6 +65,9 @@ def put_free_rates(m, k):
 def drive(m, s, k):
     """Motion where something acts on the handle: by the law of the plane."""
     e = m.engine
+    if m.acts and m.springs:
+        for i in range(2):
+            k.axis[i].pull = springs.force(s, i, k.L)
     put_free_rates(m, k)
     rate = 1.0 / k.H
     for i in range(m.axes):
