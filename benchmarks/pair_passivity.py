@@ -49,11 +49,13 @@ def drawn(seed: int) -> hc.Pair:
         loss=float(rng.uniform(0.0, LOSS)),
         passivity=True,
         energy=float(10.0 ** rng.uniform(-3.0, -1.0)),
+        seed=seed,
     )
     device, law = hc.Device(6.0, 0.1), hc.JointPD((400.0,), (50.0,))
     clay = hc.Contact(float(10.0 ** rng.uniform(2.0, 3.0)), 1.0)
     hand = hc.Operator(2.0, 2.0, 10.0)
-    return hc.Pair(device, device, law, link, Ts=TS, leader_operator=hand, follower_clay=clay)
+    held = {"leader_operator": hand, "follower_clay": clay}
+    return hc.Pair(device, device, law, link, Ts=TS, muscle=PUSH, t_max=T_MAX, **held)
 
 
 def least(seed: int, compared: bool = False) -> Least:
@@ -63,7 +65,7 @@ def least(seed: int, compared: bool = False) -> Least:
     E0 = pair.link.reserve
 
     def found(x: hc.Pair) -> float:
-        return float(hc.simulate_pair(x, T_MAX, push=PUSH, seed=seed).energy.min()) / E0
+        return float(hc.simulate(x).energy.min()) / E0
 
     return Least(pair.link.kind, found(pair), found(plain) if compared else float("nan"))
 

@@ -58,8 +58,7 @@ from .simulation.accuracy import Accuracy as Accuracy
 from .simulation.batch import simulate_batch as simulate_batch
 from .simulation.column_batch import simulate_columns as simulate_columns
 from .simulation.monitor import Outcome as Outcome
-from .simulation.pair_run import PairRecord as PairRecord
-from .simulation.pair_run import simulate_pair as simulate_pair
+from .simulation.pair_record import PairRecord as PairRecord
 from .simulation.record import Record as Record
 from .simulation.record import observed_passivity as observed_passivity
 from .simulation.record import out_of_band_ratio as out_of_band_ratio

@@ -45,7 +45,6 @@ def good_values(folder):
     pair = {"pair": hc.Pair(device, device, hc.JointPD((100.0,), (5.0,)))}
     by_function = {
         "pair_limits": pair, "pair_map": {**pair, "gains": 3, "delays": 3}, "compare_links": pair,
-        "simulate_pair": {**pair, "t_max": 0.01},
         "pair_transparency": pair, "pair_hands": {**pair, "hands": hc.theory.Box(), "samples": 2},
         "Pair": {"leader": device, "follower": device, "law": hc.JointPD((1.0,), (1.0,))},
         "friction_cycle": {"arm": arm, "law": rubbed},

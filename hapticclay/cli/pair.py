@@ -45,7 +45,8 @@ class PairCommand:
         cells: Gains and delays of the map.
         feel: Also say what the hand feels along this axis of the world, and with which hands and
             objects the pair is stable.
-        run: Also run the pair for this time [s], after a push of the hand.
+        run: Also run the pair for this time [s], under the muscle of the hand that the file gives;
+            by default a push of 1 N for 50 ms.
         data: Log of one axis, in place of a file of the pair, in any format that is read, or a
             scope of Simulink: time [s], both positions [rad], torques of both motors and the force
             on the follower [N.m].
@@ -120,9 +121,9 @@ class PairCommand:
         if self.feel:
             yield pair_ports.pair_transparency(pair, self.feel)
         if self.run:
-            from ..simulation.pair_run import simulate_pair
+            from ..simulation.simulate import simulate
 
-            yield simulate_pair(pair, self.run)
+            yield simulate(replace(pair, t_max=self.run))
         if self.map:
             yield pair_maps.pair_map(pair, *map(int, self.cells))
 

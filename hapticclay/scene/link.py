@@ -35,6 +35,7 @@ class Link:
         passivity: whether, in runs, an observer and a controller at each end let out no more energy
             than came in at the other one (Ryu, Kwon, Hannaford 2004); theory leaves them out.
         energy: reserve E0 that each of them may let out besides [J], 0 to 1e6; None for 0.01 J.
+        seed: of jitter and losses, 0 to 2^32 - 1.
     """
 
     kind: Literal["position-position", "position-force", "four-channel", "waves"] = KINDS[0]
@@ -54,6 +55,7 @@ class Link:
     ] = None
     passivity: bool = False
     energy: Annotated[float | None, Bound(0.0, 1e6, "J")] = None
+    seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
 
     def __post_init__(self):
         felt = self.kind in ("position-force", "four-channel")

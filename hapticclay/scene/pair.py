@@ -17,6 +17,8 @@ from ..formulas.constants import B_MAX
 from ..model import arm as closed_form
 from ..model.arm import Arm
 from ..model.operator import Operator
+from ..model.shapes import Pulse
+from ..model.signals import Signal
 from ..model.spring import STIFFNESS_MAX
 from . import pair_files
 from .link import Link
@@ -25,6 +27,7 @@ from .virtual_wall import Device
 NOMINAL = (0.5 * math.pi, -0.5 * math.pi)  # [rad] elbow square, link 2 along x
 UNKNOWN_ROTOR = "rotor inertia (armature): part of the mass or inertia that is given"
 AXES = ("x", "y", "z")
+TOUCH = Pulse((1.0, 0.0), 0.0, 0.05)  # [N] for 50 ms
 
 
 @part("contact.")
@@ -65,6 +68,9 @@ class Pair:
         follower_clay: what the follower touches; None for free motion.
         axes: for each joint of the follower, the number of the leader's joint that it follows, from
             1 on, negative for the opposite sense; None for the same order.
+        muscle: in runs, muscle force of the leader's hand [N], any signal; None for none. By
+            default 1 N along x for 50 ms.
+        t_max: runs end at this time [s], > 0, at most 1e4.
     """
 
     leader: MjcfArm | Arm | Device
@@ -77,6 +83,8 @@ class Pair:
     leader_operator: Operator | None = None
     follower_clay: Contact | None = None
     axes: Annotated[tuple[int, ...] | None, Bound(-1000, 1000)] = None
+    muscle: Signal | None = TOUCH
+    t_max: Annotated[float, Bound(0.0, 1e4, "s", above=True)] = 2.0
 
     def __post_init__(self):
         n, m = len(joint_names(self.leader)), len(joint_names(self.follower))

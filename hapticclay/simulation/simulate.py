@@ -14,7 +14,7 @@ from .record import Record
 from .run import Progress
 
 if TYPE_CHECKING:
-    from .pair_run import PairRecord
+    from .pair_record import PairRecord
 
 
 @overload
@@ -39,10 +39,11 @@ def simulate(
     engine: str = "auto",
     error: float | str | None = None,
 ) -> Any:
-    """Runs a scenario to its end, or a leader and a follower for 2 s.
+    """Runs a scenario, or a leader and a follower, to its end.
 
     Args:
-        scenario: what to run; of a pair, `simulate_pair` runs longer, pushes otherwise.
+        scenario: what to run. Of a pair both arms run with their full motion, joint friction,
+            torque limits and joint stops; `every`, `progress` and `error` are for scenarios.
         every: keep each every-th sample, and the last.
         progress: called now and then with (simulated time [s], handle x [m]); True ends the run, as
             "interrupted".
@@ -54,12 +55,14 @@ def simulate(
             progress starts at 0 s in each run. None runs the scenario as it is.
 
     Returns:
-        The record. Instability and similar ends are outcomes (record.status), not exceptions.
+        The record, of a pair a `PairRecord`. Instability and similar ends are outcomes
+        (record.status), not exceptions.
 
     Raises:
         ParameterError: an argument is of the wrong kind, there is no compiled kernel, the scene
             is too stiff for its integrator, the record may not fit into memory, the law of its
-            controller is not found, or an error in seconds is requested without a border to cross.
+            controller is not found, an error in seconds is requested without a border to cross, or
+            no part of the control sample of a pair, down to 1/40, divides all its delays.
         RuntimeError: the law of its controller raised an exception (`LawFailed`). Interruptions
             such as Ctrl-C are raised unchanged.
     """
@@ -68,9 +71,9 @@ def simulate(
         for name, (value, default) in given.items():
             if value != default:
                 raise ParameterError(name, value, "must be left out with a pair")
-        from .pair_run import simulate_pair  # imported only for a pair
+        from .pair_run import PairRun  # imported only for a pair
 
-        return simulate_pair(scenario, engine=engine)
+        return PairRun(scenario, engine).to_end()
     warn_implausible(scenario)
     if error is not None:
         from .asked_error import simulate_within  # imported only if an error is requested

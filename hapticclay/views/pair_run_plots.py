@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..simulation.pair_run import PairRecord
+from ..simulation.pair_record import PairRecord
 from .palette import BLACK, BLUE, GREY, VERMILION
 from .panels import label_axes, set_title, stacked
 from .style import figure_style, points, stroke

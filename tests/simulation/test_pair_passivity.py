@@ -12,12 +12,12 @@ from hapticclay.simulation.pair_passivity import MOST, Port
 PUSH = hc.Pulse((5.0, 0.0), 0.0, 0.5)
 
 
-def late(delay, **kw):
+def late(delay, t_max=4.0, **kw):
     """Force feedback from a spring of 1 kN/m."""
     device, law = hc.Device(6.0, 0.1), hc.JointPD((400.0,), (50.0,))
     link = hc.Link("position-force", delay, **kw)
     carried = {"leader_operator": hc.Operator(2.0, 2.0, 10.0), "follower_clay": hc.Contact(1e3)}
-    return hc.Pair(device, device, law, link, Ts=5e-3, **carried)
+    return hc.Pair(device, device, law, link, Ts=5e-3, muscle=PUSH, t_max=t_max, **carried)
 
 
 @pytest.mark.parametrize("room", [0.0, 1e-4, 3e-3])
@@ -52,8 +52,8 @@ def test_a_damper_takes_back_what_came_out():
 @pytest.mark.parametrize("delay", [0.05, 0.1])
 def test_force_feedback_grows_without_and_is_bounded_with(delay):
     """The pair of the page; the largest motion falls from quarter to quarter."""
-    plain = hc.simulate_pair(late(delay), 4.0, push=PUSH)
-    guarded = hc.simulate_pair(late(delay, passivity=True, energy=0.01), 4.0, push=PUSH)
+    plain = hc.simulate(late(delay))
+    guarded = hc.simulate(late(delay, passivity=True, energy=0.01))
     peaks = [[x.max() for x in np.array_split(found.motion, 4)] for found in (plain, guarded)]
     assert plain.grows and np.all(np.diff(peaks[0]) > 0.0) and plain.energy.min() < -1e3
     assert not guarded.grows and np.all(np.diff(peaks[1]) < 0.0)
@@ -64,7 +64,7 @@ def test_force_feedback_grows_without_and_is_bounded_with(delay):
 
 def test_without_a_reserve_it_stands_still():
     """The leader feels nothing in free motion: nothing goes in, so nothing may come out."""
-    found = hc.simulate_pair(late(0.05, passivity=True, energy=0.0), 0.5, push=PUSH)
+    found = hc.simulate(late(0.05, 0.5, passivity=True, energy=0.0))
     assert found.leader.max() > 0.05 and not np.any(found.follower) and not np.any(found.energy)
 
 

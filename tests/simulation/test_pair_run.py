@@ -34,7 +34,7 @@ def test_a_run_grows_beyond_the_delay_of_theory(share, grows):
     pair = one(Ts=4e-3)
     limit = hc.theory.pair_limits(pair).delay
     delay = round(share * limit / pair.Ts) * pair.Ts
-    assert hc.simulate_pair(replace(pair, link=hc.Link(delay=delay)), 8.0).grows is grows
+    assert hc.simulate(replace(pair, link=hc.Link(delay=delay), t_max=8.0)).grows is grows
 
 
 @pytest.mark.parametrize("share, grows", [(0.99, False), (1.01, True)])
@@ -43,15 +43,15 @@ def test_seven_joints_grow_beyond_the_gain_of_theory(share, grows):
     pair = seven(link=hc.Link(delay=4e-3), Ts=2e-3)
     factor = share * hc.theory.pair_limits(pair).gain
     stiff = replace(pair, law=replace(DRIVE, Kp=tuple(factor * x for x in KP)))
-    assert hc.simulate_pair(stiff, 2.0).grows is grows
+    assert hc.simulate(stiff).grows is grows
 
 
 def test_friction_fed_forward_grows_as_fast_as_theory_says():
     """A push of micronewtons, so that the friction law is its slope: the rate within 1 %."""
     slopes = (0.93, 0.93, 1.77, 2.97, 0.79, 2.08, 0.22)
     law = replace(DRIVE, friction=[(0.0, 1.0, x) for x in slopes])
-    pair = seven(law, Ts=1e-3, delay=1e-3)
-    found = hc.simulate_pair(pair, 0.25, push=hc.Pulse((1e-6, 0.0), 0.0, 0.02))
+    pair = seven(law, Ts=1e-3, delay=1e-3, muscle=hc.Pulse((1e-6, 0.0), 0.0, 0.02), t_max=0.25)
+    found = hc.simulate(pair)
     rates = np.abs(np.diff(found.leader, axis=0)).max(axis=1)
     growth = math.log(rates[-1] / rates[-51]) / (50 * pair.Ts)
     assert growth == pytest.approx(math.log(Build(pair).loop().radius()) / pair.Ts, rel=0.01)
@@ -59,8 +59,7 @@ def test_friction_fed_forward_grows_as_fast_as_theory_says():
 
 def test_motion_is_that_of_scipy():
     """Without delay at 2 kHz, against continuous control: the hold lags by 0.25 ms of some 100."""
-    pair = one(Ts=5e-4, **HELD)
-    found = hc.simulate_pair(pair, 0.5, push=hc.Step((2.0, 0.0), 0.0))
+    found = hc.simulate(one(Ts=5e-4, muscle=hc.Step((2.0, 0.0), 0.0), t_max=0.5, **HELD))
 
     def slope(t, x):
         (ql, qf, vl, vf) = x
@@ -77,8 +76,9 @@ def test_motion_is_that_of_scipy():
 @pytest.mark.parametrize("kind", ["position-position", "position-force", "waves"])
 def test_a_run_is_the_map(kind):
     """A push of one sample, then 150 samples free: states of the map from where the push ended."""
-    pair = one(kind, (8e-3, 4e-3), Ts=4e-3, delay=4e-3, **HELD)
-    found = hc.simulate_pair(pair, 0.9, push=hc.Pulse((1.0, 0.0), 0.0, 4e-3))
+    push = {"muscle": hc.Pulse((1.0, 0.0), 0.0, 4e-3), "t_max": 0.9}
+    pair = one(kind, (8e-3, 4e-3), Ts=4e-3, delay=4e-3, **push, **HELD)
+    found = hc.simulate(pair)
     loop = Build(pair).loop()
     A, x, out = loop.map(), np.zeros(loop.states), []
     q = found.leader[1, 0]
@@ -99,19 +99,18 @@ def test_a_run_is_the_map(kind):
 
 def test_jitter_and_losses_hold_the_newest_packet():
     """The same seed gives the same run; 20 % of losses at 20 ms leave the pair stable."""
-    pair = one(Ts=2e-3, **HELD)
-    pair = replace(pair, link=hc.Link(delay=20e-3, jitter=6e-3, loss=0.2))
-    a, b = (hc.simulate_pair(pair, 0.5, seed=3) for _ in range(2))
+    late = hc.Link(delay=20e-3, jitter=6e-3, loss=0.2, seed=3)
+    pair = replace(one(Ts=2e-3, t_max=0.5, **HELD), link=late)
+    a, b = (hc.simulate(pair) for _ in range(2))
     np.testing.assert_array_equal(a.leader, b.leader)
-    other = hc.simulate_pair(pair, 0.5, seed=4)
+    other = hc.simulate(replace(pair, link=replace(late, seed=4)))
     assert not np.array_equal(a.leader, other.leader)
     assert np.abs(other.leader).max() < 2.0 * np.abs(a.leader).max()
 
 
 def test_energy_is_what_the_arms_lost():
     """Work of the hand less motion, friction and spring of both sides: what the link took."""
-    pair = one(Ts=1e-3, leader_operator=None, follower_clay=None)
-    found = hc.simulate_pair(pair, 0.4, push=hc.Pulse((5.0, 0.0), 0.0, 0.05))
+    found = hc.simulate(one(Ts=1e-3, muscle=hc.Pulse((5.0, 0.0), 0.0, 0.05), t_max=0.4))
     t, q = found.t, np.hstack([found.leader, found.follower])
     v = np.gradient(q, t, axis=0)
     work = 5.0 * (q[50, 0] - q[0, 0])
@@ -130,11 +129,11 @@ def test_energy_is_what_the_arms_lost():
 )
 def test_refused(made, told):
     with pytest.raises(hc.ParameterError, match=told):
-        hc.simulate_pair(made(), 0.01)
+        hc.simulate(made())
 
 
 def test_a_pair_that_diverges_ends_and_says_so():
     device = hc.Device(mass=0.1, damper=0.0)
     pair = hc.Pair(device, device, hc.JointPD((4000.0,), (1.0,)), hc.Link(delay=0.05))
-    found = hc.simulate_pair(pair, t_max=6.0)
+    found = hc.simulate(replace(pair, t_max=6.0))
     assert found.grows and "diverged" in found.ended and found.t[-1] < 6.0

@@ -1,0 +1,93 @@
+"""One end of a running pair: its arm, its host's law, and what it has received."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arms.joint_law import compensated, rate_filter
+from ..scene import pair as pairs
+from ..scene.pair import Pair
+from ..theory.architectures import ARCHITECTURES
+from ..theory.architectures.control import Control
+from .pair_passivity import Port
+from .stepwise import Simulation
+
+
+class Host:
+    """One end: its run, its law, and what it has received."""
+
+    def __init__(self, pair: Pair, i: int, control: Control, run: Simulation):
+        self.pair, self.i, self.control, self.run = pair, i, control, run
+        self.arm, self.law = run.scenario.file_arm, pair.laws[i]
+        self.axes = ["xyz".index(c) for c in self.arm.axes]
+        self.start = run.state.q.copy()
+        self.own, self.other = np.zeros(pair.n), np.zeros(pair.n)
+        self.arrived = np.zeros(len(control.message))  # waves; others pull as they arrive
+        self.newest, self.x = -1, np.zeros(control.states)
+        self.last_q, self.rate = np.zeros(pair.n), np.zeros(pair.n)
+        self.held = compensated(pair.arms[i], self.law)
+        self.acts = i == 1 or ARCHITECTURES[pair.link.kind].leader_law
+        self.weight = self._weight(self.start)
+        self.port = Port(pairs.linear_arm(pair.arms[i]).inertia, pair.Ts, pair.link.reserve)
+        self.pull = np.zeros(pair.n)  # as it arrived, with passivity controllers
+
+    def _weight(self, q: np.ndarray) -> np.ndarray:
+        """Torque against the arm's weight."""
+        mechanism = self.arm.mechanism
+        if not (self.held and mechanism.weighs):
+            return np.zeros(len(q))
+        mechanism.at(q)
+        return mechanism.weights()
+
+    def sampled(self) -> tuple[np.ndarray, np.ndarray]:
+        """Measures, and returns the own torque and the message."""
+        state = self.run.state
+        q = state.q - self.start
+        v = self._rate(q, state.qd)
+        jacobian = self.arm.jacobian(state.q)[self.axes]  # type: ignore[union-attr]
+        F = -jacobian.T @ state.fh[: len(self.axes)]
+        y = np.concatenate([q, v, F])
+        signals = np.concatenate([y, self.arrived, self.x])
+        own = self.control.torque @ signals
+        message = self.control.message @ signals
+        self.x = self.control.state @ signals
+        own = own + self._law(q, v)
+        if self.pair.link.passivity:
+            self.port.observe()
+            own = self.port.guarded(own + self.pull, v)
+        self.weight = self._weight(state.q)
+        return own + self.weight, message
+
+    def _rate(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+        """The measured rate, as the law estimates it."""
+        if self.law.velocity == "exact":
+            return qd
+        keep, gain = rate_filter(self.law.cutoff, self.pair.Ts)
+        self.rate = keep * self.rate + gain * (q - self.last_q)
+        self.last_q = q
+        return self.rate
+
+    def _law(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """The joint law where the host runs it, and the friction that it feeds forward."""
+        out = np.zeros(len(q))
+        if self.acts and self.law.runs == "host":
+            out -= np.array(self.law.Kp) * q + np.array(self.law.Kd) * v
+        if self.law.friction is not None:
+            Fc, k, Fv = np.array(self.law.friction).T
+            out += Fc * np.tanh(k * v) + Fv * v
+        return out
+
+    @property
+    def torque(self) -> np.ndarray:
+        """The held torque."""
+        return self.own + self.other
+
+    def taken(self, before: np.ndarray, after: np.ndarray, weight: np.ndarray) -> float:
+        """Energy that law and link took from the arm in a step, drives included [J]."""
+        moved = after - before
+        out = -(self.torque - weight) @ moved
+        if self.acts and self.law.runs == "drive":
+            middle = 0.5 * (before + after) - self.start
+            rate = moved / self.run.scenario.dt
+            out += (np.array(self.law.Kp) * middle + np.array(self.law.Kd) * rate) @ moved
+        return float(out)

@@ -1,0 +1,97 @@
+"""What a run of a leader and a follower leaves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arguments import named
+from ..results import Result, Tables
+
+RELATIVE = 1e-9  # growth of an amplitude that is none
+
+
+@named
+@dataclass(frozen=True, repr=False, eq=False)
+class PairRecord(Result):
+    """What a leader and a follower did, m control samples of n joints.
+
+    Attributes:
+        kind: kind of the link.
+        names: joints of the leader.
+        t: times [s], shape (m,).
+        leader: positions of the leader's joints [rad], shape (m, n).
+        follower: positions of the follower's joints [rad], shape (m, n).
+        leader_torque: torques that its host has held [N.m], shape (m, n).
+        follower_torque: likewise, of the follower.
+        hand: force of the hand on the leader [N], shape (m, 2) or (m, 3).
+        contact: force of the follower on what it touches [N], likewise.
+        energy: energy that controllers and link have taken from both arms [J], shape (m,): where
+            it falls without bound, they feed the motion.
+        port_energy: the same at leader and follower [J], shape (m, 2).
+        ended: how the run ended: "" at its time, else what ended it.
+    """
+
+    drawn_by = "hapticclay.views.pair_run_plots:run_plot"
+    written_as = "pair_run"
+    printed = {"end": ()}
+
+    kind: str
+    names: tuple[str, ...]
+    t: np.ndarray
+    leader: np.ndarray
+    follower: np.ndarray
+    leader_torque: np.ndarray
+    follower_torque: np.ndarray
+    hand: np.ndarray
+    contact: np.ndarray
+    energy: np.ndarray
+    port_energy: np.ndarray
+    ended: str
+
+    @property
+    def motion(self) -> np.ndarray:
+        """Largest motion of a joint of either arm from its pose [rad], shape (m,)."""
+        both = np.hstack([self.leader - self.leader[0], self.follower - self.follower[0]])
+        return np.abs(both).max(axis=1)
+
+    @property
+    def grows(self) -> bool:
+        """Whether rates in the last quarter are larger than in the one before, or it ended."""
+        if self.ended:
+            return True
+        both = np.diff(np.hstack([self.leader, self.follower]), axis=0)
+        third, last = np.array_split(np.abs(both).max(axis=1), 4)[2:]
+        return bool(last.max() > (1.0 + RELATIVE) * third.max())
+
+    @property
+    def error(self) -> float:
+        """Root mean square of follower less leader, all joints [rad]."""
+        return float(np.sqrt(np.mean((self.follower - self.leader) ** 2)))
+
+    def headline(self) -> str:
+        """The run in one line."""
+        how = f"ended at {self.t[-1]:.4g} s: {self.ended}" if self.ended else "to its end"
+        grows = "motion grows" if self.grows else "motion decays"
+        return (
+            f"{self.kind}, {how}; {grows}; follower off by {1e3 * self.error:.3g} mrad rms; "
+            f"controllers and link took {self.energy[-1]:.3g} J, at least {self.energy.min():.3g} J"
+        )
+
+    def tables(self) -> Tables:
+        """How it ended, and every sample."""
+        end: dict[str, Any] = {
+            "t [s]": [float(self.t[-1])],
+            "grows": [self.grows],
+            "error [rad]": [self.error],
+            "energy [J]": [float(self.energy[-1])],
+        }
+        samples: dict[str, Any] = {"t [s]": self.t, "energy [J]": self.energy}
+        for i, name in enumerate(("leader", "follower")):
+            samples[f"energy at {name} [J]"] = self.port_energy[:, i]
+        for j, name in enumerate(self.names):
+            samples[f"leader {name} [rad]"] = self.leader[:, j]
+            samples[f"follower {name} [rad]"] = self.follower[:, j]
+        return {"end": end, "samples": samples}
