@@ -14,7 +14,11 @@ import matplotlib.pyplot as plt
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
-OTHERS = EXAMPLES / "studies" / "pair_log.py", EXAMPLES / "records" / "replay.py"
+OTHERS = (
+    EXAMPLES / "studies" / "pair_log.py",
+    EXAMPLES / "records" / "replay.py",
+    EXAMPLES / "runs" / "pair_at_a_wall.py",
+)
 
 
 def main(names: list[str]) -> None:

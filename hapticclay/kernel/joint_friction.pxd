@@ -8,7 +8,7 @@ cdef double CLOSE
 cdef void find(Model m, Kick k) noexcept nogil
 @cython.locals(a=cython.double)
 cdef void put_matrix(Model m, Kick k) noexcept nogil
-@cython.locals(torque=cython.double, f=cython.double)
+@cython.locals(torque=cython.double)
 cdef double pushed(Model m, Kick k, long j) noexcept nogil
 @cython.locals(slides=cython.bint)
 cdef void rates(Model m, Kick k) noexcept nogil

@@ -52,10 +52,7 @@ def pushed(m, k, j):
     """Torque of the handle's load on a joint, without its dampers [N.m]."""
     torque = 0.0
     for i in range(m.axes):
-        f = k.axis[i].f
-        if m.acts and m.springs and i < 2:
-            f -= k.axis[i].pull
-        torque += m.engine.joint_J[i * m.joints + j] * f
+        torque += m.engine.joint_J[i * m.joints + j] * k.axis[i].f
     return torque
 
 

@@ -38,7 +38,9 @@ def put_weight(m: Any, s: Scenario, axes: list[int]) -> None:
     mechanism = s.file_arm.mechanism
     weighs, gravity = mechanism.weighs, np.array(mechanism.model.opt.gravity)[axes]
     hands = [s.operators[min(i, 1)] or NO_HAND for i in range(len(axes))]
-    m.weight[: len(axes)] = [x.mass * g if weighs else 0.0 for x, g in zip(hands, gravity, strict=True)]
+    m.weight[: len(axes)] = [
+        x.mass * g if weighs else 0.0 for x, g in zip(hands, gravity, strict=True)
+    ]
     law = s.controller if isinstance(s.controller, JointPD) else None
     m.feeds_gravity = int(compensated(s.arm, law) and weighs)
 
