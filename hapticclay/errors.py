@@ -21,6 +21,13 @@ if TYPE_CHECKING:
 
 MOST_OF_VALUE, MOST_OF_NAME, MOST_OF_BOUND = 60, 120, 600  # characters in a message
 MOST_COMPARED = 100  # characters of a word that is compared with known names
+SYNONYMS = {
+    **dict.fromkeys(("max_time", "end_time", "t_end", "duration", "sim_time"), "t_max"),
+    **dict.fromkeys(("timestep", "time_step", "step"), "dt"),
+    **dict.fromkeys(("sample_time", "sampling_time", "sample_period"), "Ts"),
+    **dict.fromkeys(("latency", "lag"), "delay"),
+}
+"""Names elsewhere of what has another name here."""
 
 
 class ParameterError(ValueError):
@@ -96,7 +103,9 @@ def _middle_cut(text: str) -> str:
 
 
 def nearest(word: str, names: Collection[str]) -> list[str]:
-    """The name most like a word, in a list; an empty list if none is."""
+    """The name that a word means or is most like, in a list; an empty list if there is none."""
+    if (same := SYNONYMS.get(word)) in names:
+        return [same]
     return difflib.get_close_matches(word[:MOST_COMPARED], names, n=1)
 
 

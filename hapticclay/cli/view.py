@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ..live.replay import Replay
     from ..live.session import Session
     from ..simulation.record import Record
+    from ..views.live_page import LivePage
 
 
 HAND, SERVER = ("device",), ("device-server",)
@@ -107,7 +108,9 @@ class ViewCommand:
         """Plays a session until its window or page is closed."""
         with console.ctrl_c() as stop, streaming(session, self.stream):
             if self.web:
-                _serve_page(session, self.host, self.port, stop.is_set)
+                from ..views.page import Page
+
+                serve_page(Page(session, self.host, self.port), self.host, stop.is_set)
             else:
                 from ..views.window import Window
 
@@ -144,11 +147,10 @@ def replay(record: Record, tool: Tool, stream: str | None = None) -> None:
         Window(play).show(stop.is_set)
 
 
-def _serve_page(session: Session, host: str, port: int, until: Callable[[], bool]) -> None:
+def serve_page(page: LivePage, host: str, until: Callable[[], bool]) -> None:
+    """Serves a page until it is to end, and says where it is."""
     from ..ports.guard import LOCAL
-    from ..views.page import Page
 
-    page = Page(session, host, port)
     if host not in LOCAL:
         print(
             f"warning: other machines can reach {host}, unencrypted; only this address grants "

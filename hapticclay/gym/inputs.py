@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -29,11 +30,11 @@ def action_of(field: str, given: Any, shape: tuple[int, ...]) -> np.ndarray:
         bound = f"must be real numbers, as float32, not of dtype {action.dtype}"
         raise ParameterError(field, given, bound)
     numbers = action.astype(np.float64)
-    good = np.isfinite(numbers)
-    if not good.all():
-        place = ", ".join(str(i) for i in np.argwhere(~good)[0])
-        value = action[~good][0].item()
-        raise ParameterError(f"{field}[{place}]", value, "must be a finite number")
+    if not math.isfinite(np.vdot(numbers, numbers)):  # a quick look: large numbers overflow, too
+        bad = np.argwhere(~np.isfinite(numbers))
+        for place in map(tuple, bad[:1].tolist()):
+            at = ", ".join(map(str, place))
+            raise ParameterError(f"{field}[{at}]", action[place].item(), "must be a finite number")
     return numbers
 
 

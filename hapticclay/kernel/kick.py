@@ -40,7 +40,7 @@ def load(m, s, k):
             o = k.axis[i]
             o.f, o.d, o.b0, o.b1, o.clay, o.clay_d = o.uh, 0.0, 0.0, 0.0, 0.0, 0.0
     if m.axes > 2:
-        k.z.uh = k.z.f = k.z.d = 0.0
+        k.z.f, k.z.d = k.z.uh, 0.0
     if m.hand:
         hand.load(m, k)
 

@@ -64,18 +64,12 @@ def peek(size_t models, size_t states, size_t which, Py_ssize_t n, size_t spare,
     cdef const long long *w = <const long long *>which
     cdef double *out = <double *>shown
     cdef Py_ssize_t j
-    cdef long i
-    cdef long long k, at
+    cdef long long k
     with nogil:
         for j in range(n):
             k = w[j]
-            at = s[k].row
             loop.kernel_arm_put(&m[k], &s[k])
-            loop.kernel_path_peek(&m[k], &s[k], <State_s *>spare)
-            for i in range(16):
-                out[18 * k + i] = m[k].rows[16 * at + i]
-            if m[k].records_clay_force:
-                out[18 * k + 16], out[18 * k + 17] = m[k].rendered[3 * at], m[k].rendered[3 * at + 1]
+            loop.kernel_path_show(&m[k], &s[k], <State_s *>spare, out + 18 * k)
 
 
 def strained(

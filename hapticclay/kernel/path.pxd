@@ -10,6 +10,7 @@ from . cimport laws
 from . cimport march
 from . cimport memory
 from . cimport methods
+from . cimport rows
 from . cimport sampled
 from . cimport springs
 from . cimport viscous
@@ -37,3 +38,4 @@ cdef void whole_steps(Model m, State s, long room) noexcept nogil
 cdef void accurate_whole_steps(Model m, State s, long room) noexcept nogil
 cdef void advance(Model m, State s, long room) noexcept nogil
 cdef void peek(Model m, State s, State spare) noexcept nogil
+cdef void show(Model m, State s, State spare, double *out) noexcept nogil

@@ -16,6 +16,7 @@ from . import (
     march,
     memory,
     methods,
+    rows,
     sampled,
     springs,
     viscous,
@@ -310,3 +311,15 @@ def peek(m, s, spare):
     for j in range(m.spans):
         memory.copied_row(m.span[j].at, m.span[j].kept, m.span[j].size)
     arm.put(m, s)
+
+
+def show(m, s, spare, out):
+    """Writes the row of the next step, and the force of the clay in it; see `peek`."""
+    n = s.row
+    peek(m, s, spare)
+    for i in range(rows.ROW):
+        out[i] = m.rows[rows.ROW * n + i]
+    if m.records_clay_force:
+        out[rows.ROW], out[rows.ROW + 1] = m.rendered[3 * n], m.rendered[3 * n + 1]
+    else:
+        out[rows.ROW], out[rows.ROW + 1] = viscous.force(m, out[12], out[13], out[4], out[5])

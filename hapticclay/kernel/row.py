@@ -175,11 +175,10 @@ class Row:
 
         Then comes what an arm from a file adds to rows.
         """
-        m, n = self.m, self.s.row
-        arm.put(m, self.s)
-        self._step(path.peek, m, self.s, self.spare)
-        rendered = self.buffers.rendered[n, :2] if m.records_clay_force else (0.0, 0.0)
-        return np.concatenate((self.buffers.rows[n], rendered, self.extra_at(n)))
+        n, out = self.s.row, np.full(SHOWN, np.nan)
+        arm.put(self.m, self.s)
+        self._step(path.show, self.m, self.s, self.spare, out)
+        return np.append(out, self.extra_at(n))
 
     def extra_at(self, n: int) -> np.ndarray:
         """What an arm from a file adds to a row."""

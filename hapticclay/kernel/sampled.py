@@ -252,7 +252,7 @@ def on_sensor(m, s, k, ux, uy):
         fx, fy = laws.without_clay(m, s, k, fx, fy)
         if m.special and m.flow:
             x.pull, y.pull = reaction(m, s, k, fx, fy)
-    s.fz = 0.0
+    s.fz = m.z.push
     if not m.hand:
         return ux, uy
     if s.before == 0.0:

@@ -11,8 +11,8 @@ import numpy as np
 from ..arms.joint_law import JointPD, compensated
 from ..model.operator import NO_HAND
 from ..scene.scenario import Scenario
+from ..theory.client_loop import held_arm
 from ..theory.joint_gains import joint_loop
-from ..theory.joint_walls import held_arm
 from .monitor import LIMITS, OFTEN, STILL, WHILE, Outcome, at_rest
 
 FASTEST = 200.0  # [rad/s or m/s] beyond any joint of an arm

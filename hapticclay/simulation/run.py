@@ -360,10 +360,10 @@ class Run:
         self.row.change(scenario, self._controller)
         self._ahead = None
 
-    def change_force(self, force: tuple[float, float]) -> None:
+    def change_force(self, force: tuple[float, ...]) -> None:
         """Continues under another constant muscle force."""
         self.scenario = with_checked(self.scenario, force=force)
-        self.push_evenly((0.0, *self.scenario.steady_force, 0.0, 0.0))
+        self.push_steadily()
 
     def change_gain(self, gain: tuple[float, float]) -> None:
         """Continues with another gain."""
@@ -375,6 +375,13 @@ class Run:
         for a, K in zip(self.row.m.axis[:2], gain, strict=True):
             a.K = float(K)
         self._ahead = None
+
+    def push_steadily(self) -> None:
+        """Continues under the constant muscle force of the scenario."""
+        x, y, *more = self.scenario.steady_force
+        self.push_evenly((0.0, x, y, 0.0, 0.0))
+        for z in more:
+            self.row.m.z.push = z
 
     def push_evenly(self, steady: tuple[float, ...]) -> None:
         """Continues under a muscle force that changes evenly: since [s], (x, y) [N], rate [N/s]."""
@@ -424,7 +431,7 @@ class Run:
         self._prepared(self.filled + 1)
         found = self.row.peek()
         self.row.check()
-        return self.put_force(found)
+        return found
 
     def numbers_ahead(self) -> list[float]:
         """As `ahead`; the last good row if the run has ended, NaN for none."""
@@ -440,16 +447,9 @@ class Run:
         more = joints.width(self.row.m) if self.row.m.general else 0
         return np.full(rows.ROW + 2 + more, np.nan) if self.last is None else self.last
 
-    def put_force(self, sample: np.ndarray) -> np.ndarray:
-        """Puts the force of the clay into a sample, unless it was recorded."""
-        if not self.records_force:
-            vx, vy, bx, by = *sample[4:6].tolist(), *sample[12:14].tolist()
-            sample[rows.ROW], sample[rows.ROW + 1] = self._force(bx, by, vx, vy)
-        return sample
-
-    def _force(self, bx: Any, by: Any, vx: Any, vy: Any) -> tuple[Any, Any]:
+    def _force(self, b: Any, v: Any) -> tuple[Any, Any]:
         """Force of the clay's damping, (x, y) [N]."""
-        return viscous.force(self.row.m, bx, by, vx, vy)
+        return viscous.force(self.row.m, *b, *v)
 
     def torque_reached(self, n: int, k: int) -> np.ndarray:
         """|tau| of shoulder and elbow that at least k of the last n rows not judged reach [N.m]."""
@@ -534,12 +534,10 @@ class Run:
 
     def _keep(self, made: np.ndarray, good: int) -> None:
         """Keeps good rows."""
-        forces = self.buffers.rendered
-        force = forces[good - 1, :2] if self.records_force else (0.0, 0.0)
+        forces, end = self.buffers.rendered, made[good - 1]
+        force = forces[good - 1, :2] if self.records_force else self._force(end[12:14], end[4:6])
         extra = self.extra(len(made))
-        self.last = self.put_force(np.append(made[good - 1], force))
-        if len(extra):
-            self.last = np.append(self.last, extra[good - 1])
+        self.last = np.concatenate((end, force, extra[good - 1] if len(extra) else ()))
         if not self.recorded:
             return
         keep = np.arange(-self.judged % self.every, good, self.every)
@@ -575,7 +573,7 @@ class Run:
             out |= {"removed": force[:, 2]} if self.row.m.groove else {}
             out["fe"] = force[:, :2]
         else:
-            out["fe"] = np.column_stack(self._force(*out["b"].T, *out["v"].T))
+            out["fe"] = np.column_stack(self._force(out["b"].T, out["v"].T))
         if self.row.m.general:
             out |= joint_arrays(self.row.m, out, np.concatenate(extra))
         return out | {"t": t}

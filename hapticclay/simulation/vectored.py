@@ -11,7 +11,6 @@ import numpy as np
 from ..kernel import layout, mover, movers, path, records, scene
 from ..kernel.native import machine
 from ..kernel.row import CHUNK, SHOWN, one
-from ..kernel.rows import ROW
 from ..scene.scenario import Scenario
 from .monitor import Outcome
 from .run import Run, Workspace
@@ -69,7 +68,7 @@ class VectoredRuns:
         s, run = self.given[k], self.runs[k]
         run.row.m.drops_events = 1
         self.over[k], self.changed[k], self.times[k] = False, False, 0.0
-        self.force[k], self.gain[k] = s.force, s.gain
+        self.force[k], self.gain[k] = s.force[:2], s.gain
         self.looked_at[k], self.diverging[k] = -np.inf, False
         if self.engine == "native":
             self.kept[k] = [x.of(s) for x in self.movers]
@@ -83,8 +82,8 @@ class VectoredRuns:
         force, gain = tuple(self.force[k].tolist()), tuple(self.gain[k].tolist())
         if gain != run.scenario.gain:
             run.change_gain(gain)
-        if force != run.scenario.force:
-            run.change_force(force)
+        if force != run.scenario.force[:2]:
+            run.change_force((*force, *run.scenario.force[2:]))
         return run
 
     def scenario(self, k: int) -> Scenario:
@@ -97,7 +96,7 @@ class VectoredRuns:
         if scenario is None and not self.changed[k] and not run.prepares:
             run.restart()
             run.scenario = self.given[k]
-            run.push_evenly((0.0, *run.scenario.steady_force, 0.0, 0.0))
+            run.push_steadily()
         else:
             self.given[k] = scenario or self.given[k]
             self.runs[k] = self._new(k, self.given[k], run.workspace)
@@ -188,8 +187,6 @@ class VectoredRuns:
             more = np.minimum(goal[left] - states["i"][left], part)
             self.rooms[left] = np.minimum(states["row"][left] + more, CHUNK - 1)
             self._call(work, left)
-            if shows:
-                self._put_force(left)
             done = (states["code"][left] != path.OPEN) | (states["row"][left] >= CHUNK - 1)
             for k in left[done].tolist():
                 self._settle(k)
@@ -255,19 +252,8 @@ class VectoredRuns:
             if len(together):
                 self._draw(together, 1)
                 self._call(self._peek, together)
-                self._put_force(together)
             self.is_shown[stale] = True
         return self.shown
-
-    def _put_force(self, which: np.ndarray) -> None:
-        """Puts the force of clay that is not recorded beside the samples shown."""
-        m, shown = self.models, self.shown
-        which = which[m["records_clay_force"][which] == 0]
-        rotated = m["rotated"][which] == 1
-        at = which[~rotated]
-        shown[at, ROW:] = shown[at, 12:14] * shown[at, 4:6]
-        for k in which[rotated].tolist():
-            self.runs[k].put_force(shown[k])
 
     def torque_reached(self, n: int, k: int) -> np.ndarray:
         """As `Run.torque_reached`, shape (runs, 2)."""

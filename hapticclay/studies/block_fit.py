@@ -79,11 +79,15 @@ def block_fit(
     from scipy.optimize import least_squares
 
     start, low, high, size = (np.array(x) for x in zip(*unknowns, strict=True))
+
+    def of(x: np.ndarray) -> np.ndarray:
+        return residuals(x * size)
+
     found = least_squares(
-        lambda x: residuals(x * size),
+        of,
         np.clip(start / size, low / size, high / size),
+        lambda x: _slopes(of, x, step, high / size),
         bounds=(low / size, high / size),
-        diff_step=step,
         xtol=1e-3 * step,
         ftol=1e-5 * step,
         x_scale="jac",
@@ -91,6 +95,21 @@ def block_fit(
     )
     slopes = found.jac / size
     return BlockFit(found.x * size, _covariance(slopes, found.fun), slopes, found.fun, level)
+
+
+def _slopes(
+    residuals: Callable[[np.ndarray], np.ndarray], x: np.ndarray, step: float, high: np.ndarray
+) -> np.ndarray:
+    """Derivatives by differences of a step, or of that share of a number above 1.
+
+    A share of each number, as SciPy takes it, is rounding where a number is at a bound of 0.
+    """
+    here, columns = residuals(x), []
+    for i, way in enumerate(step * np.maximum(np.abs(x), 1.0)):
+        moved = x.copy()
+        moved[i] += way if x[i] + way <= high[i] else -way
+        columns.append((residuals(moved) - here) / (moved[i] - x[i]))
+    return np.column_stack(columns)
 
 
 def _covariance(J: np.ndarray, rest: np.ndarray) -> np.ndarray:

@@ -18,12 +18,14 @@ from ..display import table_of
 from ..errors import ParameterError
 from ..results import Result
 from ..units import Powers, parse_unit, si_unit
-from .even_columns import unwrapped
+from .even_columns import held_rows, unwrapped
 from .outliers import runs_of, times
+from .pair_log import is_pair
 
 FEW = 3  # places that a remark names
 STUCK = 0.02  # share of the rows, in a run at the largest or smallest value, that is suspicious
 TREATED = "identify and fit say what they do about it (docs/logs.md)"
+HUGE = 1e50  # a value beyond it is none: squares and sums of others do not overflow
 LEAST = 20  # rows in which columns are judged
 MOST_COLUMNS = 1000  # of a report: a log has tens
 
@@ -110,12 +112,7 @@ def log_report(log: Log) -> LogReport:
     Raises:
         ParameterError: it has more than 1000 columns.
     """
-    if len(log.names) > MOST_COLUMNS:
-        bound = (
-            f"must have at most {MOST_COLUMNS} columns, has {len(log.names)} of {log.rows} rows: "
-            "are rows and columns exchanged?"
-        )
-        raise ParameterError("file", str(log.path), bound)
+    _check_columns(log)
     found = candidates(log, "time")
     time = found[0] if found else ""
     stamps, warnings = None, [] if log.rows else ["there are no rows of numbers"]
@@ -135,12 +132,23 @@ def log_report(log: Log) -> LogReport:
         low, high = (float(kept.min()), float(kept.max())) if len(kept) else (math.nan, math.nan)
         rows.append((head.text, unit, low, high, "; ".join([*faults, *_remarks(x)])))
         if len(kept) and head.text != time:
-            columns[_label(head, unit)] = size * x
+            columns[_label(head, unit)] = size * np.where(np.abs(x) > HUGE, math.nan, x)
+    warnings += _unstated([x.name for x in log.table.heads if x.text in unknown])
     table = table_of(("column", "unit", "lowest", "highest", "remarks"), rows)
     t = None if stamps is None else stamps.t
     said = tuple(log.table.notes), tuple(warnings), tuple(_commands(log, time, unknown))
     name, form = log.path.name, log.table.form
     return LogReport(name, form, log.rows, time, table, t, columns, *said)
+
+
+def _check_columns(log: Log) -> None:
+    """Refuses a table that lies on its side."""
+    count, unnamed = len(log.names), all(x.isdigit() for x in log.names)
+    if count <= MOST_COLUMNS and not (unnamed and log.rows < LEAST < count):
+        return
+    most = f"must have at most {MOST_COLUMNS} columns" if count > MOST_COLUMNS else "must have rows"
+    bound = f"{most}, has {count} columns of {log.rows} rows: are rows and columns exchanged?"
+    raise ParameterError("file", str(log.path), bound)
 
 
 def _label(head: Head, unit: str) -> str:
@@ -219,19 +227,35 @@ def _has(unit: str, powers: Powers) -> bool:
     return known is not None and known[1] == powers
 
 
+def _unstated(unknown: list[str]) -> list[str]:
+    """What to state where units are unknown."""
+    if not unknown:
+        return []
+    pairs = " ".join(shlex.quote(f"{name}=UNIT") for name in unknown[:FEW])
+    return [
+        f"no command for {_several(len(unknown), 'column')} without a known unit: state it by "
+        f"--units {pairs}, as N, mm or deg (--counts for those of an encoder)"
+    ]
+
+
 def _remarks(x: np.ndarray) -> list[str]:
     """What is suspicious in a column."""
+    out, huge = [], np.abs(x) > HUGE
+    if count := int(np.count_nonzero(huge)):
+        out.append(f"{count} beyond {HUGE:g}")
+    x = np.where(huge, math.nan, x)
     good = np.isfinite(x)
     if not good.any():
-        return ["no numbers"]
-    out = []
-    if missing := int(np.count_nonzero(~good)):
+        return [*out, "no numbers"]
+    if missing := int(np.count_nonzero(~good & ~huge)):
         out.append(f"{missing} missing")
     if (span := float(np.ptp(x[good]))) == 0.0:
         return [*out, "constant"]
     if len(x) < LEAST:
         return out
     ends = [np.isfinite(x) & (x == edge) for edge in (x[good].min(), x[good].max())]
+    if (rows := held_rows(x)) > 1:
+        out.append(f"changes every {rows} rows: held")
     stuck = sum(b - a for end in ends for a, b in runs_of(end) if b - a > FEW)
     if stuck > STUCK * len(x) and len(np.unique(x[good])) > LEAST:
         out.append("limited?")
@@ -249,6 +273,8 @@ def _commands(log: Log, time: str, unknown: set[str]) -> list[str]:
     every = {x: candidates(log, x) for x in ("force", "position", "command")}
     found = {x: [name for name in names if name not in unknown] for x, names in every.items()}
     file = shlex.quote(str(log.path))
+    if is_pair(log) and not unknown:
+        return [f"hapticclay pair --data {file}"]
     if not log.rows or not time or time in unknown or not found["position"]:
         return []
     place = found["position"][0]

@@ -204,8 +204,9 @@ def column_of(name: str, value: Any, t: Any) -> np.ndarray:
     """A column as an array of floats, as long as t."""
     x = array_of(name, value, "must be an array of numbers")
     if x.ndim != 1 or len(x) < LEAST_ROWS:
-        bound = f"must be one column of {LEAST_ROWS} samples or more"
-        raise ParameterError(name, f"shape {x.shape}", bound)
+        bound = f"must be one column of {LEAST_ROWS} rows or more"
+        given = f"{len(x)} rows" if x.ndim == 1 else f"array of shape {x.shape}"
+        raise ParameterError(name, given, bound)
     if len(x) != len(t):
         raise ParameterError(name, f"{len(x)} samples", f"must be as long as t, {len(t)} samples")
     within = np.abs(x) <= LARGEST_VALUE

@@ -46,6 +46,10 @@ PUSHED_TOLD = (
     "the follower moves otherwise than its motor pushes it: a hand or a load may act there; "
     "inertia and friction are not identified"
 )
+ALIKE_TOLD = (
+    "P, D and lag of the {} are not told apart: the error moves at one frequency, where many laws "
+    "make the same torque; move at several"
+)
 MISFIT = 0.02  # of a torque that a law leaves, above which a warning is given
 
 
@@ -168,11 +172,15 @@ def identify_pair(
         raise ParameterError("log", f"{len(log.t) * log.Ts:.3g} s", bound)
     law, fit = fit_law(Motion(log.t, log.follower, log.leader, log.follower_torque), band, level)
     numbers, warnings = _law_numbers("", law, fit), list(log.notes)
+    if math.isnan(numbers[0].low):
+        warnings.append(ALIKE_TOLD.format("follower"))
     if fit.rms > MISFIT * float(np.std(log.follower_torque)):
         share = fit.rms / float(np.std(log.follower_torque))
         warnings.append(f"the law leaves {100.0 * share:.2g} % of the follower's torque")
     architecture, more = _leader(log, band, level)
     numbers += more
+    if architecture == "position-position" and math.isnan(more[0].low):
+        warnings.append(ALIKE_TOLD.format("leader"))
     simulated, axis = np.zeros(0), None
     if _is_free(log):
         axis, found, simulated = _mechanics(log, law, fit, level)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ ORDER = 4  # of the low-pass ahead of a fit, without phase
 EDGE = 1.5  # [1/band] cut off on both sides of what is filtered
 STEP = 1e-5  # of differences
 RATE = 8.0  # [band] samples per second of what is fitted
+ALIKE = 0.02  # of e, e' and e'' of size 1: a smaller singular value is one frequency
 
 
 class PairLaw(NamedTuple):
@@ -109,10 +111,14 @@ def delayed(t: np.ndarray, x: np.ndarray, delay: float) -> np.ndarray:
     return x if delay == 0.0 else CubicSpline(t, x)(np.clip(t - delay, t[0], t[-1]))
 
 
+def error_of(law: PairLaw, m: Motion) -> np.ndarray:
+    """The error on which a law acts [rad], (n,)."""
+    return delayed(m.t, m.far, law.link) - m.near
+
+
 def predicted(law: PairLaw, m: Motion) -> np.ndarray:
     """The torque that a law makes of a motion, without an offset, (n,)."""
-    error = delayed(m.t, m.far, law.link) - m.near
-    return delayed(m.t, law.torque(error, m.Ts), law.late)
+    return delayed(m.t, law.torque(error_of(law, m), m.Ts), law.late)
 
 
 def fit_law(motion: Motion, band: float, level: float) -> tuple[PairLaw, BlockFit]:
@@ -122,7 +128,26 @@ def fit_law(motion: Motion, band: float, level: float) -> tuple[PairLaw, BlockFi
     """
     m = motion.below(band)
     found = [_fit(m, band, filters, level) for filters in (True, False)]
-    return min(found, key=lambda x: x[1].rms)
+    law, fit = min(found, key=lambda x: x[1].rms)
+    if apart(law, m, band) < ALIKE:
+        fit = replace(fit, covariance=np.full_like(fit.covariance, math.nan))
+    return law, fit
+
+
+def apart(law: PairLaw, m: Motion, band: float) -> float:
+    """How far P, D and lag are told apart, from 0 to 1.
+
+    They act on e, e' and e'': P e + D e' - lag (P e' + D e''). Where the error moves at one
+    frequency, e'' is -omega^2 e, and many laws make the same torque.
+    """
+    e, rows = error_of(law, m), fitted_rows(len(m.t), m.Ts, band)
+    slope = np.gradient(e, m.Ts)
+    columns = np.column_stack([e, slope, np.gradient(slope, m.Ts)])[rows]
+    columns -= columns.mean(axis=0)
+    sizes = np.linalg.norm(columns, axis=0)
+    if not np.all(sizes > 0.0):
+        return 0.0
+    return float(np.linalg.svd(columns / sizes, compute_uv=False)[-1])
 
 
 def _fit(m: Motion, band: float, filters: bool, level: float) -> tuple[PairLaw, BlockFit]:

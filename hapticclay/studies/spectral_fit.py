@@ -11,6 +11,7 @@ import numpy as np
 from ..arguments import checked
 from ..errors import Bound, ParameterError, numbers_of
 from ..fields import Axis
+from .even_columns import held_rows
 from .identification import (
     COEFFICIENT_NAMES,
     COHERENT,
@@ -45,6 +46,7 @@ NEIGHBOURS = 20  # lines to each side over which noise is averaged, at most
 WEIGHT_ROUNDS = 4  # of fit and noise; the weights settle in two
 
 Delay = Annotated[float, Bound(-1.0, 1.0, "s")]
+HELD = "the input changes only every {} rows, as a computer holds it: state it by held (--held)"
 Timing = tuple[bool, float]  # whether the input is held, and the delay of the position [s]
 # frequency [Hz], response, its deviation, coherence
 Averaged = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -95,6 +97,8 @@ def identify_data(
             f"the position jumps and does not return at t = {times(data.t[place.steps])} s: "
             "identify the parts one by one"
         )
+    if not held and what != "Th" and (rows := held_rows(columns.input)) > 1:
+        warnings.append(HELD.format(rows))
     columns = columns._replace(output=place.x)
     timing = held, delay
     found, left_out = _without_wrong_readings(what, columns, data, band, timing)
@@ -239,7 +243,6 @@ def _band(what: str, band: object, dt: float, n: int) -> tuple[float, float]:
 def _period(u: np.ndarray, high: float) -> int:
     """Samples per period of u, if it has at least three; else 0. `high`: in lines of a sample."""
     from scipy.fft import irfft, next_fast_len, rfft
-    from scipy.signal import find_peaks
 
     n = len(u)
     x = (u - u.mean()) / np.ptp(u)
@@ -249,7 +252,8 @@ def _period(u: np.ndarray, high: float) -> int:
     both = np.sqrt(power[n - lag] * (power[n] - power[lag]))  # of u before and after
     power_of_lines = np.abs(np.asarray(rfft(x, size))) ** 2
     share = np.asarray(irfft(power_of_lines, size))[: len(lag)] / np.maximum(both, 1e-9 * power[n])
-    for peak in find_peaks(share, height=REPEATED)[0][:20].tolist():
+    peaks = (share[1:-1] > share[:-2]) & (share[1:-1] > share[2:]) & (share[1:-1] >= REPEATED)
+    for peak in (1 + np.flatnonzero(peaks)[:20]).tolist():
         near = [k for k in (peak - 1, peak, peak + 1) if k <= n // 3]
         left, period = min((_between_lines(x, k, high), k) for k in near)
         if left <= PERIODIC:

@@ -16,9 +16,9 @@ from ..scene import contact, pair_hardware
 from ..scene import pair as pairs
 from ..scene.pair import Pair
 from .architectures import ARCHITECTURES
+from .client_loop import held_arm
 from .joint_gains import IGNORED, joint_loop
 from .joint_loop import JointLoop
-from .joint_walls import held_arm
 from .linear_loop import whole_samples
 from .pair_end import End, Load
 from .pair_loop import PairLoop

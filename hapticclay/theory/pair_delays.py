@@ -142,6 +142,23 @@ class Delays:
         """The edge at which the pair, stable at the least delay, turns unstable; None for none."""
         return next((edge for edge in self.edges(most) if edge.change > 0), None)
 
+    def first_alike(self, most: float) -> tuple[int, Edge | None] | None:
+        """The least whole delay, both ways alike, at which the pair is unstable; None for none.
+
+        With it, the last edge up to there at which eigenvalues leave the circle.
+        """
+        count, last = self.unstable, None
+        if count:
+            return math.ceil(0.5 * self.least), None
+        each_way = itertools.groupby(self.edges(most), lambda x: math.ceil(0.5 * x.samples))
+        for whole, edges in each_way:
+            for edge in edges:
+                count += edge.change
+                last = edge if edge.change > 0 else last
+            if count > 0:
+                return whole, last
+        return None
+
     def near(self, edge: Edge) -> Edge:
         """The edge of this loop nearest to one of another loop."""
         if edge.theta == 0.0:

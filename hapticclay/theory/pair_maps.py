@@ -16,7 +16,8 @@ from ..scene.link import KINDS, Link
 from ..scene.pair import Pair
 from .pair_build import Build
 from .pair_delays import Delays
-from .pair_verdict import LATEST, PairLimits, pair_limits
+from .pair_onset import LATEST, onset
+from .pair_verdict import PairLimits, pair_limits
 
 SPAN = 8.0  # factor of all Kp of a map, up and down
 LONGEST = 0.2  # [s] largest delay of a map of a pair without limit
@@ -101,11 +102,11 @@ def pair_map(
     build = Build(pair)
     factors = np.geomspace(1.0 / SPAN, SPAN, gains)
     found = [Delays(build.loop((0.0, 0.0), gain)) for gain in factors.tolist()]
-    edges = [None if x.unstable else x.first(2.0 * LATEST / pair.Ts) for x in found]
-    limits = np.array([_limit(x, e, pair.Ts) for x, e in zip(found, edges, strict=True)])
+    onsets = [onset(build, gain) for gain in factors.tolist()]
+    limits = np.array([math.inf if x is None else x.delay for x in onsets])
     late = np.linspace(0.0, longest or _longest(pair, limits), delays)
     samples = np.maximum(2.0 * late / pair.Ts, found[0].least)
-    buzz = [math.nan if e is None else e.theta / (2.0 * math.pi * pair.Ts) for e in edges]
+    buzz = [math.nan if x is None else x.frequency for x in onsets]
     return PairMap(
         pair.link.kind,
         factors,
@@ -116,12 +117,6 @@ def pair_map(
         0.5 * sum(build.delays),
         build.assumed(),
     )
-
-
-def _limit(found: Delays, edge: Any, Ts: float) -> float:
-    if edge is None:
-        return 0.0 if found.unstable else math.inf
-    return 0.5 * edge.samples * Ts
 
 
 def _longest(pair: Pair, limits: np.ndarray) -> float:

@@ -18,12 +18,11 @@ from . import joint_crossings, roots
 from .joint_families import NEAR
 from .joint_loop import MOST_STATES, grid
 from .pair_build import Build
-from .pair_delays import SLOWEST, Delays, Edge
+from .pair_delays import SLOWEST, Delays
 from .pair_loop import PairLoop
+from .pair_onset import Onset, onset
 
-LATEST = 2.0  # [s] largest one-way delay that is looked for
 LARGE = 500  # states of a map whose eigenvalues are not worth their time
-ROUNDS = 12  # of the share of a sample that a delay has
 HIGHEST = 64.0  # factor of all Kp up to which gains are tried
 EXACT = 1e-4  # relative width within which that factor is found
 COARSE = 1e-2  # the same for a map that is LARGE
@@ -43,8 +42,9 @@ class PairLimits(Result):
         radius: largest eigenvalue of the map over a sample, without those of rest: below 1 if
             stable. With more than 1,200 states, that found nearest to the circle or beyond it.
         structural: directions in which the free pair rests anywhere, whose eigenvalues are 1.
-        delay: largest one-way delay of the link, both ways alike, from none on [s]; 0 if the pair
-            is unstable without delay; inf for more than 2 s.
+        delay: least one-way delay of the link, both ways alike, at which the pair is unstable [s]:
+            below it all are stable; 0 if it is unstable without delay; inf for more than 2 s. Waves
+            are read at samples: the largest whole one that is stable.
         present: one-way delay of the link, the mean of both ways, with jitter and loss [s].
         frequency: of the motion that turns unstable first, or is unstable now [Hz].
         joint: joint that moves most in it.
@@ -243,48 +243,20 @@ class Study:
     # ---- delay
 
     @cached_property
-    def edge(self) -> tuple[Delays, Edge] | None:
-        """The least delay at which the pair turns unstable; None for none, or if it always is."""
-        found = self.without
-        edge = None if found.unstable else found.first(2.0 * LATEST / self.pair.Ts)
-        if edge is None:
-            return None
-        if self.build.architecture.whole:
-            return found, edge
-        for _ in range(ROUNDS):
-            share = self._late(found, edge) % self.pair.Ts
-            found = Delays(self.build.loop((share, share)))
-            before, edge = edge, found.near(edge)
-            if abs(edge.samples - before.samples) <= 1e-9 * before.samples:
-                break
-        return found, edge
-
-    @cached_property
-    def without(self) -> Delays:
-        """The pair without delay of the link."""
-        return Delays(self.build.loop((0.0, 0.0)))
-
-    def _late(self, found: Delays, edge: Edge) -> float:
-        """One-way delay of an edge [s]."""
-        return 0.5 * edge.samples * self.pair.Ts + found.loop.leader.share
+    def onset(self) -> Onset | None:
+        """The least delay at which the pair is unstable; None for more than 2 s."""
+        return onset(self.build)
 
     def delay(self) -> float:
         """Largest one-way delay [s]."""
-        if self.edge is None:
-            return 0.0 if self.without.unstable else math.inf
-        late = self._late(*self.edge)
-        if self.build.architecture.whole:
-            return (math.ceil(late / self.pair.Ts) - 1.0) * self.pair.Ts
-        return late
+        return math.inf if self.onset is None else self.onset.delay
 
     # ---- the motion that turns unstable
 
     def motion(self) -> tuple[complex, str, str]:
         """An eigenvalue, the joint that moves most, and how both arms move in it."""
-        if self.stable and self.edge is not None:
-            found, edge = self.edge
-            half = 0.5 * edge.samples
-            loop, z = found.loop.between(half, half), cmath.exp(1j * edge.theta)
+        if self.stable and self.onset is not None:
+            _, loop, z = self.onset
         else:
             loop, z = self.loop, self.worst
         leader, follower = loop.shape(z)

@@ -130,11 +130,34 @@ def test_columns_of_unknown_units_are_in_no_command(tmp_path):
     path = tmp_path / "log.csv"
     rows = [f"{0.001 * i},{i},{2 * i}" for i in range(30)]
     path.write_text("\n".join(["t [s],force [blub],pos [mm]", *rows]))
-    assert hc.studies.log_report(hc.Log.read(path)).commands == ()
+    report = hc.studies.log_report(hc.Log.read(path))
+    assert report.commands == ()
+    assert "--units force=UNIT" in report.warnings[-1]
+
+
+@pytest.mark.parametrize("hold", [1, 2, 5])
+def test_an_input_that_is_held_over_rows_is_told(tmp_path, hold):
+    path, rng = tmp_path / "log.csv", np.random.default_rng(0)
+    force = np.repeat(rng.normal(size=400 // hold), hold)
+    rows = [f"{0.001 * i},{f},{0.01 * f}" for i, f in enumerate(force.tolist())]
+    path.write_text("\n".join(["t [s],force [N],pos [m]", *rows]))
+    remark = hc.studies.log_report(hc.Log.read(path)).table["remarks"][1]
+    assert (f"changes every {hold} rows: held" in remark) is (hold > 1)
+
+
+def test_a_coarse_sensor_is_not_held(tmp_path):
+    """Its column changes at any row."""
+    from hapticclay.studies.even_columns import held_rows
+
+    slow = np.round(3.0 * np.sin(0.003 * np.arange(20000)) / 0.5)
+    assert held_rows(slow) == 1
 
 
 def test_a_table_on_its_side_is_refused_in_a_line(tmp_path):
     path = tmp_path / "side.csv"
     path.write_text("\n".join(",".join(f"{i + j}.5" for i in range(1500)) for j in range(3)))
     with pytest.raises(hc.ParameterError, match="are rows and columns exchanged"):
+        hc.studies.log_report(hc.Log.read(path))
+    path.write_text("\n".join(",".join(f"{i + j}.5" for i in range(300)) for j in range(3)))
+    with pytest.raises(hc.ParameterError, match="has 300 columns of 3 rows"):
         hc.studies.log_report(hc.Log.read(path))

@@ -351,7 +351,7 @@ def replaced(x, row, value):
 @pytest.mark.parametrize(
     "t, u, y, field, words",
     [
-        (T[:50], X[0, :50], X[1, :50], "t", "100 samples"),
+        (T[:50], X[0, :50], X[1, :50], "t", "100 rows"),
         (T, X[0, :-1], X[1], "input", "as long as t"),
         (T, X, X[1], "input", "one column"),
         (T, X[0], ["a"] * 4000, "output", "array of numbers"),
@@ -453,7 +453,7 @@ FILE = ["identify", "--csv", "a.csv"]
         (None, FILE, ["csv = 'a.csv'", "No such file"]),
         ("", FILE, ["csv", "empty"]),
         ("# only\n\n", FILE, ["csv", "empty"]),
-        ("t,input,output\n", FILE, ["shape (0,)", "100 samples"]),
+        ("t,input,output\n", FILE, ["0 rows", "100 rows"]),
         (b"\xff\xfe\x00", FILE, ["UTF-16", "damaged"]),
         (ROWS, FILE, ["columns.t", "one of 1, 2, 3"]),
         ("t,inputs,output\n" + ROWS, FILE, ["columns.input", "did you mean 'inputs'"]),

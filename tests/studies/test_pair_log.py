@@ -162,6 +162,14 @@ def test_a_scope_of_simulink_is_read_with_its_signs(tmp_path):
         np.testing.assert_array_equal(getattr(read, name), getattr(log, name))
 
 
+def test_columns_of_a_pair_go_on_with_it(tmp_path):
+    file = tmp_path / "rig.csv"
+    rows = [f"{1e-3 * i},{i},{2 * i},{3 * i}" for i in range(120)]
+    file.write_text("\n".join(["t [s],master [rad],slave [rad],tau_s [N.m]", *rows]))
+    commands = hc.studies.log_report(hc.Log.read(file)).commands
+    assert commands == (f"hapticclay pair --data {file}",)
+
+
 def test_a_scope_in_degrees_is_turned_into_radians(tmp_path):
     t = 1e-3 * np.arange(200.0)
     one = {"label": "p (deg) leader, follower", "values": np.outer(t, [90.0, 180.0])}
@@ -285,3 +293,32 @@ def test_a_missing_column_is_told_with_all_that_there_are(columns, tmp_path):
     (tmp_path / "log.csv").write_text("t,a,b,c\n" + "".join(f"{i},1,2,3\n" for i in range(50)))
     with pytest.raises(hc.ParameterError, match="t, a, b, c"):
         hc.studies.PairLog.load(tmp_path / "log.csv", columns)
+
+
+def sines(*parts):
+    """A log of the exact law 12 e + 0.1 de/dt, its error e of sines of (size, omega)."""
+    T = 5e-4
+    t = T * np.arange(8000)
+    leader = 0.09 * np.sin(4.4 * t) + 0.05 * np.sin(12.0 * t + 1.0) + 0.02 * np.sin(27.0 * t)
+    e = sum(a * np.sin(w * t) for a, w in parts)
+    torque = 12.0 * e + 0.1 * sum(a * w * np.cos(w * t) for a, w in parts)
+    return hc.studies.PairLog(t, leader, leader - e, torque, -torque)
+
+
+def test_an_error_of_one_sine_has_no_gains():
+    """Gain and phase are two numbers; P, D and lag are three."""
+    found = hc.studies.identify_pair(sines((2e-3, 30.0)))
+    for name in ("P", "D", "leader P", "leader D"):
+        assert math.isnan(found[name].low) and math.isnan(found[name].high)
+    assert sum("not told apart" in x for x in found.warnings) == 2
+
+
+@pytest.mark.parametrize("second", [(1e-3, 33.0), (2e-5, 90.0)])
+def test_an_error_of_two_sines_has_gains(second):
+    """Close ones, and one of a hundredth; differences in place of a rate are 0.25 ms late."""
+    found = hc.studies.identify_pair(sines((2e-3, 30.0), second))
+    assert not any("not told apart" in x for x in found.warnings)
+    assert found["P"].value == pytest.approx(12.0, rel=5e-3)
+    for name in ("P", "D"):
+        half = 0.5 * (found[name].high - found[name].low)
+        assert 0.0 < half < 0.02 * found[name].value

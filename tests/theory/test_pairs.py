@@ -258,9 +258,9 @@ def test_counted_eigenvalues_are_those_of_the_map(seed):
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("held", [False, True])
 def test_the_delay_limit_flips_the_map(kind, held):
-    """0.2 % of the limit on each side; limits that are infinite are stable at 300 ms.
+    """1e-6 of the limit on each side; limits that are infinite are stable at 300 ms.
 
-    A measured force jumps where a torque switches, so a limit is known to a sample there.
+    Waves are read at samples: a little beyond the last stable one it is the next that counts.
     """
     pair = one(kind=kind, Ts=2e-3, **(HELD if held else {}))
     limit = hc.theory.pair_limits(pair).delay
@@ -268,10 +268,44 @@ def test_the_delay_limit_flips_the_map(kind, held):
         late = replace(pair, link=replace(pair.link, delay=0.3))
         assert Build(late).loop().stable()
         return
-    off = 2.0 * pair.Ts if kind in ("position-force", "four-channel") else 0.002 * limit
-    for late, stable in ((limit - off, True), (limit + off, False)):
+    for late, stable in (((1.0 - 1e-6) * limit, True), ((1.0 + 1e-6) * limit, False)):
         late = replace(pair, link=replace(pair.link, delay=late))
         assert Build(late).loop().stable() is stable
+
+
+def test_a_measured_force_makes_stability_come_and_go():
+    """Where the torque switches at samples the force is a sample older: unstable from there on.
+
+    Growth of the exact map, which falls again until the next whole sample: 45.00 to 45.24 ms and
+    46.00 ms are unstable, 45.3 to 45.9 ms are not.
+    """
+    pair = one(kind="position-force", **HELD)
+    assert hc.theory.pair_limits(pair).delay == pytest.approx(45e-3, rel=1e-9)
+    build = Build(pair)
+    stable = {late: build.loop((1e-3 * late,) * 2).stable() for late in (44.9, 45.0, 45.2, 45.3)}
+    assert stable == {44.9: True, 45.0: False, 45.2: False, 45.3: True}
+    computed = replace(pair, delay=0.3e-3)  # torques switch at samples where a link has 0.7
+    late = hc.theory.pair_limits(computed).delay / pair.Ts
+    assert late % 1.0 == pytest.approx(0.7, abs=1e-6)
+
+
+@given(seed=st.integers(0, 10**6), kind=st.sampled_from(KINDS))
+@settings(max_examples=20, deadline=None)
+def test_no_delay_below_the_limit_is_unstable(seed, kind):
+    """Tenths of a sample, and switches at samples, by eigenvalues of the map; and just beyond."""
+    pair = drawn(seed, kind)
+    build, limit = Build(pair), hc.theory.pair_limits(pair).delay
+    if math.isinf(limit):
+        below = pair.Ts * np.linspace(0.0, 30.0, 41)
+    else:
+        samples = np.arange(min(40.0, limit / pair.Ts))
+        switches = samples + (-pair.delay / pair.Ts) % 1.0
+        below = pair.Ts * np.concatenate([switches, np.arange(0.0, len(samples), 0.1)])
+        below = below[below < (1.0 - 1e-7) * limit]
+        beyond = [limit + x * pair.Ts for x in (1e-9, 1e-6, 1e-3, 1e-2)]
+        assert max(build.loop((x, x)).radius() for x in beyond) > 1.0
+    for late in below.tolist():
+        assert build.loop((late, late)).radius() < 1.0 + 1e-9
 
 
 def test_only_the_round_trip_matters():

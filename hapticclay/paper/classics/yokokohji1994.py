@@ -13,7 +13,9 @@ from ...scene.link import Link
 from ...scene.pair import Contact, Pair
 from ...scene.virtual_wall import Device
 from ...studies.chart import Chart, curve
-from ...theory import pair_verdict
+from ...theory.pair_build import Build
+from ...theory.pair_delays import Delays
+from ...theory.pair_onset import LATEST
 from ..ledger import Row, row
 from .bilateral import Bilateral, Law, Motion, Push, Signals, poles_of_run
 from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Progress, holds
@@ -281,8 +283,8 @@ def _delays(quick: bool, progress: Progress) -> list[Row]:
     kinds = ("position-position", "position-force", "four-channel")
     for kind in kinds[:1] if quick else kinds:
         progress(f"delay of {kind}")
-        study = pair_verdict.Study(sampled(kind))
-        edge = study.without.first(2.0 * pair_verdict.LATEST / TS)
+        whole = Delays(Build(sampled(kind)).loop((0.0, 0.0)))
+        edge = whole.first(2.0 * LATEST / TS)
         expected = 0.5 * TS * edge.samples if edge else math.inf
         rows.append(
             row(
