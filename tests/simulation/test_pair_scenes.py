@@ -106,9 +106,9 @@ def test_yielding_clay_holds_the_follower():
     assert np.abs(found.follower).max() < 1e-16  # rounding
     assert found.leader[-1, 0] == pytest.approx(2.0 / 400.0, rel=1e-3)
     found = hc.simulate(replace(pushed, muscle=hc.Step((5.0, 0.0), 0.0), t_max=4.0))
-    # both move at rates whose dampers take what the yield force leaves: 2 = (0.5 + 0.5 + 1) v
+    # what the yield force leaves moves 2 kg behind 2 N.s/m, but for a start of some 50 ms
     rate = np.diff(found.follower[:, 0])[-1] / 1e-3
-    assert rate == pytest.approx((5.0 - 3.0) / (0.5 + 0.5 + 1.0), rel=1e-2)  # 4 s of 1 s
+    assert rate == pytest.approx(1.0 - math.exp(-4.0), rel=1e-3)
 
 
 def test_energy_of_a_push_against_a_wall():
