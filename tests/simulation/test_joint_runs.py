@@ -186,7 +186,6 @@ BAD = {
     "velocity": (dict(velocity=(0.1, 0.0)), "velocity", "must be left out"),
     "origin": (dict(origin=(0.1, 0.3)), "origin", "must be left out"),
     "limits of the servo": (dict(torque_limit=(3.0, 2.0)), "torque_limit", "must be left out"),
-    "two hands": (dict(operator=(HAND, None)), "operator", "must be one for all axes"),
     "command": (dict(command=hc.Step((0.01, 0.0), 0.1)), "command", "must be None"),
     "shaping": (dict(inertia_shaping=True), "inertia_shaping", "must be left out"),
     "groove": (
