@@ -89,7 +89,9 @@ def theory_times(arm: hc.MjcfArm, law: hc.JointPD, poses: int) -> list[dict[str,
     """Processor time of the exact answers [s]."""
     TS = engine.TS
     jobs = {
-        "all limits of the arm at a pose": (lambda: hc.theory.joint_limits(arm, law, TS, TS), 5),
+        "all limits of the arm at a pose": (
+            lambda: hc.theory.joint_limits(arm, law, TS, TS), REPEATS,
+        ),
         f"the common limit at {poses} poses": (
             lambda: hc.theory.over_poses(arm, law, TS, TS, poses=poses), 1,
         ),

@@ -256,10 +256,9 @@ def page(data: dict[str, Any]) -> str:
         "Wheels are installed into environments of their own; packages come from pip's cache.",
         common.table(places, ["", "before", "now"]),
         "Processor time [s] from the start of a process to its end, imports included: *first* in "
-        "an empty home folder, *again* in the same one. The release before compiled each kind of "
-        "scene when it first met it, and stored the code in the home folder; this one is compiled "
-        "when it is installed. Runs of the release before that are no faster compiled stayed in "
-        "Python.",
+        "an empty home folder, *again* in the same one. The release before made single runs in "
+        "Python, compiled a kind of scene where that paid, and kept the code in the home folder; "
+        "this one is compiled when it is installed. *Not there*: the release before lacks it.",
         common.table(cells, ["job", "before, first", "before, again", "now, first", "now, again"]),
         "## Data and machine",
         "All numbers: [first_results.json](first_results.json).",
