@@ -249,8 +249,8 @@ def sections(data: dict[str, Any]) -> list[str]:
         f"until rates grow; the bisection finds it to {resolution:.2f} %, for hapticclay, between "
         f"{OWN[0]:g} and {OWN[1]:g} of the exact one, to {own:.2f} %. MuJoCo's runs get the same "
         "messages from a program in Python. Run time: processor time of a simulated second of "
-        "both arms and their law; hapticclay's has link, energy and record as well, all in Python from "
-        "sample to sample.",
+        "both arms and their law; hapticclay's has link, energy and record as well, all in Python "
+        "from sample to sample.",
         common.table(
             cells, ["package", "method", "step", "error of the factor", "run time [ms/s]"]
         ),

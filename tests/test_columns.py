@@ -210,10 +210,11 @@ def test_buttons_are_read_with_mark_and_units(tmp_path):
 
 
 @pytest.mark.parametrize("cell", ["nan", "inf", "x", "", "1,2"])
-def test_exchanges_that_are_no_numbers_are_refused(cell, tmp_path):
-    path = tmp_path / "exchanges.csv"
-    row = ["0.0"] * len(COLUMNS)
-    path.write_text("\n".join((",".join(COLUMNS), ",".join(row), ",".join([cell, *row[1:]]))))
-    with pytest.raises(hc.ParameterError, match="line 3") as error:
+@pytest.mark.parametrize("axes", COLUMNS)
+def test_exchanges_that_are_no_numbers_are_refused(axes, cell, tmp_path):
+    path, names = tmp_path / "exchanges.csv", COLUMNS[axes]
+    row = ["0.0"] * len(names)
+    path.write_text("\n".join((",".join(names), ",".join(row), ",".join([cell, *row[1:]]))))
+    with pytest.raises(hc.ParameterError, match="line [23]") as error:
         Exchanges.load(path)
     assert len(str(error.value)) < 300

@@ -307,3 +307,29 @@ def test_what_is_no_log_is_refused_in_a_line(tmp_path):
     matlab(tmp_path / "a.mat")
     with pytest.raises(hc.ParameterError, match="table = 'rig': must be one of t, force, pos"):
         hc.Log.read(tmp_path / "a.mat", table="rig")
+
+
+def test_gaps_of_a_topic_are_left_out_and_told(tmp_path):
+    """0.3 s without forces: no straight line through it."""
+    pytest.importorskip("mcap")
+    from mcap.writer import Writer
+
+    with open(tmp_path / "a.mcap", "wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("Row", "jsonschema", b"{}")
+        ways = [writer.register_channel(x, "json", schema) for x in ("/place", "/force", "/slow")]
+        for i in range(2000):
+            rows = [(ways[0], {"t": 1e-3 * i, "x": 2.0 * i})]
+            rows += [(ways[1], {"t": 1e-3 * i + 2e-4, "f": 3.0 * i})] * (not 700 <= i < 1000)
+            rows += [(ways[2], {"t": 1e-3 * i, "T": 20.0})] * (i < 50 or i == 1999)
+            for channel, row in rows:
+                writer.add_message(channel, 10**6 * i, json.dumps(row).encode(), 10**6 * i)
+        writer.finish()
+    log = hc.Log.read(tmp_path / "a.mcap", units={"/place.x": "mm", "/force.f": "N"})
+    t = log.values("t")
+    assert log.rows == 1699 - 1 and not np.any((t > 0.6992) & (t < 1.0002))
+    np.testing.assert_allclose(log.values("/force.f"), 3e3 * (t - 2e-4), atol=1e-6)
+    told = " ".join(log.table.notes)
+    assert "1 gap, the longest 0.301 s, left out" in told
+    assert "topic /slow has 1 gap, the longest 1.95 s: read it as --table /slow" in told

@@ -132,6 +132,19 @@ class Mechanism:
         damping = follow.T @ (self._model.dof_damping[:, None] * follow)
         return Resting(follow.T @ whole @ follow, damping, self._jacobian() @ follow)
 
+    def at_handle(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Position of the handle and its Jacobian at joint positions, and what holds the weight.
+
+        [m], shape (3,); [m], shape (3, n); torques [N.m], shape (n,).
+
+        Raises:
+            ParameterError: constraints cannot be satisfied there.
+        """
+        self._at(q)
+        follow = self._follow()
+        weights = (self._data.qfrc_bias - self._data.qfrc_gravcomp) @ follow
+        return self.handle_place(), self._jacobian() @ follow, weights
+
     def handle(self, q: np.ndarray) -> np.ndarray:
         """Position of the handle in the frame of the world [m], shape (3,)."""
         self._at(q)
@@ -151,6 +164,31 @@ class Mechanism:
                 pass
             q = self.pose[self.dofs] + rng.normal(0.0, NEARBY, len(self.dofs))
         return np.flatnonzero(moves > STILL).tolist()
+
+    @property
+    def reach(self) -> list[float]:
+        """Distance of the handle from each joint along its links, stretched [m]; 1 of a slide."""
+        model, (kind, number) = self._model, self._site or ("body", 0)
+        body, far, distances = self._held(), 0.0, dict[int, float]()
+        if kind == "site":
+            far = float(np.linalg.norm(model.site_pos[number]))
+        while body:
+            distances[body] = far
+            far += float(np.linalg.norm(model.body_pos[body]))
+            body = int(model.body_parentid[body])
+        return [
+            distances.get(int(model.dof_bodyid[dof]), far)
+            + float(np.linalg.norm(model.jnt_pos[dof]))
+            if turns
+            else 1.0
+            for dof, turns in zip(self.dofs, self.turning, strict=True)
+        ]
+
+    @property
+    def turning(self) -> list[bool]:
+        """Whether each joint of the arm turns; others slide."""
+        slide = int(self._mujoco.mjtJoint.mjJNT_SLIDE)
+        return [bool(self._model.jnt_type[dof] != slide) for dof in self.dofs]
 
     def runnable(self) -> Any:
         """A copy of the model in which nothing acts but inertia and weight."""

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from ..errors import Bound, ParameterError
-from ..fields import value_of_text
 from ..files import writable
 from . import console, walls
+from .arm_options import ArmOptions
 from .options import Loose
 from .unused import Unused
 
@@ -41,13 +40,7 @@ class ArmCommand:
         velocity: How the rate of a joint is had, by default as the file of gains says, or exact.
         cutoff: Cutoff of --velocity filter [rad/s].
         runs: Where the gains act: in the host's loop at the rate, or in the drives' own.
-        site: Site or body at which the hand holds the arm.
-        joints: Joints of the arm, in the order of the gains; by default those before the handle.
-        pose: Joint positions, a number for each joint or NAME=POSITION [rad or m].
-        armature: Reflected inertia of the rotors, a number for each joint or NAME=INERTIA [kg.m^2].
-        damping: Viscous damping of the joints, likewise [N.m.s/rad].
-        friction: Coulomb friction of the joints, likewise [N.m].
-        gravity: Whether the controller holds the arm against gravity.
+        arm: The arm of the file.
         counts: Encoder counts a turn behind the friction that the gains feed forward.
         wall: Axis of the world along which a wall at the handle pushes.
         B: Damping of that wall [N.s/m].
@@ -71,13 +64,7 @@ class ArmCommand:
     velocity: Literal["exact", "difference", "filter"] | None = None
     cutoff: Annotated[float | None, Bound(0.0, unit="rad/s", above=True)] = None
     runs: Literal["host", "drive"] | None = None
-    site: str | None = None
-    joints: tuple[str, ...] = ()
-    pose: tuple[str, ...] = ()
-    armature: tuple[str, ...] = ()
-    damping: tuple[str, ...] = ()
-    friction: tuple[str, ...] = ()
-    gravity: Literal["compensated", "acts"] = "compensated"
+    arm: ArmOptions = ArmOptions()
     counts: Annotated[int | None, Bound(1, 10**9)] = None
     wall: Literal["x", "y", "z"] | None = None
     B: Annotated[float, Bound(0.0, unit="N.s/m")] = 0.0
@@ -101,7 +88,7 @@ class ArmCommand:
     )
 
     def __call__(self) -> int:
-        arm = self._arm()
+        arm = self.arm.arm(self.file)
         out = self.out or console.default_folder("arm", arm)
         writable(out)
         self._film_ready()
@@ -132,10 +119,7 @@ class ArmCommand:
         record, mode = buzz(arm, law, *timing)
         shown, options = buzz_film.buzz_of(record, mode.frequency)
 
-        def progress(images: Any, count: int) -> Any:
-            return iter(console.progress_bar(images, total=count, desc="film", unit="frame"))
-
-        print(f"written to {film.film(shown, self.film, options, progress)}")
+        print(f"written to {film.film(shown, self.film, options, console.film_progress)}")
 
     def _answers(self, arm: MjcfArm) -> Any:
         """The limits of the gains, of a wall, and over poses: those that are asked for."""
@@ -168,20 +152,6 @@ class ArmCommand:
     def _Ts(self) -> float:
         return self.Ts if self.Ts is not None else 1.0 / (self.rate or 1000.0)
 
-    def _arm(self) -> MjcfArm:
-        from ..arms.mjcf_arm import MjcfArm
-
-        return MjcfArm(
-            self.file,
-            site=self.site,
-            joints=self.joints or None,
-            pose=_per_joint("pose", self.pose),
-            armature=_per_joint("armature", self.armature),
-            damping=_per_joint("damping", self.damping),
-            friction=_per_joint("friction", self.friction),
-            gravity=self.gravity,
-        )
-
     def _law(self) -> JointPD:
         from ..arms.joint_law import JointPD
 
@@ -193,13 +163,3 @@ class ArmCommand:
         if self.gains:
             return JointPD.load(self.gains, **given)
         return JointPD(self.Kp, self.Kd, **given)
-
-
-def _per_joint(name: str, words: Sequence[str]) -> Any:
-    """Values in order, or by the name of the joint, NAME=VALUE; None for none."""
-    from ..scene.changes import split_words
-
-    if not any("=" in word for word in words):
-        return [value_of_text(word) for word in words] or None
-    pairs = split_words(name, words, "must be numbers, or NAME=NUMBER, each once, not both")
-    return {joint: value_of_text(text) for joint, text in pairs.items()}

@@ -8,6 +8,7 @@ from pathlib import Path
 
 SHARED = (
     "app",
+    "arm_options",
     "commands",
     "console",
     "device_options",

@@ -8,7 +8,7 @@ import shutil
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -186,3 +186,8 @@ def deliver(
     finally:  # a full disk must not hide the result
         print(found.text() if text is None else text, end="\n" if text != "" else "")
     print(f"written to {out}")
+
+
+def film_progress(images: Iterable[Any], count: int) -> Iterator[Any]:
+    """Shows how many images of a film are made."""
+    return iter(progress_bar(images, total=count, desc="film", unit="frame"))

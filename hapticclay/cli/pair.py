@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from ..results import Result
     from ..scene.pair import Pair
 
-OF_THEORY = ("delay", "kind", "Ts", "map", "compare", "cells", "feel", "run")
+OF_PAIR = ("map", "compare", "cells", "feel", "run", "film")
+OF_THEORY = ("delay", "kind", "Ts", "view", *OF_PAIR)
 OF_LOGS = ("columns", "band", "level", "units", "counts", "table", "where")
 
 
@@ -47,6 +48,12 @@ class PairCommand:
             objects the pair is stable.
         run: Also run the pair for this time [s], under the muscle of the hand that the file gives;
             by default a push of 1 N for 50 ms.
+        film: Film of that run, of at least 8 s, in which small motion is magnified: .mp4, .webp or
+            .gif.
+        view: Show the pair in a browser, with the mouse as the leader's hand and sliders for delay
+            and gains, until Ctrl-C; the record is then written.
+        host: Address of that page. Any address but that of this machine needs a token.
+        port: Port of that page; 0 for a free one.
         data: Log of one axis, in place of a file of the pair, in any format that is read, or a
             scope of Simulink: time [s], both positions [rad], torques of both motors and the force
             on the follower [N.m].
@@ -68,6 +75,10 @@ class PairCommand:
     cells: Annotated[tuple[int, int], Bound(2, 200, names=("gains", "delays"))] = (20, 20)
     feel: Literal["x", "y", "z"] | None = None
     run: Annotated[float | None, Bound(0.0, 1e4, "s", above=True)] = None
+    film: Path | None = None
+    view: bool = False
+    host: str = "127.0.0.1"
+    port: int = 8080
     data: Path | None = None
     columns: tuple[str, ...] = ()
     band: Annotated[float, Bound(0.1, 1e5, "Hz")] = 80.0
@@ -80,6 +91,9 @@ class PairCommand:
         Unused(("data",), "is in place of a file of the pair: give one of the two", ("file",)),
         Unused(OF_THEORY, "is for a file of the pair, not for a log", ("data",)),
         Unused(OF_LOGS, "is for a log: give --data", (), ("data",)),
+        Unused(OF_PAIR, "is left out where the pair is shown: leave out --view", ("view",)),
+        Unused(("film",), "shows a run: give --run", (), ("run",)),
+        Unused(("host", "port"), "is of the page: give --view too", (), ("view",)),
         Unused(("cells",), "is for a map: give --map delay-gain", (), ("map",)),
     )
 
@@ -92,9 +106,39 @@ class PairCommand:
         pair = self._pair(self.file)
         out = self.out or Path("out", "pair", self.file.stem)
         writable(out)
-        for found in list(self._answers(pair)):  # all is computed before a file is written
+        if self.view:
+            return self._viewed(pair, out)
+        if self.film is not None:
+            from ..views.film import ready
+
+            writable(self.film.parent)
+            ready(self.film)
+        answers = list(self._answers(pair))  # all is computed before a file is written
+        for found in answers:
             console.deliver(found, out, self.figures)
+        if self.film is not None:
+            self._filmed(answers, self.film)
         return 0
+
+    def _viewed(self, pair: Pair, out: Path) -> int:
+        """Shows the pair until Ctrl-C, then writes the record."""
+        from .view import show_pair
+
+        session = show_pair(pair, self.host, self.port)
+        if not session.recorded:
+            print("nothing was recorded")
+            return 0
+        console.deliver(session.record(), out, self.figures)
+        return 0
+
+    def _filmed(self, answers: Sequence[Result], file: Path) -> None:
+        from ..simulation.pair_record import PairRecord
+        from ..views import film, pair_stage
+
+        for record in answers:
+            if isinstance(record, PairRecord):
+                options = film.FilmOptions(**pair_stage.look_of(record))
+                print(f"written to {film.film(record, file, options, console.film_progress)}")
 
     def _identified(self, data: Path) -> int:
         from ..studies.pair_identification import identify_pair

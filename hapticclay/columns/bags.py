@@ -15,8 +15,10 @@ from ..display import one_line
 from ..errors import ParameterError, needing
 from .array_tables import ArrayTable
 from .heads import Head
+from .stamps import Stamps
 
 COVERED = 0.8  # share of the base's time that a topic spans, to be read beside it
+CLOCKS = "stamp", "t", "time", "timestamp"
 MOST_ITEMS = 64  # of an array in a message
 Row = dict[str, float]
 
@@ -130,33 +132,60 @@ def _table(
     if table or len(good) == 1:
         name = table or next(iter(good))
         return _made(where, path, f"{form}, topic {name}", good[name].columns(), good[name].units)
-    base = max(good, key=lambda k: len(good[k].rows))
-    clock = good[base].columns()
-    t = next(iter(clock.values())) if "stamp" not in clock else clock["stamp"]
-    columns = {f"{base}.{k}" if k not in ("stamp", "t") else k: x for k, x in clock.items()}
-    units = {f"{base}.{k}": x for k, x in good[base].units.items()}
+    return _joined(where, path, form, good)
+
+
+def _joined(where: str, path: Path, form: str, topics: Mapping[str, Topic]) -> ArrayTable:
+    """The topics that span most of the time of the fastest, on its stamps."""
+    base = max(topics, key=lambda k: len(topics[k].rows))
+    clock = topics[base].columns()
+    t = _clock(clock)
+    columns = {f"{base}.{k}" if k not in CLOCKS else k: x for k, x in clock.items()}
+    units = {f"{base}.{k}": x for k, x in topics[base].units.items()}
     inside, notes = np.ones(len(t), dtype=bool), []
-    for name, topic in good.items():
-        other = topic.columns()
-        own = other.get("stamp", other.get("t", np.zeros(0)))
+    for name, topic in topics.items():
         if name == base:
             continue
-        share = (
-            (t >= own.min()) & (t <= own.max()) if np.all(np.diff(own) > 0.0) else inside * False
-        )
-        if np.mean(share) < COVERED:
-            notes.append(f"topic {name} spans too little of the time: read it as --table {name}")
+        own = topic.columns()
+        covered, note = _covered(t, Stamps(_clock(own)))
+        if covered is None:
+            notes.append(f"topic {name} {note}: read it as --table {name}")
             continue
-        inside &= share
-        notes.append(f"topic {name} is interpolated linearly onto the stamps of {base}")
+        inside &= covered
+        notes.append(f"topic {name} is interpolated linearly onto the stamps of {base}{note}")
         columns |= {
-            f"{name}.{k}": np.interp(t, own, x)
-            for k, x in other.items()
-            if k not in ("stamp", "t", "received")
+            f"{name}.{k}": np.interp(t, _clock(own), x)
+            for k, x in own.items()
+            if k not in (*CLOCKS, "received")
         }
         units |= {f"{name}.{k}": x for k, x in topic.units.items()}
     columns = {k: x[inside] for k, x in columns.items()}
-    return _made(where, path, f"{form}, {len(good)} topics", columns, units, tuple(notes))
+    return _made(where, path, f"{form}, {len(topics)} topics", columns, units, tuple(notes))
+
+
+def _clock(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Stamps of a topic [s]."""
+    return next((columns[k] for k in CLOCKS if k in columns), next(iter(columns.values())))
+
+
+def _covered(t: np.ndarray, own: Stamps) -> tuple[np.ndarray | None, str]:
+    """Times at which another topic is between stamps that are no gap; None for too few."""
+    if len(own.backward) or len(own.repeats):
+        return None, "has stamps that do not go ahead"
+    within = (t >= own.t[0]) & (t <= own.t[-1])
+    if np.mean(within) < COVERED:
+        return None, "spans too little of the time"
+    inside = within.copy()
+    for i in own.gaps.tolist():
+        inside &= (t <= own.t[i]) | (t >= own.t[i + 1])
+    note = f"{1.0 / own.step:.4g} Hz"
+    if lost := int(np.count_nonzero(within & ~inside)):
+        count, longest = len(own.gaps), float(own.steps.max())
+        gaps = f"{count} gap{'s' * (count > 1)}, the longest {longest:.3g} s"
+        if np.mean(inside) < COVERED:
+            return None, f"has {gaps}"
+        note += f"; {lost} rows in its {gaps}, left out"
+    return inside, f" ({note})"
 
 
 def _made(

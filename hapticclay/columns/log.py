@@ -218,9 +218,15 @@ def _chosen(log: Log, where: Mapping[str, float]) -> Log:
 
 
 def columns_of(
-    field: str, path: str | os.PathLike[str], units: Mapping[str, Sequence[str]]
+    field: str,
+    path: str | os.PathLike[str],
+    units: Mapping[str, Sequence[str]],
+    optional: Mapping[str, Sequence[str]] | None = None,
 ) -> dict[str, np.ndarray]:
-    """Columns of fixed names in SI units, by name; without units, as they are."""
+    """Columns of fixed names in SI units, by name; without units, as they are.
+
+    Those that are optional are left out where the file has none.
+    """
     log = open_log(field, path)
     known = {x for names in log._names() for each in names for x in each}
     if all(x.isdigit() for x in log.names):
@@ -230,7 +236,9 @@ def columns_of(
         raise log.table.refusal(f"must have the columns {', '.join(units)}; {lacks}")
     if not log.rows:
         raise log.table.refusal("must have a row or more")
-    return {name: log.values(name, x) if x else log.raw(name) for name, x in units.items()}
+    there = {name: x for name, x in (optional or {}).items() if name in known}
+    wanted = {**units, **there}
+    return {name: log.values(name, x) if x else log.raw(name) for name, x in wanted.items()}
 
 
 def _count(field: str, size: Any) -> tuple[float, Powers]:

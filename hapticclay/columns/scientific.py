@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import io
+import re
 import warnings
 import zipfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..display import one_line
 from ..errors import ParameterError, needing
+from ..files import MOST_READ, read_bytes
 from .array_tables import ArrayTable, Container
+from .heads import is_unit
+from .matlab_elements import check_elements, is_version_5
 
+LABEL = re.compile(r"[^()]*\(([^()]*)\)\s*(.*)")  # "Lever positions (rad) master, slave"
 UNIT_NAMES = ("units", "unit", "Units", "Unit")
 DEEPEST = 12  # groups in one another
 MOST_VALUES = 2**28  # numbers of an array
@@ -22,13 +30,18 @@ def matlab(field: str, path: Path, table: str = "") -> ArrayTable:
     """A MAT file of version 4 to 7.2: arrays and structures, and the scopes of Simulink."""
     from scipy.io import loadmat
 
+    content = read_bytes(path, MOST_READ)
+    if is_version_5(content):
+        check_elements(content)
     with warnings.catch_warnings(action="ignore"):
-        data = loadmat(path, simplify_cells=True)
+        data = loadmat(io.BytesIO(content), simplify_cells=True)
     data = {k: x for k, x in data.items() if not k.startswith("__")}
     if opaque := [k for k, x in data.items() if _is_opaque(x)]:
         data = {k: x for k, x in data.items() if k not in opaque}
     units, parts = _stated(data)
+    table, notes = (table, ()) if table else _largest(data)
     found = Container.of(field, path, "MATLAB", _with_signals(data), units, parts)
+    found = replace(found, notes=notes)
     if opaque and not found.arrays:
         bound = (
             f"holds {', '.join(opaque)}, a table or an object, which only MATLAB reads: save "
@@ -57,23 +70,54 @@ def _stated(data: dict[str, Any]) -> tuple[dict[str, str], dict[str, Sequence[st
     return {k: str(x) for k, x in units.items() if isinstance(x, str)}, parts
 
 
+def _is_scope(x: Any) -> bool:
+    """Whether it is a structure with time, as scopes of Simulink save them."""
+    return isinstance(x, dict) and "time" in x and "signals" in x
+
+
 def _with_signals(data: Any) -> Any:
-    """Structures with time, as scopes of Simulink save them, by the labels of their signals."""
+    """Structures with time by the labels of their signals."""
     if not isinstance(data, dict):
         return data
-    out = {}
-    for key, x in data.items():
-        if isinstance(x, dict) and "time" in x and "signals" in x:
-            signals = x["signals"] if isinstance(x["signals"], list | tuple) else [x["signals"]]
-            signals = signals if isinstance(signals, list) else list(signals)
-            values = {"time": x["time"]}
-            for i, signal in enumerate(signals):
-                label = str(signal.get("label") or "").strip() or f"signal {i + 1}"
-                values[label if label not in values else f"{label} {i + 1}"] = signal["values"]
-            out[key] = values
-        else:
-            out[key] = _with_signals(x)
+    return {k: _scope(x) if _is_scope(x) else _with_signals(x) for k, x in data.items()}
+
+
+def _scope(scope: dict[str, Any]) -> dict[str, Any]:
+    """Time and signals of a structure with time."""
+    signals, out = scope["signals"], {"time": scope["time"]}
+    for i, signal in enumerate(signals if isinstance(signals, list | tuple) else [signals], 1):
+        label = signal.get("label")
+        label = label.strip() if isinstance(label, str) else ""
+        for name, x in _labelled(label or f"signal {i}", signal["values"]).items():
+            out[name if name not in out else f"{name} {i}"] = x
     return out
+
+
+def _labelled(label: str, values: Any) -> dict[str, Any]:
+    """Columns of a signal by the names and the unit of "Torque (Nm at lever) -tau_rm, tau_rs"."""
+    found = LABEL.fullmatch(label)
+    names = [x.strip() for x in found[2].split(",") if x.strip()] if found else []
+    columns = np.asarray(values)
+    columns = columns[:, None] if columns.ndim == 1 else columns
+    if not found or columns.ndim != 2 or not 0 < columns.shape[1] <= len(names):
+        return {label: values}
+    word = "".join(found[1].split()[:1])
+    unit = f" [{word}]" if is_unit(word) else ""
+    return {f"{name}{unit}": x for name, x in zip(names, columns.T, strict=False)}
+
+
+def _largest(data: dict[str, Any]) -> tuple[str, tuple[str, ...]]:
+    """The scope with most columns, where there are several; and a note."""
+    scopes = {k: x for k, x in data.items() if _is_scope(x) and np.size(x["time"]) > 1}
+    if len(scopes) < 2:
+        return "", ()
+    most = max(scopes, key=lambda k: sum(_width(x) for x in _scope(scopes[k]).values()))
+    others = one_line(", ".join(k for k in scopes if k != most), 80)
+    return most, (f"scope {most}, which has most columns; read {others} by --table",)
+
+
+def _width(x: Any) -> int:
+    return np.shape(x)[1] if np.ndim(x) == 2 else 1
 
 
 def hdf5(field: str, path: Path, table: str = "") -> ArrayTable:

@@ -258,7 +258,10 @@ class Row(Node):
         return _as_tuple(value, items)
 
     def fits(self, value: Any, old: Any = UNSET) -> bool:
-        return isinstance(old, tuple) if isinstance(value, Mapping) else errors.is_series(value)
+        row = old if isinstance(value, Mapping) else value
+        if isinstance(value, Mapping) and not isinstance(old, tuple) or not errors.is_series(row):
+            return False
+        return self.any_length or not hasattr(row, "__len__") or len(row) == self.arity
 
     def _read(self, value: Any, path: str, old: Any) -> Any:
         if isinstance(value, Mapping):

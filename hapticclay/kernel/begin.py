@@ -83,7 +83,7 @@ def put_machine(m, s, px, py):
         z.place, z.tool = p, p
     for j in range(m.joints):
         now.w[j], now.past[j] = s.w[j], hardware.encoded(m, j, s.q[j])
-    if m.joint_law and m.feeds_gravity:  # until the first torque arrives
+    if (m.joint_law or m.own) and m.feeds_gravity:  # until the first torque arrives
         joint_law.hold_weight(m, s)
     now.due = now.due_then = math.inf
     sampled.put_times(m, now, 0)

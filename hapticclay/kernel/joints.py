@@ -1,7 +1,7 @@
 """An arm of any joints on the engine's terms: its inertia and bias, and how a kick moves it.
 
 The handle moves along the two axes of the clay's plane, here x and y, and perhaps along a third, z.
-Nothing but the hand acts along z, which is eliminated: in the plane all laws of the clay see an arm
+Only hand and muscle act along z, which is eliminated: in the plane all laws of the clay see an arm
 of another mobility (docs/equations.md).
 """
 
@@ -58,7 +58,7 @@ def turn(m, k, rates, g, h):
         return
     for i in range(m.axes):
         k.axis[i].c = 0.0
-    if m.x.mass > 0.0:
+    if m.x.mass > 0.0 or m.y.mass > 0.0:
         for i in range(n):
             e.w[m.dof[i]] = rates[i]
         e.com_vel(e.model, e.data)
@@ -288,7 +288,7 @@ def prepare_sensor(m, s, k):
         o.a = o.rest = along(m, e.joint_J, i, e.free, 0)
     if m.axes > 2:
         z = k.z
-        z.f = m.weight[2] - hand.resistance(m, z.p, z.v, z.c, 2)
+        z.f = m.z.push + m.weight[2] - hand.resistance(m, z.p, z.v, z.c, 2)
         k.Sxx, k.Sxy, k.Syy = k.Wxx, k.Wxy, k.Wyy
         eliminate(k, m.z.mass)
         k.Wxx, k.Wxy, k.Wyy = k.Sxx, k.Sxy, k.Syy

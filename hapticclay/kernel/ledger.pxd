@@ -5,6 +5,9 @@ from . cimport joints
 
 @cython.locals(power=cython.double)
 cdef void add_work(Model m, Work of, Work to, Kick k, double *w, Machine machine) noexcept nogil
-cdef (double, double) more_taken(Model m, Kick k, double *w, double hand_taken, double joints_taken) noexcept nogil
+@cython.locals(way=cython.double)
+cdef (double, double) along_z(Model m, Kick k, double muscle, double taken) noexcept nogil
+@cython.locals(force=cython.double)
+cdef double taken_by_joints(Model m, Kick k, double *w, double taken) noexcept nogil
 @cython.locals(power=cython.double)
 cdef void add_hardware_work(Model m, Work of, Work to, Kick k, double *w, Machine machine) noexcept nogil

@@ -18,22 +18,27 @@ def add_work(m, of, to, k, w, machine):
     clay = H * (x.fe * vx + y.fe * vy)
     taken = H * (hand.damping_force(m, k, 0) * vx + hand.damping_force(m, k, 1) * vy)
     if m.general:
-        taken, to.joints = more_taken(m, k, w, taken, of.joints)
+        to.joints = taken_by_joints(m, k, w, of.joints)
+        if m.axes > 2:
+            muscle, taken = along_z(m, k, muscle, taken)
     to.muscle, to.motors, to.clay = of.muscle + muscle, of.motors + motors, of.clay + clay
     to.hand, to.through = of.hand + taken, of.through + (abs(muscle) + abs(motors))
     if m.hardware:
         add_hardware_work(m, of, to, k, w, machine)
 
 
-def more_taken(m, k, w, hand_taken, joints_taken):
-    """What the damper of the hand along z and those of the joints take in addition [J]."""
-    if m.axes > 2:
-        z = k.z
-        hand_taken += k.H * hand.damping_force(m, k, 2) * 0.5 * (z.v + z.u)
+def along_z(m, k, muscle, taken):
+    """Work of the muscle, and what the damper of the hand takes, with those along z [J]."""
+    way = k.H * 0.5 * (k.z.v + k.z.u)
+    return muscle + k.z.uh * way, taken + hand.damping_force(m, k, 2) * way
+
+
+def taken_by_joints(m, k, w, taken):
+    """What the dampers of the joints take in addition [J]."""
     for i in range(m.joints):
         force = k.L * joints.damping(m, w, i) + k.R * joints.damping(m, k.w, i)
-        joints_taken += 0.5 * k.H * force * (w[i] + k.w[i])
-    return hand_taken, joints_taken
+        taken += 0.5 * k.H * force * (w[i] + k.w[i])
+    return taken
 
 
 def add_hardware_work(m, of, to, k, w, machine):

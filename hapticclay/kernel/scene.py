@@ -79,9 +79,10 @@ def put_axes(m: Any, s: Scenario) -> None:
     for i, a in enumerate(m.axis[: m.axes]):
         if th := s.operators[min(i, 1)]:
             a.mass, a.damper, a.spring = float(th.mass), float(th.damper), float(th.spring)
+        a.push = force[i]
     for i, a in enumerate(m.axis[:2]):
         a.servo[:] = map(float, s.servo[i].numbers)
-        a.K, a.push = float(s.gain[i]), force[i]
+        a.K = float(s.gain[i])
     lags = [c.lag for c in s.compensators]
     if all(x and x[0] == 1.0 for x in lags):
         for a, lag in zip(m.axis[:2], lags, strict=True):

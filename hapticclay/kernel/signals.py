@@ -14,7 +14,7 @@ def is_on_grid(m, s):
 def push(m, s, k):
     """Mean muscle force over a kick."""
     t = s.t + 0.25 * (k.after - k.before) - m.push_since
-    for i in range(2):
+    for i in range(m.axes):
         a = m.axis[i]
         k.axis[i].uh = a.push + t * a.push_rate
     if m.muscle:

@@ -12,9 +12,10 @@ from collections import deque
 from dataclasses import replace
 from typing import Any
 
+from ..ports.commands import Numbers
 from ..ports.coupled import DeviceHand
 from ..ports.device import device_scenario
-from ..ports.driven_arm import LARGEST_FORCE, Device, Drive, DrivenArm, Sensed
+from ..ports.driven_arm import LARGEST_FORCE, Device, Drive, Sensed, driven_arm
 from ..ports.service import Service
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
@@ -56,7 +57,7 @@ class ServedSession(Session):
         refuse_other(scenario, integrator="fast")
         driven, _ = device_scenario(session_scenario(scenario, self.stiffness), None, clay=True)
         self.undriven = session_scenario(driven, 1.0)
-        self.arm = DrivenArm(self.undriven, self._largest_force)
+        self.arm = driven_arm(self.undriven, self._largest_force)
         return replace(self.undriven, controller=self.arm.controller)
 
     def verdict(self) -> LiveVerdict:
@@ -100,11 +101,11 @@ class LiveDevice(Device):
         return self._session.arm.sensed
 
     @property
-    def force(self) -> tuple[float, float]:
+    def force(self) -> Numbers:
         return self._session.arm.force
 
     @property
-    def torques(self) -> tuple[float, float]:
+    def torques(self) -> Numbers:
         return self._session.arm.asked.torques
 
     @property
@@ -116,7 +117,7 @@ class LiveDevice(Device):
     def scenario(self) -> Scenario:
         return self._session.undriven
 
-    def drive(self, drive: Drive) -> tuple[float, float]:
+    def drive(self, drive: Drive) -> Numbers:
         return self._session.arm.drive(drive)
 
     def advance(self, samples: int | None = None) -> None:

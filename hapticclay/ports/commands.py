@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 Vector = tuple[float, float, float]
 Pair = tuple[float, float]
+Numbers = tuple[float, ...]  # along the axes of a handle, or by joint
 
 NOTHING: Vector = (0.0, 0.0, 0.0)
 AXES = ("x", "y", "z")
@@ -38,7 +39,7 @@ class Command:
 
     force: Vector | None = None  # [N] on the cursor, along x, y, z of the device
     target: Vector | None = None  # [m] at which to hold the cursor
-    torques: Pair | None = None  # [N.m] on shoulder and elbow
+    torques: Numbers | None = None  # [N.m] on the joints, [N] on those that slide
 
     @property
     def mode(self) -> str:
@@ -51,6 +52,15 @@ class Command:
 
 
 IDLE = Command()
+
+
+class Joints(NamedTuple):
+    """The joints of a device."""
+
+    names: tuple[str, ...]
+    positions: Numbers  # [rad], [m] of those that slide
+    rates: Numbers  # [rad/s], [m/s]
+    torques: Numbers  # [N.m], [N] that clients apply to them
 
 
 def finite(value: Any) -> float | None:

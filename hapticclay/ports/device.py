@@ -10,17 +10,22 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, part
+from ..arms.joint_law import JointPD
+from ..arms.mjcf_arm import MjcfArm
 from ..columns.log import columns_of
 from ..errors import Bound, ParameterError
 from ..model.constants import TS
+from ..model.operator import NO_HAND, Operator
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from ..simulation.stepwise import Simulation
-from .commands import Pair
-from .driven_arm import LARGEST_FORCE, Device, Drive, DrivenArm, Sensed
+from .commands import Numbers
+from .driven_arm import LARGEST_FORCE, Device, Drive, Sensed, driven_arm
 
 LONGEST = 1e5  # [s] longest session
 FASTEST = 100.0  # [m/s] of a hand
+HOLD = Operator(0.25, 5.0, 200.0)  # a hand that holds the handle of an arm from a file at its pose
+LONGEST_STEP = 1e-3  # [s] of such an arm, where a scenario does not say
 
 
 @part("hand.")
@@ -29,8 +34,8 @@ class Trajectory:
 
     Attributes:
         t: times [s], ascending, -1e9 to 1e9, shape (n,).
-        points: positions of the handle [m], -10 to 10, no further apart than a hand of 100 m/s
-            moves meanwhile, shape (n, 2).
+        points: positions of the handle from its start [m], -10 to 10, no further apart than a hand
+            of 100 m/s moves meanwhile, shape (n, 2), or (n, 3) for an arm that moves along z too.
     """
 
     t: Annotated[tuple[float, ...], Bound(-1e9, 1e9, "s")]
@@ -39,8 +44,9 @@ class Trajectory:
     def __post_init__(self):
         if not self.t or len(self.t) != len(self.points):
             raise ParameterError("hand.t", self.t, "must have a place for each time")
-        if any(len(p) != 2 for p in self.points):
-            raise ParameterError("hand.points", self.points, "must have x and y each")
+        if {len(p) for p in self.points} not in ({2}, {3}):
+            bound = "must have x and y each, or x, y and z"
+            raise ParameterError("hand.points", self.points, bound)
         if any(b <= a for a, b in zip(self.t[:-1], self.t[1:], strict=True)):
             raise ParameterError("hand.t", self.t, "must ascend")
         for i in range(1, len(self.t)):
@@ -49,7 +55,7 @@ class Trajectory:
                 bound = f"must be within {FASTEST:g} m/s; the point before is {way:.3g} m away"
                 raise ParameterError(f"hand.points[{i}]", self.points[i], f"{bound}, {span:.3g} s")
 
-    def at(self, t: float) -> tuple[Pair, Pair]:
+    def at(self, t: float) -> tuple[Numbers, Numbers]:
         """Position [m] and velocity [m/s] at a time.
 
         Args:
@@ -57,16 +63,15 @@ class Trajectory:
         """
         i = int(np.searchsorted(self.t, t, side="right"))
         if i in (0, len(self.t)):
-            x, y = self.points[min(i, len(self.t) - 1)]
-            return (x, y), (0.0, 0.0)
-        (x0, y0), (x1, y1) = self.points[i - 1], self.points[i]
-        span = self.t[i] - self.t[i - 1]
-        vx, vy = (x1 - x0) / span, (y1 - y0) / span
-        after = t - self.t[i - 1]
-        return (x0 + vx * after, y0 + vy * after), (vx, vy)
+            point = self.points[min(i, len(self.t) - 1)]
+            return point, (0.0,) * len(point)
+        before, then = self.points[i - 1], self.points[i]
+        span, after = self.t[i] - self.t[i - 1], t - self.t[i - 1]
+        rate = tuple((b - a) / span for a, b in zip(before, then, strict=True))
+        return tuple(a + v * after for a, v in zip(before, rate, strict=True)), rate
 
     @classmethod
-    def to(cls, target: Pair) -> Trajectory:
+    def to(cls, target: Numbers) -> Trajectory:
         """A hand with a constant target.
 
         Args:
@@ -77,7 +82,7 @@ class Trajectory:
     @classmethod
     @checked
     def of_file(cls, path: str | os.PathLike[str]) -> Trajectory:
-        """Reads a trajectory from a log with the columns t [s], x and y [m].
+        """Reads a trajectory from a log with the columns t [s], x and y, and perhaps z [m].
 
         A unit in the name of a column, as in "x [mm]", or in a row below the names is converted.
 
@@ -88,9 +93,10 @@ class Trajectory:
             ParameterError: the file cannot be read, has other columns, a cell that is no number, or
                 a unit that does not fit.
         """
-        found = columns_of("hand", path, {"t": ("s",), "x": ("m",), "y": ("m",)})
-        t, x, y = (column.tolist() for column in found.values())
-        return cls(tuple(t), tuple(zip(x, y, strict=True)))
+        names = {"t": ("s",), "x": ("m",), "y": ("m",)}
+        found = columns_of("hand", path, names, {"z": ("m",)})
+        t, *points = (column.tolist() for column in found.values())
+        return cls(tuple(t), tuple(zip(*points, strict=True)))
 
 
 class SimulatedDevice(Device):
@@ -114,7 +120,7 @@ class SimulatedDevice(Device):
         """Makes the device, at rest."""
         self._scenario, self._samples = device_scenario(scenario, period, clay)
         self._hand = None if hand is None else _follower(hand, self.scenario)
-        self._arm = DrivenArm(self.scenario, largest_force)
+        self._arm = driven_arm(self.scenario, largest_force)
         driven = replace(self.scenario, controller=self._arm.controller)
         self._simulation = Simulation(driven)
 
@@ -131,11 +137,11 @@ class SimulatedDevice(Device):
         return self._arm.sensed
 
     @property
-    def force(self) -> Pair:
+    def force(self) -> Numbers:
         return self._arm.force
 
     @property
-    def torques(self) -> Pair:
+    def torques(self) -> Numbers:
         return self._arm.asked.torques
 
     @property
@@ -143,7 +149,7 @@ class SimulatedDevice(Device):
         outcome = self._simulation.outcome
         return "" if outcome is None else str(outcome)
 
-    def drive(self, drive: Drive) -> Pair:
+    def drive(self, drive: Drive) -> Numbers:
         return self._arm.drive(drive)
 
     def advance(self, samples: int | None = None) -> None:
@@ -175,7 +181,7 @@ def device_scenario(scenario: Scenario, period: float | None, clay: bool) -> tup
     out = replace(
         scenario,
         control="sampled",
-        controller=None,
+        controller=limp(scenario),
         clay=scenario.clay if clay else None,
         render="physical" if clay and scenario.clay else scenario.render,
         length=None,
@@ -191,16 +197,42 @@ def device_scenario(scenario: Scenario, period: float | None, clay: bool) -> tup
     return out, samples
 
 
+def held_scenario(arm: MjcfArm, Ts: float, hand: Operator | None = None) -> Scenario:
+    """An arm from a file under no law but that of programs, held by a hand at its pose."""
+    none = (0.0,) * len(arm.names)
+    return Scenario(
+        name=arm.name or "arm",
+        arm=arm,
+        operator=hand or HOLD,
+        controller=JointPD(none, none),
+        control="sampled",
+        Ts=Ts,
+        dt=Ts / math.ceil(Ts / LONGEST_STEP - 1e-9),
+    )
+
+
+def limp(scenario: Scenario) -> JointPD | None:
+    """The law of an arm that no program drives: joints without gains, for one from a file."""
+    if scenario.is_closed_form:
+        return None
+    none = (0.0,) * len(scenario.joints)
+    return JointPD(none, none)
+
+
 def _follower(hand: Trajectory, scenario: Scenario) -> Any:
     """Muscle force over time with which a hand follows a trajectory."""
     if any(h is None or not h.spring for h in scenario.operators):
         bound = "needs an operator with a spring on both axes, which pulls the handle along"
         raise ParameterError("hand", hand, bound)
-    hands = [h for h in scenario.operators if h is not None]
+    axes = len(hand.points[0])
+    if axes > len(scenario.axes):
+        bound = f"must have {' and '.join(scenario.axes)} each, along which the handle moves"
+        raise ParameterError("hand.points", hand.points, bound)
+    hands = [scenario.operators[min(i, 1)] or NO_HAND for i in range(axes)]
 
-    def force(t: float) -> Pair:
+    def force(t: float) -> Numbers:
         place, rate = hand.at(t)
-        x, y = (h.spring * p + h.damper * v for h, p, v in zip(hands, place, rate, strict=True))
-        return x, y
+        pairs = zip(hands, place, rate, strict=True)
+        return tuple(h.spring * p + h.damper * v for h, p, v in pairs)
 
     return force

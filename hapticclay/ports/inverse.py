@@ -23,7 +23,7 @@ from .commands import (
     TORQUE,
     VELOCITY,
     Command,
-    Pair,
+    Numbers,
     Quantity,
     Vector,
     by_axis,
@@ -33,7 +33,7 @@ from .commands import (
 )
 
 LARGEST_MESSAGE = 65_536  # bytes
-JOINTS = ("a0", "a1")  # joints of the planar arm
+JOINTS = ("a0", "a1", "a2")
 COMMANDS = {  # keys of a command's body, that of version 3.5 first; its quantity, and their names
     "set_cursor_force": (("vector", "values"), FORCE, AXES),
     "set_cursor_position": (("position", "values"), POSITION, AXES),
@@ -67,7 +67,7 @@ class Torques:
     """Torques that a client commands."""
 
     device_id: str
-    torques: Pair  # [N.m] on the joints a0 and a1
+    torques: Vector  # [N.m] on the joints a0, a1 and a2
 
 
 @dataclass(frozen=True)
@@ -100,9 +100,9 @@ class Cursor:
     velocity: Vector = NOTHING  # [m/s]
     force: Vector = NOTHING  # [N] that the device applies
     mode: str = "idle"  # what a client drives: "force", "position", "torque" or "idle"
-    angles: Pair = (0.0, 0.0)  # [deg] of the joints a0 and a1
-    rates: Pair = (0.0, 0.0)  # [deg/s] of these joints
-    torques: Pair = (0.0, 0.0)  # [N.m] on these joints
+    angles: Vector = NOTHING  # [deg] of the joints a0, a1 and a2, [m] of one that slides
+    rates: Vector = NOTHING  # [deg/s], [m/s]
+    torques: Vector = NOTHING  # [N.m] or [N] on these joints
 
 
 @dataclass(frozen=True)
@@ -212,8 +212,8 @@ def _read_commands(device: str, entry: Mapping[str, Any], found: _Contents) -> N
             if place := _numbers(name, body, found.notices):  # no position, no target
                 found.targets.append(Target(device, (place[0], place[1], place[2])))
         elif name == "set_angular_torques":
-            a0, a1 = _numbers(name, body, found.notices) or (0.0, 0.0)
-            found.torques.append(Torques(device, (a0, a1)))
+            given = _numbers(name, body, found.notices) or NOTHING
+            found.torques.append(Torques(device, first_three(given)))
         elif name not in PROBES:
             found.notices.append(f"command {name} is not simulated")
 
@@ -253,8 +253,7 @@ def message_text(message: Message) -> str:
 def _body(command: Force | Target | Torques) -> tuple[str, dict[str, Any]]:
     """Name and body of a command."""
     if isinstance(command, Torques):
-        joints = dict(zip(JOINTS, command.torques, strict=True))
-        return "set_angular_torques", {"torques": joints | {"a2": 0.0}}
+        return "set_angular_torques", {"torques": _joints(command.torques)}
     name = "set_cursor_force" if isinstance(command, Force) else "set_cursor_position"
     return name, {"values": by_axis(command.vector)}
 
@@ -297,8 +296,14 @@ def frame_text(frame: Frame) -> str:
     return json.dumps(frame_data(frame), allow_nan=False)
 
 
-def _joints(values: Pair = (0.0, 0.0)) -> dict[str, float]:
-    return {"a0": values[0], "a1": values[1], "a2": 0.0}
+def _joints(values: Vector) -> dict[str, float]:
+    return dict(zip(JOINTS, values, strict=True))
+
+
+def first_three(values: Numbers) -> Vector:
+    """Numbers of the three joints that a message has: those that an arm lacks are 0."""
+    a0, a1, a2 = (*values, *NOTHING)[:3]
+    return a0, a1, a2
 
 
 def _transform() -> dict[str, Any]:
@@ -387,9 +392,9 @@ def read_frame(data: str | bytes) -> Frame | None:
             rate,
             force,
             short_text(state.get("control_mode", state.get("mode"))) or "idle",
-            _pair(state.get("angular_position", {}), ANGLE),
-            _pair(state.get("angular_velocity", {}), RATE),
-            _pair(state.get("current_angular_torques", {}), TORQUE),
+            _of_joints(state.get("angular_position", {}), ANGLE),
+            _of_joints(state.get("angular_velocity", {}), RATE),
+            _of_joints(state.get("current_angular_torques", {}), TORQUE),
         )
         return Frame(
             name,
@@ -408,6 +413,6 @@ def _vector(given: Mapping[str, Any], quantity: Quantity) -> Vector | None:
     return None if values is None else (values[0], values[1], values[2])
 
 
-def _pair(given: Mapping[str, Any], quantity: Quantity) -> Pair:
+def _of_joints(given: Mapping[str, Any], quantity: Quantity) -> Vector:
     values, _ = read_numbers(given, JOINTS, quantity)
-    return (values[0], values[1]) if values else (0.0, 0.0)  # no loop depends on it
+    return first_three(values or ())  # no loop depends on it

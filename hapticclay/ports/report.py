@@ -11,12 +11,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import checked, named
+from ..arms.joint_law import compensated
 from ..display import text_table
 from ..errors import ParameterError
 from ..results import Result, Tables
 from ..scene.scenario import Scenario
 from ..theory.client_loop import (
+    AnyHandle,
     Handle,
+    JointHandle,
     rendered_stiffness_limit,
     rendered_stiffness_limits,
     slowest_period,
@@ -56,8 +59,8 @@ class WallFit(NamedTuple):
     back: int  # age, in answers, of the state that a force was computed from: 1 for the newest
     oldest: int  # the largest age that explains the forces as well
     tried: int  # the largest age that was tried
-    normal: tuple[float, float]  # direction of the force
-    place: tuple[float, float]  # [m] mean position in contact
+    normal: tuple[float, ...]  # direction of the force
+    place: tuple[float, ...]  # [m] mean position in contact
     contact: int  # number of messages used in the fit
 
 
@@ -79,7 +82,7 @@ class LoopReport(Result):
         K_error: standard error of K [N/m].
         explained: share of the squared force that K and B explain.
         contact: number of messages used in the fit.
-        normal: direction of the wall.
+        normal: direction of the wall, along the axes of the handle.
         limit: largest stable stiffness at this period, delay, hand and B [N/m].
         rate_needed: lowest rate at which K and B are stable, as at all higher ones, with as many
             samples of delay [Hz]; inf for none up to a thousand times the present rate, 0 where
@@ -89,6 +92,8 @@ class LoopReport(Result):
         note: why K and B could not be estimated; "" if they were.
         longest_delay: longest delay that explains the forces as well [s]; inf where older answers
             than those that were tried may; NaN without a wall.
+        assumed: what the limit of an arm from a file rests on, and what it leaves out, a sentence
+            each.
     """
 
     drawn_by = "hapticclay.views.loop_plots:loop_plot"
@@ -105,13 +110,14 @@ class LoopReport(Result):
     K_error: float
     explained: float
     contact: int
-    normal: tuple[float, float]
+    normal: tuple[float, ...]
     limit: float
     rate_needed: float
     line_B: tuple[float, ...]
     line_K: tuple[float, ...]
     note: str = ""
     longest_delay: float = math.nan
+    assumed: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -171,7 +177,8 @@ class LoopReport(Result):
         """The report, a quantity a line, and the headline."""
         report = self.tables()["report"]
         values = [value for (value,) in report.values()]
-        return f"{text_table({'loop': list(report), '': values}, form=form)}\n{self.headline()}"
+        table = text_table({"loop": list(report), "": values}, form=form)
+        return "\n".join([table, self.headline(), *self.assumed])
 
     def figures(self) -> dict[str, Any]:
         """The limit line; without a wall there is nothing to show."""
@@ -227,13 +234,17 @@ def loop_report(exchanges: Exchanges, scenario: Scenario) -> LoopReport:
         The report; if the forces do not determine a wall, K and B are NaN and `note` says why.
 
     Raises:
-        ParameterError: there are fewer than two messages.
+        ParameterError: there are fewer than two messages, or they are of an arm of other axes.
     """
     if len(exchanges) < 2:
         raise ParameterError("exchanges", len(exchanges), "must have two messages or more")
+    if exchanges.axes != len(scenario.axes):
+        bound = f"must be of a handle of {len(scenario.axes)} axes, as the scenario's"
+        raise ParameterError("exchanges", exchanges.axes, bound)
     gaps = np.diff(exchanges.received)
     period = float(np.median(np.diff(exchanges.began)))
-    shortened = np.abs(exchanges.asked[:, :2] - exchanges.applied).max(axis=1) > 1e-9
+    asked = exchanges.asked[:, : exchanges.axes]
+    shortened = np.abs(asked - exchanges.applied).max(axis=1) > 1e-9
     fit, note = fit_wall(exchanges)
     mean = float(np.mean(gaps))
     common: dict[str, Any] = {
@@ -246,11 +257,12 @@ def loop_report(exchanges: Exchanges, scenario: Scenario) -> LoopReport:
     if fit is None or period <= 0.0:
         note = why_no_period(exchanges) if period <= 0.0 else note
         absent: dict[str, Any] = dict.fromkeys(UNDETERMINED, math.nan)
-        absent |= dict(contact=0, normal=(1.0, 0.0), line_B=(), line_K=())
+        normal = (1.0, *(0.0,) * (exchanges.axes - 1))
+        absent |= dict(contact=0, normal=normal, line_B=(), line_K=())
         return LoopReport(**common, **absent, note=note)
     delay = lag_behind(exchanges, fit.back)
     longest = math.inf if fit.oldest == fit.tried else lag_behind(exchanges, fit.oldest)
-    handle = Handle.of(scenario, fit.place, fit.normal)
+    handle = handle_of(scenario, fit)
     limit = rendered_stiffness_limit(handle, fit.B, period, delay)
     slow = slowest_period(handle, fit.K, fit.B, delay / period, period)
     line_B, line_K = limit_line(handle, fit.B, period, delay)
@@ -268,7 +280,27 @@ def loop_report(exchanges: Exchanges, scenario: Scenario) -> LoopReport:
         rate_needed=1.0 / slow if slow else math.inf,
         line_B=line_B,
         line_K=line_K,
+        assumed=assumed_of(scenario),
     )
+
+
+def handle_of(scenario: Scenario, fit: WallFit) -> AnyHandle:
+    """The handle as the wall of a client meets it; that of an arm from a file at its pose."""
+    if not scenario.is_closed_form:
+        return JointHandle.of(scenario, fit.normal)
+    (x, y), (nx, ny) = fit.place, fit.normal
+    return Handle.of(scenario, (x, y), (nx, ny))
+
+
+def assumed_of(scenario: Scenario) -> tuple[str, ...]:
+    """What the limit of an arm from a file rests on."""
+    if scenario.is_closed_form:
+        return ()
+    from ..theory.joint_gains import IGNORED  # imported only for such an arm
+
+    held = "held all the time" if compensated(scenario.arm, None) else "acts"
+    about = "limit of small motions about the arm's pose"
+    return (about, *scenario.file_arm.notes, f"weight: {held}", IGNORED)
 
 
 def lag_behind(exchanges: Exchanges, back: int) -> float:
@@ -292,11 +324,10 @@ def why_no_period(exchanges: Exchanges) -> str:
 
 
 def limit_line(
-    handle: Handle, B: float, Ts: float, delay: float
+    handle: AnyHandle, B: float, Ts: float, delay: float
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Largest stable stiffness over damping, from zero damping to where none is stable."""
-    mass = float(1.0 / (handle.normal @ np.linalg.inv(handle.inertia) @ handle.normal))
-    top = max(2.5 * mass / (Ts + delay), 1.2 * B)
+    top = max(2.5 * handle.mass / (Ts + delay), 1.2 * B)
     rising = np.geomspace(1e-3 * top, 0.8 * top, LINE)
     grid = [0.0, *rising.tolist(), *np.linspace(0.82 * top, top, LINE // 2).tolist()]
     return tuple(grid), rendered_stiffness_limits(handle, grid, Ts, delay)
@@ -304,8 +335,8 @@ def limit_line(
 
 def fit_wall(exchanges: Exchanges) -> tuple[WallFit | None, str]:
     """The wall that explains a client's forces, or why there is none."""
-    force = exchanges.asked[:, :2]
-    size = np.hypot(*force.T)
+    force = exchanges.asked[:, : exchanges.axes]
+    size = np.hypot(*force.T) if exchanges.axes == 2 else np.linalg.norm(force, axis=1)
     tried = max(FIRST, min(LATEST, len(force) // LOOKBACK))
     contact = np.isfinite(size) & (size > FORCE_LEAST)
     contact[: FIRST + 1] = False  # its state may have come with the inventory
@@ -364,9 +395,7 @@ def _fitted(
     total = float(((y - y.mean()) ** 2).sum())
     is_constant = total < 1e-12 * float(y @ y)  # a constant force does not show a wall
     explained = 0.0 if is_constant else 1.0 - float(residual @ residual) / total
-    mean = place.mean(axis=0)
-    direction = float(normal[0]), float(normal[1])
-    centre = float(mean[0]), float(mean[1])
+    direction, centre = tuple(normal.tolist()), tuple(place.mean(axis=0).tolist())
     return WallFit(
         float(K), float(B), error, explained, back, back, back, direction, centre, len(at)
     )

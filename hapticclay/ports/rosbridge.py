@@ -19,7 +19,9 @@ from .commands import (
     LONGEST_TEXT,
     NOTHING,
     POSITION,
+    TORQUE,
     Command,
+    Joints,
     Vector,
     by_axis,
     finite,
@@ -46,11 +48,12 @@ TAKEN = {
     "spatial/servo_cf": "geometry_msgs/WrenchStamped",
     "servo_cf": "geometry_msgs/WrenchStamped",
     "servo_cp": "geometry_msgs/PoseStamped",
+    "servo_jf": "sensor_msgs/JointState",
     "phantom/force_feedback": "omni_msgs/OmniFeedback",
 }
 PLACES = {"geometry_msgs/WrenchStamped": ("wrench", "force")}  # keys of the vector in a message
 PLACES |= {"geometry_msgs/PoseStamped": ("pose", "position"), "omni_msgs/OmniFeedback": ("force",)}
-JOINTS = ("shoulder", "elbow")
+MOST_JOINTS = 64  # of a message
 OPTIONAL = ("type", "compression")  # anything but a text counts as none
 LONGEST_THROTTLE = 1e9  # [ms]
 
@@ -134,6 +137,8 @@ def kind_of(topic: str, kinds: Mapping[str, str]) -> str:
 
 def command_of(kind: str, msg: Mapping[str, Any]) -> tuple[Command, str]:
     """The command in a message on a command topic."""
+    if kind == "servo_jf":
+        return _joint_command(msg.get("effort"))
     part: Any = msg
     for name in PLACES[TAKEN[kind]]:
         part = part.get(name) if isinstance(part, Mapping) else None
@@ -143,6 +148,15 @@ def command_of(kind: str, msg: Mapping[str, Any]) -> tuple[Command, str]:
     if given is None:
         return _command(kind, None), f"{kind}: {dropped}"
     return _command(kind, (given[0], given[1], given[2])), ""
+
+
+def _joint_command(given: Any) -> tuple[Command, str]:
+    """The torques of all joints."""
+    if not isinstance(given, list) or len(given) > MOST_JOINTS:
+        return Command(), f"servo_jf without an effort of {MOST_JOINTS} joints at most"
+    places = tuple(map(str, range(len(given))))
+    torques, dropped = read_numbers(dict(zip(places, given, strict=True)), places, TORQUE)
+    return Command(torques=torques), dropped and f"servo_jf: {dropped}"
 
 
 def _command(kind: str, vector: Vector | None) -> Command:
@@ -176,7 +190,9 @@ def ros_time(t: float) -> dict[str, int]:
     return {"secs": whole, "nsecs": parts, "sec": whole, "nanosec": parts}
 
 
-def ros_message(kind: str, cursor: Cursor, pressed: frozenset[str], t: float) -> dict[str, Any]:
+def ros_message(
+    kind: str, cursor: Cursor, joints: Joints, pressed: frozenset[str], t: float
+) -> dict[str, Any]:
     """The message of a published topic."""
     stamped: dict[str, Any] = {"header": {"stamp": ros_time(t), "frame_id": FRAME}}
     if kind == "phantom/button":
@@ -184,7 +200,7 @@ def ros_message(kind: str, cursor: Cursor, pressed: frozenset[str], t: float) ->
     if kind == "operating_state":
         return stamped | {"state": "ENABLED", "is_homed": True, "is_busy": False}
     if kind in ("measured_js", "phantom/joint_states"):
-        return stamped | _joint_state(cursor)
+        return stamped | _joint_state(joints)
     if kind == "measured_cv":
         twist = {"linear": by_axis(cursor.velocity), "angular": by_axis(NOTHING)}
         return stamped | {"twist": twist}
@@ -197,12 +213,12 @@ def _pose(place: Vector) -> dict[str, Any]:
     return {"position": by_axis(place), "orientation": dict(IDENTITY)}
 
 
-def _joint_state(cursor: Cursor) -> dict[str, Any]:
+def _joint_state(joints: Joints) -> dict[str, Any]:
     return {
-        "name": list(JOINTS),
-        "position": [math.radians(x) for x in cursor.angles],
-        "velocity": [math.radians(x) for x in cursor.rates],
-        "effort": list(cursor.torques),
+        "name": list(joints.names),
+        "position": list(joints.positions),
+        "velocity": list(joints.rates),
+        "effort": list(joints.torques),
     }
 
 

@@ -81,7 +81,7 @@ class RosbridgeProtocol:
     def due(self, service: Host, session: Session) -> list[str]:
         """Subscribed topics with a state newer than the last one sent."""
         kept, t, out = session.memory, service.device.sensed.t, []
-        cursor, pressed = service.cursor(), service.pressed
+        cursor, joints, pressed = service.cursor(), service.joints, service.pressed
         epoch = self._epoch if service.clock == "wall" else 0.0
         for topic, kind in kept.topics.items():
             if kind == "phantom/button":
@@ -93,7 +93,7 @@ class RosbridgeProtocol:
             if before is not None and 0.0 <= t - before < max(wait, 1e-9):
                 continue
             kept.sent[topic] = t
-            msg = rosbridge.ros_message(kind, cursor, pressed, epoch + t)
+            msg = rosbridge.ros_message(kind, cursor, joints, pressed, epoch + t)
             out.append(rosbridge.publish_text(topic, msg))
         return out
 

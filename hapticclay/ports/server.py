@@ -228,7 +228,7 @@ def serve(
             record = server.record()
 
     Args:
-        scenario: arm, hand, hardware and step are used; compensator and servo are not.
+        scenario: arm, hand, hardware and step are used; compensator, servo and controller are not.
         host: address to listen on; addresses other than this machine's need a token, part of `url`.
         port: port to listen on; 0 for a free one.
         clock: "tick": each message of the first client advances the device by a period, so that a

@@ -13,14 +13,17 @@ import math
 import threading
 import time
 from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from ..display import one_line
-from .commands import IDLE, NOTHING, Command, Vector
+from ..scene.joint_numbers import turning
+from .commands import AXES, IDLE, NOTHING, Command, Joints, Numbers, Vector
 from .driven_arm import LIMP, Device, Drive
 from .exchanges import Exchange, ExchangeLog
-from .inverse import Cursor
-from .planes import normal_component, to_plane, to_space
+from .inverse import Cursor, first_three
+from .planes import along, cursor_axes, moving_axes, to_cursor
 from .sessions import PLAIN, Inverse3, Session, WireProtocol
 
 REST: Vector = (0.08, -0.15, 0.14)  # [m] cursor of an Inverse3 at rest: handle at p = 0
@@ -47,7 +50,10 @@ class Service:
         """Makes the service; `start` starts the wall clock."""
         self.device, self.clock = device, clock
         self.notices = Counter[str]()  # what was dropped from messages, and how often
-        self.inverse3, self._plane = inverse3, inverse3.plane
+        self.inverse3 = inverse3
+        self._axes = cursor_axes(device.scenario, inverse3.plane)
+        self._moving = moving_axes(device.scenario, inverse3.plane)
+        self._turns = turning(device.scenario)
         self.protocol = protocol_of(inverse3.protocol)
         self.skipped = self.samples = 0  # control samples by the wall clock: late, and made
         self._sessions: dict[int, Session] = {}
@@ -62,7 +68,8 @@ class Service:
         with self._lock:
             self._count += 1
             number = self._count
-            session = self._sessions[number] = Session(number)
+            log = ExchangeLog(axes=len(self._axes))
+            session = self._sessions[number] = Session(number, log=log)
             self._logs[number] = session.log
             if len(self._logs) > MOST_LOGS:  # bounds memory when many clients come and go
                 gone = [k for k in self._logs if k not in self._sessions]
@@ -88,13 +95,12 @@ class Service:
 
     def apply(self, session: Session, command: Command) -> None:
         """Applies a client's command; with the clock "tick", the first client's advances it."""
-        device = self.device
+        device, command = self.device, self._possible(command)
         session.command, session.heard = command, time.monotonic()
         force = command.force or NOTHING
-        x, y = to_plane(force, self._plane)
-        z = normal_component(force, self._plane)
-        if z:
-            self.count("force across the plane of the arm is recorded and cannot act")
+        asked = along(force, self._axes)
+        if len(asked) < len(force):
+            asked = (*asked, force[3 - sum(self._axes)])
         began = device.t
         applied = device.drive(self._drive())
         if self.clock == "tick" and session.number == min(self._sessions):
@@ -104,8 +110,28 @@ class Service:
                     s.command = IDLE
         seen = device.sensed
         place, rate = seen.position, seen.velocity
-        row = Exchange(session.heard, began, seen.t, place, rate, (x, y, z), applied)
-        session.log.add(row)
+        session.log.add(Exchange(session.heard, began, seen.t, place, rate, asked, applied))
+
+    def _possible(self, command: Command) -> Command:
+        """A command with a torque for each joint, if it has any; tells what cannot act."""
+        force, torques, n = command.force, command.torques, len(self.device.scenario.joints)
+        for i, axis in enumerate(AXES):
+            if force and force[i] and i not in self._moving:
+                where = "across the plane of the arm"
+                if not self.device.scenario.is_closed_form:
+                    where = f"along {axis}, where the handle does not move,"
+                self.count(f"force {where} is recorded and cannot act")
+        if torques is None:
+            return command
+        if not self.device.takes_torques:
+            self.count("joint torques cannot act: the motors are those of the pair")
+            return replace(command, torques=None)
+        if len(torques) < n:
+            self.count(f"{len(torques)} joint torques were given: this arm has {n} joints")
+            return replace(command, torques=None)
+        if any(torques[n:]):
+            self.count(f"torques beyond the arm's {n} joints cannot act")
+        return replace(command, torques=torques[:n])
 
     @property
     def logs(self) -> list[ExchangeLog]:
@@ -141,31 +167,33 @@ class Service:
             for s in self._sessions.values()
             if self.clock == "tick" or now - s.heard < PATIENCE
         ]
-        forces = [to_plane(c.force, self._plane) for c in fresh if c.force is not None]
+        forces = [along(c.force, self._axes) for c in fresh if c.force is not None]
         torques = [c.torques for c in fresh if c.torques is not None]
-        targets = [to_plane(c.target, self._plane) for c in fresh if c.target is not None]
+        targets = [along(c.target, self._axes) for c in fresh if c.target is not None]
         target = None
         if targets:  # the newest client's
-            (x, y), (x0, y0) = targets[-1], to_plane(REST, self._plane)
-            target = x - x0, y - y0
-        return Drive(
-            (sum(f[0] for f in forces), sum(f[1] for f in forces)),
-            target,
-            (sum(x[0] for x in torques), sum(x[1] for x in torques)),
-        )
+            rest = along(REST, self._axes)
+            target = tuple(x - x0 for x, x0 in zip(targets[-1], rest, strict=True))
+        return Drive(_sums(forces), target, _sums(torques))
 
     def cursor(self, mode: str = "idle") -> Cursor:
         """The newest measurement, in the frame of the device."""
-        seen, device, plane = self.device.sensed, self.device, self._plane
+        seen, device, axes = self.device.sensed, self.device, self._axes
         return Cursor(
-            to_space(seen.position, plane, REST),
-            to_space(seen.velocity, plane),
-            to_space(device.force, plane),
+            to_cursor(seen.position, axes, REST),
+            to_cursor(seen.velocity, axes),
+            to_cursor(device.force, axes),
             mode,
-            (math.degrees(seen.angles[0]), math.degrees(seen.angles[1])),
-            (math.degrees(seen.rates[0]), math.degrees(seen.rates[1])),
-            device.torques,
+            _in_degrees(seen.angles, self._turns),
+            _in_degrees(seen.rates, self._turns),
+            first_three(device.torques),
         )
+
+    @property
+    def joints(self) -> Joints:
+        """The joints, as newly measured."""
+        seen = self.device.sensed
+        return Joints(self.device.scenario.joints, seen.angles, seen.rates, self.device.torques)
 
     @property
     def pressed(self) -> frozenset[str]:
@@ -207,6 +235,16 @@ class Service:
                     self.device.advance(due)
                     self.samples += due
             time.sleep(0.0 if due else 0.25 * sample)
+
+
+def _sums(rows: Sequence[Numbers]) -> Numbers:
+    return tuple(map(sum, zip(*rows, strict=True)))
+
+
+def _in_degrees(values: Numbers, turns: Sequence[bool]) -> Vector:
+    """Positions or rates of the first three joints; those that slide as they are."""
+    pairs = zip(values, turns, strict=True)
+    return first_three(tuple(math.degrees(x) if turning else x for x, turning in pairs))
 
 
 def protocol_of(protocol: str) -> WireProtocol:

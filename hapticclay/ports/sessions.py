@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Protocol
 from ..arguments import part
 from ..errors import Bound, ParameterError
 from .buttons import ButtonScript
-from .commands import IDLE, Command
+from .commands import IDLE, Command, Joints
 from .driven_arm import LARGEST_FORCE, Device
 from .exchanges import ExchangeLog
 from .guard import origins_of
@@ -27,7 +27,8 @@ class Inverse3:
     Attributes:
         device_id: id of the Inverse3, 1 to 16 hexadecimal digits.
         grip_id: id of the grip, 1 to 16 hexadecimal digits.
-        plane: "xy" or "xz", plane of the cursor in which the arm moves.
+        plane: "xy" or "xz", plane of the cursor in which the two-link arm moves; an arm from a file
+            moves along the axes of its world.
         buttons: pressed buttons of the grip over time.
         largest_force: longer forces are shortened to this length [N], > 0, at most 1e3.
         protocol: "inverse" for the Haply Inverse service, or "rosbridge" for ROS topics as JSON.
@@ -80,6 +81,11 @@ class Host(Protocol):
 
     def cursor(self, mode: str = "idle") -> Cursor:
         """The newest measurement, in the frame of the device."""
+        ...
+
+    @property
+    def joints(self) -> Joints:
+        """The joints, as newly measured."""
         ...
 
     def apply(self, session: Session, command: Command) -> None:

@@ -13,10 +13,15 @@ def torque_limits(s: Scenario) -> np.ndarray:
     return np.array(s.torque_limit if s.is_closed_form else s.file_arm.torque_limit)
 
 
+def turning(s: Scenario) -> list[bool]:
+    """Whether each joint turns; others slide."""
+    return [True, True] if s.is_closed_form else s.file_arm.mechanism.turning
+
+
 def references(s: Scenario) -> np.ndarray | None:
     """Joint positions to which the law pulls [rad], shape (n,); None where no law does."""
     law = s.controller
-    if not isinstance(law, JointPD):
+    if not isinstance(law, JointPD) or not any(law.Kp):
         return None
     if law.reference is not None:
         return np.array(law.reference)

@@ -15,7 +15,7 @@ from ..arguments import checked, named
 from ..arms.joint_law import JointPD, checked_law
 from ..arms.mjcf_arm import MjcfArm
 from ..display import html_table, one_line
-from ..errors import Bound, ParameterError, choice, number, quantity
+from ..errors import Bound, ParameterError, choice, number, numbers_of, quantity
 from ..fields import JOINTS, check_fields, dotted_names, merged_values, no_field, values_of
 from ..model import samples, shapes  # noqa: F401  # so that files and options know every Signal
 from ..model.arm import PAPER, Arm
@@ -41,6 +41,7 @@ FOLD_MARGIN = math.radians(1.001)  # of the elbow, likewise: a run ends at 1 deg
 
 # Types of the fields that experiments share with scenarios.
 Force = Annotated[tuple[float, float], Bound(-1e6, 1e6, "N")]
+SpaceForce = Annotated[tuple[float, float, float], Bound(-1e6, 1e6, "N", names=("x", "y", "z"))]
 STEP_LEAST = 1e-6  # [s]
 StepLength = Annotated[float, Bound(STEP_LEAST, 0.02, "s")]
 Duration = Annotated[float, Bound(0.0, 1e5, "s", above=True)]
@@ -70,10 +71,10 @@ class Scenario:
         clay: the virtual clay; None for free space.
         gain: compensator gain K on each axis, 0 to 1e6 [1/kg] for the printed compensator, whose
             virtual mass is 1/K; 0 turns the compensator off.
-        force: constant part of the operator's muscle force uh on each axis [N]; none for an arm
-            from a file where it is not given.
+        force: constant part of the operator's muscle force uh on each axis [N], of two or all axes
+            of the handle; none for an arm from a file where it is not given.
         operator: impedance Th of the operator's arm, of both axes or a pair (x, y); None for a
-            pure force (Th = 0).
+            pure force (Th = 0). That of y acts along z, too, where an arm from a file moves there.
         inertia_shaping: whether the servo shapes the handle's inertia, so that Sh holds at every
             pose.
         dt: physics and control step [s], 1e-6 to 0.02; where it is not given, 0.36 ms, or the
@@ -110,7 +111,7 @@ class Scenario:
     name: str = "free"
     clay: Clay | None = None
     gain: Annotated[tuple[float, float], Bound(0.0, 1e6, "1/kg")] = GAIN
-    force: Force = FORCE
+    force: Annotated[SpaceForce | tuple[float, float], Bound(-1e6, 1e6, "N")] = FORCE
     operator: Operator | None | tuple[Operator | None, Operator | None] = None
     inertia_shaping: bool = False
     dt: StepLength = TS
@@ -158,6 +159,7 @@ class Scenario:
         if not self.is_closed_form:
             _check_arm(self)
             return
+        _check_force(self)
         self._check_rotated_axes()
         self._check_soft_clay()
         self._check_reach("start", self.start)
@@ -304,13 +306,14 @@ class Scenario:
         return any(x is not None and x.varies for x in (self.muscle, self.command))
 
     @property
-    def steady_force(self) -> tuple[float, float]:
-        """The constant part of the muscle force, (x, y) [N]: `force`, and a constant `muscle`."""
-        (x, y), muscle = self.force, self.muscle
+    def steady_force(self) -> tuple[float, ...]:
+        """The constant part of the muscle force along all axes [N]: `force`, constant `muscle`."""
+        (x, y, *more), muscle = self.force, self.muscle
         if muscle is not None and not muscle.varies:
-            more = muscle(0.0)
-            x, y = x + more[0], y + more[1]
-        return float(x), float(y)
+            mx, my = muscle(0.0)
+            x, y = x + mx, y + my
+        more += [0.0] * (len(self.axes) - 2 - len(more))
+        return float(x), float(y), *more
 
     def _check_servo(self) -> None:
         """Refuses a servo too fast for the step; the servo alone would diverge."""
@@ -404,16 +407,31 @@ def _suit_arm(s: Scenario) -> None:
             object.__setattr__(s, name, value)
 
 
+def _check_force(s: Scenario) -> None:
+    """Refuses a force along an axis that the handle does not have."""
+    if len(s.force) > len(s.axes):
+        numbers_of("force", s.force, s.axes)
+
+
+def _check_pose(arm: MjcfArm) -> None:
+    """Refuses a pose beyond the range of a joint, where a run would end at once."""
+    for name, q, (low, high) in zip(arm.names, arm.q, arm.ranges, strict=True):
+        if not low <= q <= high:
+            bound = f"must be within the range of the joint, {low:.4g} to {high:.4g}"
+            raise ParameterError(f"arm.pose.{name}", float(q), bound)
+
+
 def _check_arm(s: Scenario) -> None:
     """Refuses what an arm from a file cannot have, beyond the table of support."""
     arm, law, io = s.arm, s.controller, s.hardware
     assert isinstance(arm, MjcfArm)
     arm.check_handle()
+    _check_force(s)
+    _check_pose(arm)
     with_arm = "with an arm from a file"
     given = {
         "controller": (law is None, f"must be given {with_arm}: a JointPD, or your own"),
         "command": (s.command is not None, f"must be None {with_arm}, which has no compensator"),
-        "operator": (s.operators[0] != s.operators[1], f"must be one for all axes {with_arm}"),
     }
     for name, default in (("start", (0.0, 0.0)), ("velocity", (0.0, 0.0)), ("origin", ORIGIN)):
         bound = f"must be left out {with_arm}, which starts at rest at its pose"

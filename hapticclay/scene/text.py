@@ -52,8 +52,8 @@ def clay_text(clay: Clay | None) -> str:
     return "none" if clay is None else ", ".join(x.text() for x in clay.words)
 
 
-def _pair(x: tuple[float, float]) -> str:
-    return f"({x[0]:.4g}, {x[1]:.4g})"
+def _pair(x: tuple[float, ...]) -> str:
+    return f"({', '.join(f'{part:.4g}' for part in x)})"
 
 
 def _hand(th: Operator | None) -> str:

@@ -11,8 +11,8 @@ import numpy as np
 from ..arms.joint_law import JointPD, compensated
 from ..model.operator import NO_HAND
 from ..scene.scenario import Scenario
+from ..theory.client_loop import held_arm
 from ..theory.joint_gains import joint_loop
-from ..theory.joint_walls import held_arm
 from .monitor import LIMITS, OFTEN, STILL, WHILE, Outcome, at_rest
 
 FASTEST = 200.0  # [rad/s or m/s] beyond any joint of an arm
@@ -177,8 +177,8 @@ class JointMonitor:
 def is_stable_at_start(scenario: Scenario) -> bool:
     """Whether the loop of the joints is stable at the arm's pose; so is one that is not known."""
     arm = scenario.file_arm
-    law, hand = scenario.controller, scenario.operators[0]
-    if not isinstance(law, JointPD):
+    law, (hand, other) = scenario.controller, scenario.operators
+    if not isinstance(law, JointPD) or hand != other:
         return True
     linear = held_arm(arm.linear(), hand or NO_HAND)
     delay = scenario.hardware.delay if scenario.hardware else 0.0

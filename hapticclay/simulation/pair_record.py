@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..arguments import named
 from ..results import Result, Tables
+from ..scene.pair import Pair
 
 RELATIVE = 1e-9  # growth of an amplitude that is none
 
@@ -32,6 +35,9 @@ class PairRecord(Result):
             it falls without bound, they feed the motion.
         port_energy: the same at leader and follower [J], shape (m, 2).
         ended: how the run ended: "" at its time, else what ended it.
+        follows: motion of the follower's joints that the link asks for per the leader's, its scale
+            of motion and map of axes, shape (n, n).
+        pair: what ran, which films show; None in a record that was read from a file.
     """
 
     drawn_by = "hapticclay.views.pair_run_plots:run_plot"
@@ -50,6 +56,8 @@ class PairRecord(Result):
     energy: np.ndarray
     port_energy: np.ndarray
     ended: str
+    follows: np.ndarray
+    pair: Pair | None = None
 
     @property
     def motion(self) -> np.ndarray:
@@ -67,9 +75,27 @@ class PairRecord(Result):
         return bool(last.max() > (1.0 + RELATIVE) * third.max())
 
     @property
+    def off(self) -> np.ndarray:
+        """Motion of the follower less the one that the link asks for [rad], shape (m, n)."""
+        asked = (self.leader - self.leader[0]) @ self.follows.T
+        return self.follower - self.follower[0] - asked
+
+    @property
     def error(self) -> float:
-        """Root mean square of follower less leader, all joints [rad]."""
-        return float(np.sqrt(np.mean((self.follower - self.leader) ** 2)))
+        """Root mean square of `off`, all joints [rad]."""
+        return float(np.sqrt(np.mean(self.off**2)))
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Writes the record with exact values, without its pair, whole or not at all.
+
+        Args:
+            path: the file, .json.
+
+        Raises:
+            ParameterError: the file cannot be written.
+        """
+        bare = self if self.pair is None else replace(self, pair=None)
+        return super(PairRecord, bare).save(path)
 
     def headline(self) -> str:
         """The run in one line."""

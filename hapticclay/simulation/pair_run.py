@@ -19,12 +19,11 @@ from ..scene import pair as pairs
 from ..scene.pair import Pair
 from ..theory.architectures import ARCHITECTURES
 from . import stepwise
-from .pair_arms import run_arm, run_scene
+from .pair_arms import MOST_PARTS, least_parts, run_arm, run_scene
 from .pair_host import Host
 from .pair_record import PairRecord
 from .stepwise import Simulation
 
-MOST_PARTS = 40  # engine steps of a control sample that are tried
 WHOLE = 1e-6  # of an engine step that a delay may be off
 ARRIVE, ACT = 0, 1  # order of events at the same step
 
@@ -32,17 +31,20 @@ ARRIVE, ACT = 0, 1  # order of events at the same step
 class PairRun:
     """Both hosts, events between them, and what is recorded, sample by sample.
 
-    `force` is what a hand presses the leader's handle with from now on [N], besides the muscle of
-    the pair. `ended` says what ended the run, "" while nothing has.
+    `forces` are what presses the handles of leader and follower from now on [N], besides the
+    muscle of the pair; None for nothing. Each `every`-th sample is kept, and the `newest`. `ended`
+    says what ended the run, "" while nothing has.
     """
 
-    def __init__(self, pair: Pair, engine: str = "auto"):
+    def __init__(self, pair: Pair, engine: str = "auto", every: int = 1):
         self.pair, self.architecture = pair, ARCHITECTURES[pair.link.kind]
         self.parts, self.step = parts_of(pair), 0
         self.random = np.random.default_rng(pair.link.seed)
         self.events: list[Any] = []
         self.count, self.energy, self.ended = 0, 0.0, ""
-        self.force: Sequence[float] | None = None
+        self.forces: list[Sequence[float] | None] = [None, None]
+        self.every = every
+        self.newest: list[Any] = []  # row of the last sample
         dt = pair.Ts / self.parts
         more = {"dt": dt, "t_max": (self.samples * self.parts + 2) * dt}
         self.hosts = []
@@ -83,7 +85,7 @@ class PairRun:
 
     def to_end(self) -> PairRecord:
         """Runs for the time of the pair, or until something ends it."""
-        while not self.ended and len(self.rows) < self.samples:
+        while not self.ended and self.step < self.samples * self.parts:
             self.advance()
         return self.record()
 
@@ -91,7 +93,8 @@ class PairRun:
         """What has happened so far."""
         columns = [np.array(x) for x in zip(*self.rows, strict=True)]
         names = pairs.joint_names(self.pair.leader)
-        fields: Any = self.pair.link.kind, names, *columns, self.ended
+        follows = self.pair.link.scale[0] * self.pair.mapping
+        fields: Any = self.pair.link.kind, names, *columns, self.ended, follows, self.pair
         return PairRecord(*fields)
 
     def _sample(self) -> None:
@@ -103,8 +106,12 @@ class PairRun:
             self._send(i, (self.step, message, self.hosts[i].port.into))
         row = [self.t]
         row += [x.q for x in states] + [host.torque for host in self.hosts]
-        self.rows.append([*row, states[0].fh, -states[1].fh, self.energy])
-        self.rows[-1].append([host.port.taken for host in self.hosts])
+        ends = (states[0].fh, self.hosts[1].pressed)
+        forces = [x[host.places.shown] for x, host in zip(ends, self.hosts, strict=True)]
+        ports = [host.port.taken for host in self.hosts]
+        self.newest = [*row, *forces, self.energy, ports]
+        if self.step // self.parts % self.every == 0:
+            self.rows.append(self.newest)
 
     def _send(self, i: int, packet: tuple[int, np.ndarray, float]) -> None:
         """A packet of an end, on its way to the other one."""
@@ -147,8 +154,7 @@ class PairRun:
     def _advanced(self, host: Host) -> float:
         """Makes a step of an arm; the energy that controllers took from it [J]."""
         before = host.run.state.q
-        force = self.force if host.i == 0 else None
-        host.run.step(force, host.torque.tolist())
+        host.run.step(self.forces[host.i], host.torque.tolist())
         taken = host.taken(before, host.run.state.q, host.weight)
         host.port.taken += taken
         return taken
@@ -171,10 +177,10 @@ def parts_of(pair: Pair) -> int:
     """Engine steps of a control sample: the fewest of which all delays are whole multiples.
 
     Raises:
-        ParameterError: there are none up to 40.
+        ParameterError: there are none up to 40, or clay is too stiff.
     """
-    jitter = pair.link.jitter > 0.0
-    for parts in range(8 if jitter else 2, MOST_PARTS + 1):
+    least = max(8 if pair.link.jitter > 0.0 else 2, least_parts(pair))
+    for parts in range(least, MOST_PARTS + 1):
         late = [x * parts / pair.Ts for x in (*pair.link.delays, pair.delay)]
         if all(abs(x - round(x)) <= WHOLE * max(1.0, x) for x in late):
             return parts

@@ -360,10 +360,10 @@ class Run:
         self.row.change(scenario, self._controller)
         self._ahead = None
 
-    def change_force(self, force: tuple[float, float]) -> None:
+    def change_force(self, force: tuple[float, ...]) -> None:
         """Continues under another constant muscle force."""
         self.scenario = with_checked(self.scenario, force=force)
-        self.push_evenly((0.0, *self.scenario.steady_force, 0.0, 0.0))
+        self.push_steadily()
 
     def change_gain(self, gain: tuple[float, float]) -> None:
         """Continues with another gain."""
@@ -375,6 +375,13 @@ class Run:
         for a, K in zip(self.row.m.axis[:2], gain, strict=True):
             a.K = float(K)
         self._ahead = None
+
+    def push_steadily(self) -> None:
+        """Continues under the constant muscle force of the scenario."""
+        x, y, *more = self.scenario.steady_force
+        self.push_evenly((0.0, x, y, 0.0, 0.0))
+        for z in more:
+            self.row.m.z.push = z
 
     def push_evenly(self, steady: tuple[float, ...]) -> None:
         """Continues under a muscle force that changes evenly: since [s], (x, y) [N], rate [N/s]."""

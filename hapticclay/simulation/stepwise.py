@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import checked
-from ..errors import ParameterError, integer, number, numbers_of, pair
+from ..errors import ParameterError, integer, is_series, number, numbers_of, pair
 from ..kernel.engine import warnings_caught
 from ..kernel.row import SHOWN
 from ..model.operator import Operator
@@ -234,7 +234,8 @@ class Simulation:
 
         Args:
             force: muscle force uh on the handle from this sample on [N], in place of the
-                scenario's constant force; None for the one in effect.
+                scenario's constant force, along two or all axes of the handle; None for the one in
+                effect.
             torque: torques of shoulder and elbow motor from this sample on [N.m], in place of the
                 controller's; with control="sampled" and from the first step on. None for those in
                 effect.
@@ -269,7 +270,7 @@ class Simulation:
             if run.outcome is not None:
                 return
             if force is not None:
-                force = pair("force", force, -MOST, MOST, unit="N")
+                force = force_of(force, run.scenario.axes)
                 if force != run.scenario.force:
                     run.change_force(force)
             if torque is not None:
@@ -414,6 +415,14 @@ def sample_of(t: float, row: np.ndarray, m: Any = None) -> Sample:
     found = {name: x[None] for name, x in zip(Sample._fields[1:], pairs, strict=True)}
     found |= joint_arrays(m, found, row[None, SHOWN:])
     return Sample(t, **{name: x[0] for name, x in found.items()})
+
+
+def force_of(value: object, axes: Sequence[str]) -> tuple[float, ...]:
+    """Muscle force along two axes of the handle, or all [N]."""
+    if len(axes) > 2 and is_series(value):
+        value = tuple(value)  # type: ignore[arg-type]
+        axes = axes[:2] if len(value) == 2 else axes
+    return numbers_of("force", value, axes, -MOST, MOST, unit="N")
 
 
 def gain_of(value: object) -> tuple[float, float]:

@@ -68,7 +68,7 @@ class VectoredRuns:
         s, run = self.given[k], self.runs[k]
         run.row.m.drops_events = 1
         self.over[k], self.changed[k], self.times[k] = False, False, 0.0
-        self.force[k], self.gain[k] = s.force, s.gain
+        self.force[k], self.gain[k] = s.force[:2], s.gain
         self.looked_at[k], self.diverging[k] = -np.inf, False
         if self.engine == "native":
             self.kept[k] = [x.of(s) for x in self.movers]
@@ -82,8 +82,8 @@ class VectoredRuns:
         force, gain = tuple(self.force[k].tolist()), tuple(self.gain[k].tolist())
         if gain != run.scenario.gain:
             run.change_gain(gain)
-        if force != run.scenario.force:
-            run.change_force(force)
+        if force != run.scenario.force[:2]:
+            run.change_force((*force, *run.scenario.force[2:]))
         return run
 
     def scenario(self, k: int) -> Scenario:
@@ -96,7 +96,7 @@ class VectoredRuns:
         if scenario is None and not self.changed[k] and not run.prepares:
             run.restart()
             run.scenario = self.given[k]
-            run.push_evenly((0.0, *run.scenario.steady_force, 0.0, 0.0))
+            run.push_steadily()
         else:
             self.given[k] = scenario or self.given[k]
             self.runs[k] = self._new(k, self.given[k], run.workspace)

@@ -32,6 +32,7 @@ BRIDGED = 24  # rows missing in a gap that is bridged ...
 LOST = 0.05  # ... if no larger share of all rows is missing
 TICK = 0.02  # of the duration: stamps of a coarser clock are no times of rows
 TURNS = (math.tau, 360.0)  # at which angles begin again [rad, deg]
+WIDEST = 64  # bits of a counter
 WRAP = 0.1  # of a turn: jumps at a wrap differ from the turn by less ...
 HELD_SPANS = 20  # between changes of a column by which one that is held is known
 INSIDE, SLACK = 0.5, 1e-3  # ... all steps that go on are smaller, and like those around to this
@@ -81,6 +82,8 @@ def even_columns(columns: Mapping[str, np.ndarray], input: Between = "spline") -
 
 def unwrapped(x: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
     """A position without the jumps of an encoder that begins again: it, the turn, and the rows."""
+    if not np.all(np.abs(x) < 2.0 ** (WIDEST + 1)):
+        return x, 0.0, np.zeros(0, dtype=int)
     steps = np.diff(x)
     size = np.abs(steps)
     span = float(np.ptp(x)) if len(x) else 0.0
@@ -164,7 +167,7 @@ def _in_order(rows: Columns) -> tuple[Columns, list[str]]:
     same = np.ones(len(rows["t"]), dtype=bool)
     same[0:1] = False
     for x in rows.values():
-        same[1:] &= np.diff(x) == 0.0
+        same[1:] &= x[1:] == x[:-1]
     if same.any():
         notes.append(f"rows that repeat the row before are left out: {np.count_nonzero(same)}")
         rows = {key: x[~same] for key, x in rows.items()}

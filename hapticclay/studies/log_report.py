@@ -20,10 +20,12 @@ from ..results import Result
 from ..units import Powers, parse_unit, si_unit
 from .even_columns import held_rows, unwrapped
 from .outliers import runs_of, times
+from .pair_log import is_pair
 
 FEW = 3  # places that a remark names
 STUCK = 0.02  # share of the rows, in a run at the largest or smallest value, that is suspicious
 TREATED = "identify and fit say what they do about it (docs/logs.md)"
+HUGE = 1e50  # a value beyond it is none: squares and sums of others do not overflow
 LEAST = 20  # rows in which columns are judged
 MOST_COLUMNS = 1000  # of a report: a log has tens
 
@@ -130,7 +132,7 @@ def log_report(log: Log) -> LogReport:
         low, high = (float(kept.min()), float(kept.max())) if len(kept) else (math.nan, math.nan)
         rows.append((head.text, unit, low, high, "; ".join([*faults, *_remarks(x)])))
         if len(kept) and head.text != time:
-            columns[_label(head, unit)] = size * x
+            columns[_label(head, unit)] = size * np.where(np.abs(x) > HUGE, math.nan, x)
     warnings += _unstated([x.name for x in log.table.heads if x.text in unknown])
     table = table_of(("column", "unit", "lowest", "highest", "remarks"), rows)
     t = None if stamps is None else stamps.t
@@ -238,11 +240,14 @@ def _unstated(unknown: list[str]) -> list[str]:
 
 def _remarks(x: np.ndarray) -> list[str]:
     """What is suspicious in a column."""
+    out, huge = [], np.abs(x) > HUGE
+    if count := int(np.count_nonzero(huge)):
+        out.append(f"{count} beyond {HUGE:g}")
+    x = np.where(huge, math.nan, x)
     good = np.isfinite(x)
     if not good.any():
-        return ["no numbers"]
-    out = []
-    if missing := int(np.count_nonzero(~good)):
+        return [*out, "no numbers"]
+    if missing := int(np.count_nonzero(~good & ~huge)):
         out.append(f"{missing} missing")
     if (span := float(np.ptp(x[good]))) == 0.0:
         return [*out, "constant"]
@@ -268,6 +273,8 @@ def _commands(log: Log, time: str, unknown: set[str]) -> list[str]:
     every = {x: candidates(log, x) for x in ("force", "position", "command")}
     found = {x: [name for name in names if name not in unknown] for x, names in every.items()}
     file = shlex.quote(str(log.path))
+    if is_pair(log) and not unknown:
+        return [f"hapticclay pair --data {file}"]
     if not log.rows or not time or time in unknown or not found["position"]:
         return []
     place = found["position"][0]

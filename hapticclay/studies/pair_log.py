@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import re
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,14 +10,11 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..columns.heads import powers_of
 from ..columns.log import Log, open_log
 from ..display import brief, one_line
 from ..errors import ParameterError, choice
-from ..files import MOST_TABLE, read_bytes
-from ..units import parse_unit
 from .even_columns import even_columns, unwrapped, wrap_note
-from .measurement import LEAST_ROWS, check_sampling, column_of
+from .measurement import check_sampling, column_of
 
 COLUMNS = {  # columns of a log and their contents
     "t": "time [s]",
@@ -33,7 +27,6 @@ COLUMNS = {  # columns of a log and their contents
 UNITS = {"t": ("s",), "leader": ("rad",), "follower": ("rad",)} | {
     name: ("N.m",) for name in ("leader_torque", "follower_torque", "force")
 }
-QUANTITIES = "rad", "N.m"
 SPELLINGS = {  # of a column's name in lower case without its sign
     "t": ("t", "time"),
     "leader": ("leader", "master", "x_m", "q_m", "x_l", "q_l"),
@@ -44,7 +37,6 @@ SPELLINGS = {  # of a column's name in lower case without its sign
 }
 OUTPUT = {"follower": "output"}  # the motion by which it is judged whether stamps are late
 OPTIONAL = ("leader_torque", "force")
-LABEL = re.compile(r"[^()]*\(([^()]*)\)\s*(.*)")  # "Lever positions (rad) master, slave"
 
 
 @named
@@ -123,18 +115,10 @@ class PairLog:
         Raises:
             ParameterError: the file cannot be read, a column is missing, or as `PairLog`.
         """
-        file, given = Path(path), dict(columns or {})
+        given = dict(columns or {})
         for key in given:
             choice("columns", key, tuple(COLUMNS))
-        try:
-            plain = not (units or counts) and file.suffix.lower() == ".mat"
-            if plain and (table := _scope(file)):
-                found: dict[str, Any] = _chosen(file, table, given, list(table))
-                return cls(**found, name=file.stem)
-            return logged(open_log("path", file, units, counts), given)
-        except OSError as error:
-            bound = f"must be a readable file ({error.strerror})"
-            raise ParameterError("path", str(path), bound) from None
+        return logged(open_log("path", path, units, counts), given)
 
 
 def logged(log: Log, columns: Mapping[str, str]) -> PairLog:
@@ -153,6 +137,13 @@ def logged(log: Log, columns: Mapping[str, str]) -> PairLog:
     names = {new: key for key, new in OUTPUT.items()}
     even: dict[str, Any] = {names.get(key, key): x for key, x in made.columns.items()}
     return PairLog(**even, name=log.path.stem, notes=(*notes, *made.notes))
+
+
+def is_pair(log: Log) -> bool:
+    """Whether columns of a log are those of a pair, by their names."""
+    names = {_plain(head.name) for head in log.table.heads}
+    wanted = (key for key in COLUMNS if key not in OPTIONAL)
+    return all(names.intersection(SPELLINGS[key]) for key in wanted)
 
 
 # ---- files ---------------------------------------------------------------------------------------
@@ -181,41 +172,3 @@ def _chosen(
 
 def _plain(name: str) -> str:
     return name.strip().lstrip("-").strip().lower()
-
-
-def _scope(file: Path) -> dict[str, np.ndarray]:
-    """The columns of a scope of Simulink by the names in its labels; none for other files."""
-    from scipy.io import loadmat
-
-    read_bytes(file, MOST_TABLE)  # refuses what is too large
-    try:
-        with warnings.catch_warnings(action="ignore"):  # of names that stand twice
-            data = loadmat(file, simplify_cells=True)
-    except OSError:
-        raise
-    except Exception:  # noqa: BLE001  # whatever SciPy raises on another file
-        return {}
-    tables = []
-    for x in data.values():
-        if isinstance(x, dict) and {"time", "signals"} <= x.keys():
-            with contextlib.suppress(KeyError, TypeError, ValueError, AttributeError):  # damaged
-                tables.append(_signals(x))
-    tables = [x for x in tables if len(x["time"]) >= LEAST_ROWS]
-    return max(tables, key=len, default={})  # a file may hold smaller ones, such as a reference
-
-
-def _signals(scope: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Columns in SI units by the names in labels such as "Torque (Nm at lever) -tau_rm, tau_rs"."""
-    out = {"time": np.asarray(scope["time"], dtype=float).ravel()}
-    signals = scope["signals"]
-    for i, signal in enumerate([signals] if isinstance(signals, dict) else signals, 1):
-        values = np.asarray(signal["values"], dtype=float).reshape(len(out["time"]), -1)
-        label = LABEL.fullmatch(str(signal.get("label", "")).strip())
-        names = [x.strip() for x in label[2].split(",") if x.strip()] if label else []
-        word = label[1].split()[0] if label and label[1].split() else ""
-        unit = parse_unit(word)
-        size, other = (float(unit[0]), unit[1] not in powers_of(QUANTITIES)) if unit else (1.0, 0)
-        for j, column in enumerate(values.T):
-            name = names[j] if j < len(names) else f"signal {i}.{j + 1}"
-            out[f"{name} [{word}]" if other else name] = size * column  # so that none mistakes it
-    return out

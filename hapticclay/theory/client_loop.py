@@ -1,10 +1,10 @@
 """The sampled loop of an arm, a hand at it, and a program that renders a wall through a port.
 
 The handle moves in the plane: M p'' + D p' + S p = n f, with M the inertia of arm and hand at a
-pose. The program reads position and velocity every Ts. Its force f = -(K n.p + B n.v) acts after
-`delay` and is held for one Ts (zero-order hold). Between samples the motion is linear, so the loop
-is a matrix: exact for small motions about the pose. The model has no friction, no torque limits and
-no wall surface.
+pose; or the joints of an arm from a file move, with J' n in the place of n. The program reads
+position and velocity every Ts. Its force f = -(K n.p + B n.v) acts after `delay` and is held for
+one Ts (zero-order hold). Between samples the motion is linear, so the loop is a matrix: exact for
+small motions about the pose. The model has no friction, no torque limits and no wall surface.
 """
 
 from __future__ import annotations
@@ -17,9 +17,11 @@ from typing import Annotated
 import numpy as np
 
 from ..arguments import checked
+from ..arms.joint_law import compensated
+from ..arms.mechanism import STILL, Linear
 from ..display import brief
 from ..errors import Bound, ParameterError, number
-from ..model.operator import NO_HAND
+from ..model.operator import NO_HAND, Operator
 from ..scene.scenario import Scenario
 from . import linear_loop, roots
 from .joint_loop import JointLoop
@@ -72,15 +74,91 @@ class Handle:
         mass, damping, stiffness = np.array(hands).T
         return cls(inertia + np.diag(mass), damping, stiffness, np.array(normal) / size)
 
+    def loop(self, K: float, B: float, Ts: float, delay: float) -> JointLoop:
+        """The loop with a wall."""
+        along = np.outer(self.normal, self.normal)
+        hand = np.diag(self.damping), np.diag(self.stiffness)
+        return JointLoop(self.inertia, *hand, K * along, B * along, Ts, delay)
 
-def client_map(handle: Handle, K: float, B: float, Ts: float, delay: float) -> np.ndarray:
+    @property
+    def mass(self) -> float:
+        """Mass of arm and hand along the normal [kg]."""
+        return float(1.0 / (self.normal @ np.linalg.inv(self.inertia) @ self.normal))
+
+
+def held_arm(linear: Linear, operator: Operator) -> Linear:
+    """The arm with a hand at its handle: mass, damper and spring along x, y and z.
+
+    Gravity acts on the mass, too: it is held as the arm's own weight is.
+    """
+    square = linear.jacobian.T @ linear.jacobian
+    return linear._replace(
+        inertia=linear.inertia + operator.mass * square,
+        damping=linear.damping + operator.damper * square,
+        stiffness=linear.stiffness + operator.spring * square,
+        gravity_stiffness=linear.gravity_stiffness + operator.mass * linear.weight_stiffness,
+    )
+
+
+@dataclass(frozen=True)
+class JointHandle:
+    """Joints of an arm from a file at its pose, with a hand at the handle, as a wall moves them.
+
+    Its weight is held all the time if gravity is compensated: the arm's own loop is far faster
+    than that of a program.
+
+    Attributes:
+        inertia: inertia of joints and hand [kg.m^2], shape (n, n).
+        damping: their damping [N.m.s/rad], shape (n, n).
+        stiffness: their stiffness, with that of a weight that acts [N.m/rad], shape (n, n).
+        along: way of the handle along the normal of the wall per joint position [m], shape (n,).
+    """
+
+    def __repr__(self) -> str:
+        return brief(self)
+
+    inertia: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    along: np.ndarray
+
+    @classmethod
+    @checked
+    def of(cls, scenario: Scenario, normal: tuple[float, ...]) -> JointHandle:
+        """The handle of a scenario's arm from a file, at its pose."""
+        arm = scenario.file_arm
+        linear = held_arm(arm.linear(), scenario.operators[0] or NO_HAND)
+        stiffness = linear.stiffness
+        if not compensated(arm, None):
+            stiffness = stiffness + linear.gravity_stiffness
+        rows = ["xyz".index(axis) for axis in scenario.axes]
+        along = np.array(normal) / math.hypot(*normal) @ linear.jacobian[rows]
+        if not np.abs(along).max() > STILL:
+            raise ParameterError("normal", normal, "must be one along which the handle can move")
+        return cls(linear.inertia, linear.damping, stiffness, along)
+
+    def loop(self, K: float, B: float, Ts: float, delay: float) -> JointLoop:
+        """The loop with a wall."""
+        square = np.outer(self.along, self.along)
+        return JointLoop(
+            self.inertia, self.damping, self.stiffness, K * square, B * square, Ts, delay
+        )
+
+    @property
+    def mass(self) -> float:
+        """Mass of arm and hand along the normal [kg]."""
+        return float(1.0 / (self.along @ np.linalg.solve(self.inertia, self.along)))
+
+
+AnyHandle = Handle | JointHandle
+
+
+def client_map(handle: AnyHandle, K: float, B: float, Ts: float, delay: float) -> np.ndarray:
     """State matrix of the sampled loop, x(k+1) = A x(k): position, velocity, delayed forces."""
-    along = np.outer(handle.normal, handle.normal)
-    hand = np.diag(handle.damping), np.diag(handle.stiffness)
-    return JointLoop(handle.inertia, *hand, K * along, B * along, Ts, delay).map()
+    return handle.loop(K, B, Ts, delay).map()
 
 
-def holds(handle: Handle, K: float, B: float, Ts: float, delay: float) -> bool:
+def holds(handle: AnyHandle, K: float, B: float, Ts: float, delay: float) -> bool:
     """Whether the loop is stable: all modes but rigid motion lie within the unit circle."""
     return _stable(client_map(handle, K, B, Ts, delay))
 
@@ -95,7 +173,7 @@ Delay = Annotated[float, Bound(0.0, 10.0, "s")]
 
 
 @checked
-def rendered_stiffness_limit(handle: Handle, B: float, Ts: Sample, delay: Delay = 0.0) -> float:
+def rendered_stiffness_limit(handle: AnyHandle, B: float, Ts: Sample, delay: Delay = 0.0) -> float:
     """Largest stable stiffness of a wall rendered by a program [N/m]."""
     (limit,) = rendered_stiffness_limits(handle, (B,), Ts, delay)
     return limit
@@ -103,7 +181,7 @@ def rendered_stiffness_limit(handle: Handle, B: float, Ts: Sample, delay: Delay 
 
 @checked
 def rendered_stiffness_limits(
-    handle: Handle, B: Sequence[float], Ts: Sample, delay: Delay = 0.0
+    handle: AnyHandle, B: Sequence[float], Ts: Sample, delay: Delay = 0.0
 ) -> tuple[float, ...]:
     """Largest stable stiffness by damping of the wall: the Z-width of a program's loop."""
     dampings = [number("B", b, -1e6, 1e6) for b in B]
@@ -121,7 +199,7 @@ def rendered_stiffness_limits(
 
 
 @checked
-def slowest_period(handle: Handle, K: float, B: float, late: float, Ts: float) -> float:
+def slowest_period(handle: AnyHandle, K: float, B: float, late: float, Ts: float) -> float:
     """Longest sampling period, up to which a wall rendered by a program is stable [s].
 
     The wall is stable at this and at every shorter period that is tested: 33 in each factor of ten.

@@ -11,13 +11,13 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..arms.joint_law import JointPD, compensated
-from ..arms.mechanism import Linear
+from ..arms.mechanism import STILL
 from ..arms.mjcf_arm import MjcfArm
 from ..errors import Bound, ParameterError
 from ..model.operator import NO_HAND, Operator
 from ..results import Result, Tables
 from . import joint_changes
-from .client_loop import Delay, Sample
+from .client_loop import Delay, Sample, held_arm
 from .joint_changes import Edge, slopes
 from .joint_families import Circle, Family, Limit
 from .joint_gains import IGNORED, gravity_words, joint_loop
@@ -26,7 +26,6 @@ from .joint_loop import JointLoop, timing_words
 AXES = ("x", "y", "z")
 LINE = 40  # dampings of the line of limits
 MOST_B = 2.2  # of mass/(Ts + delay): no wall is stable at more damping
-STILL = 1e-9  # [m] least motion of the handle per joint rate
 Axis = Literal["x", "y", "z"]
 
 
@@ -106,20 +105,6 @@ class WallLimit(Result):
         }
         wall = {name: [x] for name, x in row.items()}
         return {"wall": wall, "sensitivity": moves, "line": line}
-
-
-def held_arm(linear: Linear, operator: Operator) -> Linear:
-    """The arm with a hand at its handle: mass, damper and spring along x, y and z.
-
-    Gravity acts on the mass, too: it is held as the arm's own weight is.
-    """
-    square = linear.jacobian.T @ linear.jacobian
-    return linear._replace(
-        inertia=linear.inertia + operator.mass * square,
-        damping=linear.damping + operator.damper * square,
-        stiffness=linear.stiffness + operator.spring * square,
-        gravity_stiffness=linear.gravity_stiffness + operator.mass * linear.weight_stiffness,
-    )
 
 
 @checked

@@ -21,13 +21,14 @@ from ..files import atomic
 from ..kernel.engine import mujoco
 from ..live.status import held_words
 from ..model.constants import AXES
+from ..simulation.pair_record import PairRecord
 from ..simulation.record import Record
 from ..studies.removal import TOOL, Tool
 from .stage import CAMERAS, Stage
 from .stick_stage import StickStage
+from .sticks import LEAST_ASPECT
 
 FRAME_RATES = {".mp4": 30, ".webp": 20, ".gif": 20}  # [1/s], by kind of file
-LEAST_ASPECT = 1.2  # aspect ratio for which the cameras of room.xml are designed
 PLOTS_SHARE = 0.375  # of the width
 FONT_WIDTH = 175  # [pixels] of a picture by which its title grows by half of its usual size
 SLOW = 0.2  # speed below which a title has four digits of the time
@@ -184,8 +185,32 @@ def _check_codec(kind: str) -> None:
         raise ParameterError("out", kind, bound) from None
 
 
+class ArmReel:
+    """What a film shows of a run: its scene, posed sample by sample, and words."""
+
+    def __init__(self, record: Record, options: FilmOptions):
+        self.stage, self._record = stage_of(record, options), record
+        self._held = record.held()[:, : len(AXES)].tolist()
+        self._removed = None if record.ground is None else record.extra.get("removed")
+        self._done = 0
+
+    def show(self, n: int) -> list[str]:
+        """Poses the scene after the first n samples, and says what of it is no picture."""
+        record, stage, words = self._record, self.stage, []
+        stage.carve(_thinned(record.p[self._done : n]))
+        self._done = n
+        stage.pose(record.q[n - 1])
+        stage.push(record.fe[n - 1], all(self._held[n - 1]))
+        if stage.field >= 0:
+            volume = stage.removal.volume if self._removed is None else float(self._removed[n - 1])
+            words.append(f"removed {1e6 * volume:.1f} cm3")
+        if still := held_words(self._held[n - 1]):
+            words.append(still)
+        return words
+
+
 def frames(
-    record: Record, options: FilmOptions = FILM_OPTIONS, rate: int = 30
+    record: Record | PairRecord, options: FilmOptions = FILM_OPTIONS, rate: int = 30
 ) -> Iterator[np.ndarray]:
     """Yields the frames of a film, shape (height, width, 3) of bytes; each overwrites the last."""
     width, height = options.size
@@ -196,35 +221,31 @@ def frames(
         share = 2 * round(0.5 * PLOTS_SHARE * width)
         if plots_fit(share, height):
             beside, running = share, RunningPlots(record, share, height)
-    stage = stage_of(record, options)
+    reel = _reel(record, options)
     camera = choice("camera", options.camera, CAMERAS)
-    lens = Lens(stage, width - beside, height, camera, options.smooth)
+    lens = Lens(reel.stage, width - beside, height, camera, options.smooth)
     image = np.empty((height, width, 3), dtype=np.uint8)
-    held = record.held()[:, : len(AXES)].tolist()
-    recorded = None if record.ground is None else record.extra.get("removed")
     digits = 2 if options.speed > SLOW else 4
     gap = "   " if width - beside >= ONE_LINE_WIDTH else "\n"
+    magnified = [f"motion x {options.magnify:.0f}"] if options.magnify != 1.0 else []
     try:
-        done = 0
         for n in samples_shown(record, options.speed, rate):
-            stage.carve(_thinned(record.p[done:n]))
-            stage.pose(record.q[n - 1])
-            stage.push(record.fe[n - 1], all(held[n - 1]))
-            title = f"t = {record.t[n - 1]:.{digits}f} s"
-            if options.magnify != 1.0:
-                title += f"{gap}motion x {options.magnify:.0f}"
-            if stage.field >= 0:
-                volume = stage.removal.volume if recorded is None else float(recorded[n - 1])
-                title += f"{gap}removed {1e6 * volume:.1f} cm3"
-            if still := held_words(held[n - 1]):
-                title += gap + still
-            image[:, : width - beside] = lens.photograph(title)
+            words = reel.show(n)
+            time = f"t = {record.t[n - 1]:.{digits}f} s"
+            image[:, : width - beside] = lens.photograph(gap.join([time, *magnified, *words]))
             if running:
                 image[:, width - beside :] = running.draw(n)
-            done = n
             yield image
     finally:
         lens.close()
+
+
+def _reel(record: Record | PairRecord, options: FilmOptions) -> Any:
+    if isinstance(record, Record):
+        return ArmReel(record, options)
+    from .pair_stage import PairReel
+
+    return PairReel(record, options.camera, options.magnify)
 
 
 def stage_of(record: Record, options: FilmOptions) -> Any:
@@ -237,7 +258,7 @@ def stage_of(record: Record, options: FilmOptions) -> Any:
     return StickStage(record, options.magnify)
 
 
-def samples_shown(record: Record, speed: float, rate: int) -> np.ndarray:
+def samples_shown(record: Record | PairRecord, speed: float, rate: int) -> np.ndarray:
     """Counts the samples up to each frame of a film."""
     end = float(record.t[-1]) if len(record.t) else 0.0
     at = np.append(np.arange(0.0, end, speed / rate), end)
@@ -250,7 +271,7 @@ def _thinned(p: np.ndarray) -> np.ndarray:
 
 
 def film(
-    record: Record,
+    record: Record | PairRecord,
     out: Path,
     options: FilmOptions = FILM_OPTIONS,
     progress: Callable[[Iterator[np.ndarray], int], Iterator] | None = None,
@@ -258,7 +279,8 @@ def film(
     """Writes a film of a run."""
     kind, options = ready(out, options)
     if not len(record.t):
-        raise ParameterError("record", record.scenario.name, "must hold samples")
+        name = record.scenario.name if isinstance(record, Record) else record.kind
+        raise ParameterError("record", name, "must hold samples")
     rate = FRAME_RATES[kind]
     images: Any = frames(record, options, rate)
     if progress:

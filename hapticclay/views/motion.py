@@ -1,10 +1,15 @@
-"""Velocity and force of clay that resists along the motion, or along each axis."""
+"""What figures and films show of a motion: along it, or of the joint that moves most."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
 from ..model.clay import Clay
+from ..simulation.pair_record import PairRecord
+
+SMALL = 0.05  # [rad or m] motion below this is shown in thousandths
 
 
 def along_motion(v: np.ndarray, fe: np.ndarray, main: int) -> tuple[np.ndarray, np.ndarray]:
@@ -26,3 +31,17 @@ def resolved(
     if clay is not None and clay.along_motion:
         return along_motion(v, force, i)
     return v[:, i], force[:, i]
+
+
+def most_moved(r: PairRecord) -> tuple[int, list[np.ndarray]]:
+    """The joint of a pair that moves most, and its motion at both ends."""
+    moved = [q - q[0] for q in (r.leader, r.follower)]
+    j = int(np.maximum(*map(np.abs, moved)).max(axis=0).argmax())
+    return j, [x[:, j] for x in moved]
+
+
+def pair_unit(names: tuple[str, ...], turned: Any) -> tuple[str, float]:
+    """Unit in which a joint's motion is drawn, and its size."""
+    small = max(float(np.abs(x).max(initial=0.0)) for x in turned) < SMALL
+    unit = "m" if names == ("x",) else "rad"
+    return (f"m{unit}", 1e3) if small else (unit, 1.0)

@@ -10,9 +10,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..model.constants import AXES
+from ..simulation.pair_record import PairRecord
 from ..simulation.record import Record
 from .flow_plots import draw_laws, flows_met
-from .motion import resolved
+from .motion import SMALL, most_moved, pair_unit, resolved
 from .palette import BLUE, GREEN, GREY, VERMILION
 from .panels import shade_held
 from .run_axes import held_spans, is_viscous, shade_clay, shades
@@ -23,7 +24,6 @@ TEXT_SIZE = 7.5  # [points]
 LEAST_PANEL = (120, 100)  # width and height [pixels] that the numbers of a running plot need
 ROOMY_PANEL = (180, 110)  # ... and the names of its axes
 MOST_JOINTS = 3  # shown of an arm from a file
-SMALL = 0.05  # [rad or m] motion below this is shown in thousandths
 LEGEND_WIDTH = 230  # [pixels] from which a legend fits beside the title
 
 
@@ -48,7 +48,7 @@ class RunningPlots:
     The axes are drawn once; each image restores them and draws the curves (matplotlib's blitting).
     """
 
-    def __init__(self, record: Record, width: int, height: int):
+    def __init__(self, record: Record | PairRecord, width: int, height: int):
         """Draws the axes."""
         figure, curves = running_figure(record, width, height)
         self._canvas: Any = figure.canvas
@@ -73,14 +73,12 @@ class RunningPlots:
 
 @figure_style(font_size=TEXT_SIZE, lines_linewidth=1.0)
 def running_figure(
-    record: Record, width: int, height: int
+    record: Record | PairRecord, width: int, height: int
 ) -> tuple[Figure, list[tuple[Axes, np.ndarray, np.ndarray, str]]]:
     """Draws the axes of the running plots, with a legend where there is room for it."""
     count = max(1, min(3, height // LEAST_PANEL[1]))
     roomy = width >= ROOMY_PANEL[0] and height >= ROOMY_PANEL[1] * count
-    i = int(np.ptp(record.p[:, 1]) > 1.2 * np.ptp(record.p[:, 0]))
-    closed_form = record.scenario.is_closed_form
-    plans = (_running_panels(record, i, roomy) if closed_form else _joint_panels(record))[:count]
+    plans = _plans(record, roomy)[:count]
     figure = Figure(figsize=(width / FILM_DPI, height / FILM_DPI), dpi=FILM_DPI)
     panels: Any = figure.subplots(count, 1, squeeze=False)[:, 0]
     for ax, plan in zip(panels, plans, strict=True):
@@ -90,13 +88,8 @@ def running_figure(
         ax.set_title(plan.title, fontsize=TEXT_SIZE, color=GREY, pad=2, loc="left")
         for _, color, name in plan.curves:
             ax.plot([], [], color=color, lw=stroke(1.4), label=name)
-    viscous = is_viscous(record.scenario)
-    for ax in panels[: (2 if viscous else 1) * closed_form]:
-        shade_clay(ax, *shades(record, AXES[i]))
-    for ax in panels[1 : 1 + closed_form]:
-        _running_laws(ax, record, i)
-    for ax in panels[2:]:
-        shade_held(ax, held_spans(record, AXES[i]))
+    if isinstance(record, Record):
+        _draw_clay(panels, record)
     for ax in panels if width >= LEGEND_WIDTH else ():
         entries = dict(zip(*ax.get_legend_handles_labels()[::-1], strict=True))
         place: Any = dict(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
@@ -108,6 +101,49 @@ def running_figure(
     canvas.draw()
     both = zip(panels, plans, strict=True)
     return figure, [(ax, plan.x, y, color) for ax, plan in both for y, color, _ in plan.curves]
+
+
+def _plans(record: Record | PairRecord, roomy: bool) -> tuple[Panel, ...]:
+    if isinstance(record, PairRecord):
+        return _pair_panels(record)
+    if not record.scenario.is_closed_form:
+        return _joint_panels(record)
+    return _running_panels(record, _main_axis(record), roomy)
+
+
+def _main_axis(record: Record) -> int:
+    """The axis along which the handle moves most."""
+    return int(np.ptp(record.p[:, 1]) > 1.2 * np.ptp(record.p[:, 0]))
+
+
+def _draw_clay(panels: Any, record: Record) -> None:
+    """Shades clay and the times at which it held the handle; draws its law."""
+    i, closed_form = _main_axis(record), record.scenario.is_closed_form
+    for ax in panels[: (2 if is_viscous(record.scenario) else 1) * closed_form]:
+        shade_clay(ax, *shades(record, AXES[i]))
+    for ax in panels[1 : 1 + closed_form]:
+        _running_laws(ax, record, i)
+    for ax in panels[2:]:
+        shade_held(ax, held_spans(record, AXES[i]))
+
+
+def _pair_panels(r: PairRecord) -> tuple[Panel, ...]:
+    """The joint that moves most, forces of hand and contact, and energy taken, over time."""
+    j, turned = most_moved(r)
+    unit, scale = pair_unit(r.names, turned)
+    forces = [np.linalg.norm(f, axis=1) for f in (r.hand, r.contact)]
+    ports = [1e3 * x for x in r.port_energy.T]
+
+    def panel(name: str, values: Any, labels: Any) -> Panel:
+        curves = tuple(zip(values, (BLUE, VERMILION), labels, strict=True))
+        return Panel(r.t, np.concatenate(values), ("time [s]", name), "", curves)
+
+    ends = "leader", "follower"
+    return (
+        panel(f"{r.names[j]} [{unit}]", [scale * x for x in turned], ends),
+        panel("force [N]", forces, ("hand", "contact")),
+        panel("energy taken [mJ]", ports, ("at leader", "at follower")),
+    )
 
 
 def _running_panels(r: Record, i: int, roomy: bool) -> tuple[Panel, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -11,13 +10,10 @@ from ..arms.mechanism import Sticks
 from ..errors import ParameterError
 from ..kernel.engine import mujoco
 from ..simulation.record import Record
-from .palette import BLUE, PART_COLORS, SKY, TABLE, rgb
+from .palette import BLUE, PART_COLORS
+from .sticks import draw_sticks, room
 
 POSES = 40  # of a run, from which the cameras see all
-LINK, JOINT, KNOB = 0.016, 0.024, 0.03  # radii, as shares of the mechanism's size
-FIELD = 40.0  # [deg] of view
-VIEWS = {"room": (-50.0, 24.0, 1.0), "top": (-90.0, 89.0, 1.0), "close": (-50.0, 24.0, 0.45)}
-"""Azimuth and elevation of each camera [deg], and its distance as a share of the first one's."""
 
 
 class StickStage:
@@ -36,7 +32,7 @@ class StickStage:
         figures = [self._sticks(record.q[k]) for k in chosen]
         places = np.concatenate([x.segments.reshape(-1, 3) for x in figures])
         handles = np.array([x.handle for x in figures])
-        self.model = _room(places, handles)
+        self.model = room(places, handles)
         self.data = mujoco.MjData(self.model)
         mujoco.mj_forward(self.model, self.data)
         self._size = float(np.ptp(places, axis=0).max())
@@ -69,75 +65,4 @@ class StickStage:
 
     def draw_arrow(self, scene: mujoco.MjvScene) -> None:
         """Adds the mechanism to what a renderer draws."""
-        size, shown = self._size, self._shown
-        for k, (begin, end) in enumerate(shown.segments):
-            color = BLUE if k % 2 else PART_COLORS["dark"]
-            _capsule(scene, begin, end, LINK * size, color)
-        for place in shown.joints:
-            _sphere(scene, place, JOINT * size, PART_COLORS["steel"])
-        _sphere(scene, shown.handle, KNOB * size, PART_COLORS["orange"])
-
-
-def _capsule(scene: mujoco.MjvScene, begin: Any, end: Any, radius: float, color: str) -> None:
-    geom = _added(scene, mujoco.mjtGeom.mjGEOM_CAPSULE.value, np.zeros(3), np.zeros(3), color)
-    if geom is not None:
-        kind = mujoco.mjtGeom.mjGEOM_CAPSULE.value
-        mujoco.mjv_connector(geom, kind, radius, np.array(begin), np.array(end))
-
-
-def _sphere(scene: mujoco.MjvScene, place: Any, radius: float, color: str) -> None:
-    kind = mujoco.mjtGeom.mjGEOM_SPHERE.value
-    _added(scene, kind, np.full(3, radius), np.array(place), color)
-
-
-def _added(scene: Any, kind: int, size: np.ndarray, place: np.ndarray, color: str) -> Any:
-    if scene.ngeom >= scene.maxgeom:
-        return None
-    geom = scene.geoms[scene.ngeom]
-    rgba = np.array((*rgb(color), 1.0), dtype=np.float32)
-    mujoco.mjv_initGeom(geom, kind, size, place, np.eye(3).ravel(), rgba)
-    scene.ngeom += 1
-    return geom
-
-
-def _room(places: np.ndarray, handles: np.ndarray) -> mujoco.MjModel:
-    """A table below all places, a light, and cameras that see them."""
-    low, high = places.min(axis=0), places.max(axis=0)
-    middle, size = 0.5 * (low + high), float((high - low).max())
-    spec = mujoco.MjSpec()
-    spec.visual.headlight.ambient[:] = 0.35
-    spec.visual.headlight.diffuse[:] = 0.3
-    spec.stat.extent, spec.stat.center = 2.0 * size, middle
-    sky = mujoco.mjtTexture.mjTEXTURE_SKYBOX
-    light, dark = (np.array(rgb(x)) for x in SKY)
-    gradient = mujoco.mjtBuiltin.mjBUILTIN_GRADIENT
-    spec.add_texture(
-        name="sky", type=sky, builtin=gradient, rgb1=light, rgb2=dark, width=64, height=384
-    )
-    plane, floor = mujoco.mjtGeom.mjGEOM_PLANE, low[2] - 0.06 * size
-    spec.worldbody.add_geom(
-        name="table",
-        type=plane,
-        size=(8.0 * size, 8.0 * size, 0.1),
-        pos=(*middle[:2], floor),
-        rgba=(*rgb(TABLE), 1.0),
-    )
-    above = middle + size * np.array((0.6, -0.8, 3.0))
-    spec.worldbody.add_light(pos=above, dir=middle - above, diffuse=(0.38,) * 3)
-    distance = 0.62 * size / math.tan(math.radians(0.5 * FIELD)) + 0.3 * size
-    for name, (azimuth, elevation, share) in VIEWS.items():
-        target = middle if name != "close" else handles.mean(axis=0)
-        back, quat = _look(azimuth, elevation)
-        at = target + share * distance * back
-        spec.worldbody.add_camera(name=name, pos=at, quat=quat, fovy=FIELD)
-    return spec.compile()
-
-
-def _look(azimuth: float, elevation: float) -> tuple[np.ndarray, np.ndarray]:
-    """Direction from what a camera sees to the camera, and its orientation."""
-    a, e = math.radians(azimuth), math.radians(elevation)
-    back = np.array((math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)))
-    right = np.array((-math.sin(a), math.cos(a), 0.0))
-    quat = np.zeros(4)
-    mujoco.mju_mat2Quat(quat, np.column_stack((right, np.cross(back, right), back)).ravel())
-    return back, quat
+        draw_sticks(scene, self._shown, self._size, BLUE, PART_COLORS["orange"])

@@ -57,6 +57,12 @@ def test_options_replace_what_the_file_says(file, tmp_path, capsys):
         (["{}", "--kind", "wave"], "did you mean 'waves'"),
         (["{}", "--cells", "3", "3"], "give --map"),
         (["{}", "--map", "gain"], "delay-gain"),
+        (["{}", "--film", "pair.mp4"], "give --run"),
+        (["{}", "--view", "--run", "0.1"], "leave out --view"),
+        (["{}", "--port", "0"], "give --view"),
+        (["{}", "--view", "--delay", "0.00031415"], "whole parts"),
+        (["{}", "--run", "0.1", "--film", "pair.avi"], "must be one of .mp4, .webp, .gif"),
+        (["{}", "--run", "0.1", "--delay", "0.00031415", "--film", "x.webp"], "whole parts"),
         (["{}", "--dely", "1ms"], "did you mean --delay"),
     ],
 )
@@ -83,3 +89,10 @@ def test_a_file_that_is_no_pair(text, told, tmp_path, capsys):
     assert main(["pair", str(path), "--out", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err
     assert told in error and error.count("\n") == 1
+
+
+@pytest.mark.parametrize("command", ["run", "view", "video"])
+def test_commands_of_scenarios_name_the_one_for_pairs(command, file, capsys):
+    assert main([command, file]) == 2
+    error = capsys.readouterr().err
+    assert "are for hapticclay pair" in error and error.count("\n") == 1

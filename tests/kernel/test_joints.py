@@ -132,12 +132,13 @@ def test_a_step_is_of_second_order(name, delay):
     arm = hc.MjcfArm(card, friction=[0.0] * n, **given)
     aim = arm.q + np.random.default_rng(1).uniform(-away, away, n)
     law = hc.JointPD(Kp, [0.02 * x for x in Kp], velocity="difference", reference=tuple(aim))
-    motion = Motion(card, arm.names, arm.axes, arm.pose, (0.0, 2.0, 6.0), (2.0, 1.0))
+    force = (2.0, 1.0, 0.5)[: len(arm.axes)]
+    motion = Motion(card, arm.names, arm.axes, arm.pose, (0.0, 2.0, 6.0), force)
     exact = motion.run((law.Kp, law.Kd, aim), Ts, samples, delay)
     errors = []
     for ratio in (2, 4, 8):
         s = scene(
-            arm, law, Ts, ratio, t_max=Ts * samples, force=(2.0, 1.0),
+            arm, law, Ts, ratio, t_max=Ts * samples, force=force,
             operator=hc.Operator(0.0, 2.0, 6.0),
             hardware=hc.Hardware(delay=delay * Ts) if delay else None,
         )  # fmt: skip
@@ -336,7 +337,7 @@ def test_a_law_of_ones_own_has_all_joints_and_axes():
         pulls = zip(q, qd, params, strict=True)
         return tuple((y - x) - 0.02 * w for x, w, y in pulls), state
 
-    common = dict(operator=hc.Operator(0.0, 3.0, 8.0), force=(0.3, 0.1))
+    common = dict(operator=hc.Operator(0.0, 3.0, 8.0), force=(0.3, 0.1, 0.2))
     mine = hc.simulate(scene(arm, hc.Controller(law, params=pd.reference), **common))
     theirs = hc.simulate(scene(arm, pd, **common))
     np.testing.assert_allclose(mine.q, theirs.q, atol=1e-13)
@@ -345,7 +346,7 @@ def test_a_law_of_ones_own_has_all_joints_and_axes():
     assert forces.shape[1] == 3 and np.abs(forces[:, 2]).max() > 1e-3
     # a hand without mass pushes by place and velocity; recorded rates are means over a sample
     np.testing.assert_allclose(
-        forces[:, 2], (-8.0 * mine.p[:, 2] - 3.0 * handle_rates(arm, mine)[:, 2])[:-1],
+        forces[:, 2], (0.2 - 8.0 * mine.p[:, 2] - 3.0 * handle_rates(arm, mine)[:, 2])[:-1],
         atol=2e-2 * np.abs(forces[:, 2]).max(),
     )  # fmt: skip
 
@@ -372,8 +373,9 @@ def test_energy_is_balanced_to_second_order(card):
     left = []
     for ratio in (1, 2, 4):
         s = scene(
-            arm, law, 2e-3, ratio, operator=hc.Operator(0.0, 2.0, 6.0), force=(1.0, 0.5), t_max=0.1
-        )
+            arm, law, 2e-3, ratio, operator=hc.Operator(0.0, 2.0, 6.0), t_max=0.1,
+            force=(1.0, 0.5, -0.8)[: len(arm.axes)],
+        )  # fmt: skip
         e = hc.simulate(s).energy
         left.append(abs(e["residual"]) / e["throughput"])
         assert e["joint_dampers"] >= 0.0 and e.get("friction", 0.0) >= 0.0

@@ -51,7 +51,7 @@ def test_a_message_is_read_as_it_was_sent(forces, full, profile):
     assert read_message(message_text(sent).encode()) == sent
 
 
-@given(ID, PLACE, st.tuples(FINITE, FINITE))
+@given(ID, PLACE, VECTOR)
 def test_places_and_torques_are_read_as_they_were_sent(name, place, torques):
     both = (Target(name, place),), (Torques(name, torques),)
     sent = Message(devices=(name, name), targets=both[0], torques=both[1])
@@ -67,8 +67,12 @@ def test_places_and_torques_are_read_as_they_were_sent(name, place, torques):
         ),
         ('"set_cursor_position":{"position":{"x":0.1}}', Command(None, (0.1, 0.0, 0.0))),
         ('"set_cursor_position":{"position":{"x":NaN}}', Command()),  # no place is no target
-        ('"set_angular_torques":{"torques":{"a0":1,"a1":2,"a2":3}}', Command(torques=(1.0, 2.0))),
-        ('"set_angular_torques":{"torques":{"a0":"much"}}', Command(torques=(0.0, 0.0))),
+        (
+            '"set_angular_torques":{"torques":{"a0":1,"a1":2,"a2":3}}',
+            Command(torques=(1.0, 2.0, 3.0)),
+        ),
+        ('"set_angular_torques":{"torques":{"a1":2}}', Command(torques=(0.0, 2.0, 0.0))),
+        ('"set_angular_torques":{"torques":{"a0":"much"}}', Command(torques=(0.0, 0.0, 0.0))),
     ],
 )
 def test_places_and_torques_of_all_versions(body, command):
@@ -79,7 +83,8 @@ def test_places_and_torques_of_all_versions(body, command):
 
 @given(ID, PLACE, PLACE, VECTOR, st.sets(st.sampled_from(["a", "b", "c", "home"])))
 def test_a_frame_is_read_as_it_was_sent(name, position, velocity, force, buttons):
-    cursor = Cursor(position, velocity, force, "torque", (1.0, -2.5), (0.5, 3.0), (0.1, -0.2))
+    joints = (1.0, -2.5, 90.0), (0.5, 3.0, -7.0), (0.1, -0.2, 0.3)
+    cursor = Cursor(position, velocity, force, "torque", *joints)
     sent = Frame(name, cursor, "F00D", frozenset(buttons), 3, True)
     assert read_frame(frame_text(sent)) == sent
 

@@ -10,9 +10,8 @@ from tests.snippets import printed_by
 DOCS = Path(__file__).parents[2] / "docs"
 
 
-def code_of(page):
-    (code,) = re.findall(r"```python\n(.*?)```", (DOCS / page).read_text(), re.S)
-    return code
+def code_of(page, i=0):
+    return re.findall(r"```python\n(.*?)```", (DOCS / page).read_text(), re.S)[i]
 
 
 def test_the_test_of_the_device_page_passes(tmp_path):
@@ -20,6 +19,12 @@ def test_the_test_of_the_device_page_passes(tmp_path):
     words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_wall.py"]
     out = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
     assert out.returncode == 0 and "1 passed" in out.stdout, out.stdout
+
+
+def test_the_floor_under_an_arm_from_a_file_is_reported_as_the_page_says(tmp_path):
+    code = code_of("device.md", 1)
+    out = printed_by(code, tmp_path)
+    assert out.splitlines() == re.findall(r"^# (.*)", code, re.M) != []
 
 
 def test_the_snippet_of_the_buzz_page_prints_what_it_says(tmp_path):

@@ -279,7 +279,7 @@ class Still:
 @pytest.mark.parametrize("kind", PUBLISHED)
 def test_messages_are_finite_json_with_a_stamp(kind):
     service = Service(Still(), clock="tick", inverse3=SHOWN)
-    msg = ros_message(kind, service.cursor(), frozenset(), 1.25)
+    msg = ros_message(kind, service.cursor(), service.joints, frozenset(), 1.25)
     json.dumps(msg, allow_nan=False)
     assert kind == "phantom/button" or msg["header"]["stamp"]["nsecs"] == 250_000_000
 

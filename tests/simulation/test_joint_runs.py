@@ -89,6 +89,40 @@ TEXT = """<mujoco><worldbody><body><joint name="a" axis="0 0 1"/>
 <site name="handle" pos="0.2 0 0"/></body></worldbody></mujoco>"""
 
 
+@pytest.mark.parametrize("card", ["haptic_3", "leader_7"])
+def test_a_hand_pushes_along_three_axes(card):
+    """Given in steps, from a snapshot, in a batch or in the scenario: the same run."""
+    force = (0.5, -0.2, 0.3)
+    s = scene(card, 5.0, 0.1, 0.0, force=force, clay=None, t_max=0.02)
+    whole = hc.simulate(s)
+    flat = hc.simulate(replace(s, force=force[:2]))
+    assert np.abs(whole.p[:, 2] - flat.p[:, 2]).max() > 1e-6
+    with hc.Simulation(replace(s, force=(0.0, 0.0))) as sim:
+        sim.step(force=force)
+        shot = sim.snapshot()
+        sim.advance(5, force=(9.0, 9.0, 9.0))
+        sim.restore(shot)
+        while sim.outcome is None:
+            sim.step()
+        for name in ("p", "v", "q", "tau", "fh"):
+            np.testing.assert_array_equal(getattr(sim.record(), name), getattr(whole, name), name)
+    with hc.SimulationBatch([s, s]) as sims:
+        sims.advance(10, force=np.array([force[:2], (0.0, 0.0)]))
+        np.testing.assert_array_equal(sims.p[0], whole.p[10, :2])
+        assert sims.scenarios[1].force == (0.0, 0.0, 0.3)
+
+
+@pytest.mark.parametrize("force", [(1.0,), (1.0, 2.0, 3.0, 4.0), 2.0, (1.0, 2.0, "x")])
+def test_a_force_along_axes_that_the_handle_has_not_is_refused(force):
+    with pytest.raises(hc.ParameterError, match="force"), hc.Simulation(SCENES["planar"]) as sim:
+        sim.step(force=force)
+    with pytest.raises(hc.ParameterError, match="force"):
+        replace(SCENES["closed, three axes"], force=force)
+    for s in (hc.Scenario(), SCENES["planar"]):
+        with pytest.raises(hc.ParameterError, match=r"2 numbers \(x, y\), got 3"):
+            replace(s, force=(1.0, 2.0, 3.0))
+
+
 # ---- verdicts ------------------------------------------------------------------------------------
 
 
@@ -152,7 +186,6 @@ BAD = {
     "velocity": (dict(velocity=(0.1, 0.0)), "velocity", "must be left out"),
     "origin": (dict(origin=(0.1, 0.3)), "origin", "must be left out"),
     "limits of the servo": (dict(torque_limit=(3.0, 2.0)), "torque_limit", "must be left out"),
-    "two hands": (dict(operator=(HAND, None)), "operator", "must be one for all axes"),
     "command": (dict(command=hc.Step((0.01, 0.0), 0.1)), "command", "must be None"),
     "shaping": (dict(inertia_shaping=True), "inertia_shaping", "must be left out"),
     "groove": (

@@ -162,6 +162,14 @@ def test_a_scope_of_simulink_is_read_with_its_signs(tmp_path):
         np.testing.assert_array_equal(getattr(read, name), getattr(log, name))
 
 
+def test_columns_of_a_pair_go_on_with_it(tmp_path):
+    file = tmp_path / "rig.csv"
+    rows = [f"{1e-3 * i},{i},{2 * i},{3 * i}" for i in range(120)]
+    file.write_text("\n".join(["t [s],master [rad],slave [rad],tau_s [N.m]", *rows]))
+    commands = hc.studies.log_report(hc.Log.read(file)).commands
+    assert commands == (f"hapticclay pair --data {file}",)
+
+
 def test_a_scope_in_degrees_is_turned_into_radians(tmp_path):
     t = 1e-3 * np.arange(200.0)
     one = {"label": "p (deg) leader, follower", "values": np.outer(t, [90.0, 180.0])}

@@ -47,7 +47,10 @@ def test_signals_page_runs(tmp_path):
     assert "at " in out
 
 
-PRINTING = "materials.md", "fit.md", "logs.md", "pair_log.md", "pair.md", "replay.md"
+FORMATS = ("text", "parquet", "matlab", "hdf5", "numpy", "excel", "ros")
+PRINTING = ("materials.md", "fit.md", "logs.md", "pair_log.md", "pair.md", "replay.md") + tuple(
+    f"logs/{name}.md" for name in FORMATS
+)
 
 
 @pytest.mark.parametrize("page", PRINTING)
