@@ -108,8 +108,7 @@ def run_scene(pair: Pair, i: int, arm: MjcfArm | Arm, **more: Any) -> Scenario:
     Raises:
         ParameterError: it cannot run with what it touches.
     """
-    touched = pair.touched[i]
-    arm, clay, operator = _carried(arm, pair.operators[i], touched)
+    arm, clay, operator = _carried(pair, i, arm)
     if clay is not None and clay.yields and _has_friction(arm):
         bound = "must be 0 where clay yields, in runs"
         raise ParameterError(f"{('leader', 'follower')[i]}.friction", arm.friction, bound)  # type: ignore[union-attr]
@@ -164,35 +163,40 @@ def _has_friction(arm: Any) -> bool:
     return isinstance(arm, MjcfArm) and any(arm.friction)  # type: ignore[arg-type]
 
 
-def _carried(arm: Any, hand: Operator | None, touched: Any) -> tuple[Any, Clay | None, Any]:
+def _carried(pair: Pair, i: int, arm: Any) -> tuple[Any, Clay | None, Any]:
     """The arm, its plane as what it touches needs it, the clay, and what moves along with it."""
+    hand, touched = pair.operators[i], pair.touched[i]
     if not isinstance(touched, Contact):
         return arm, touched, hand
-    if touched.axis is not None:
-        arm = _facing(arm, touched.axis)
-    if touched.unilateral:
-        wall = touched.wall
-        if isinstance(arm, Arm) and touched.axis == "y":
-            wall = Clay(wall.y, replace(wall.x, along="y"))
-        return arm, wall, hand
-    return arm, None, _moved_along(arm, hand, touched)
+    at = 0 if touched.axis is None else _axes(arm).index(touched.axis)
+    if at > 1 or (at == 1 and len(_axes(arm)) > 2 and not touched.unilateral):
+        arm, at = _facing(arm, touched.axis, i), 0
+    if not touched.unilateral:
+        return arm, None, _moved_along(hand, touched, at)
+    wall = touched.wall
+    return arm, wall if at == 0 else Clay(wall.y, replace(wall.x, along="y")), hand
 
 
-def _facing(arm: Any, axis: str) -> Any:
+def _axes(arm: Any) -> str:
+    """Axes of the world along which forces of a run act, in their order."""
+    return arm.axes if isinstance(arm, MjcfArm) else "xy"
+
+
+def _facing(arm: MjcfArm, axis: Any, i: int) -> MjcfArm:
     """An arm from a file with an axis of the world as the first of its plane."""
-    if not isinstance(arm, MjcfArm) or arm.axes[0] == axis:
-        return arm
-    other = next(c for c in arm.axes if c != axis)
-    return replace(arm, plane=axis + other)
+    if i == 0:
+        bound = f"must be {arm.axes[0]} in runs, where the muscle acts in the plane {arm.axes[:2]}"
+        raise ParameterError("contact.axis", axis, bound)
+    return replace(arm, plane=axis + next(c for c in arm.axes if c != axis))
 
 
-def _moved_along(arm: Any, hand: Operator | None, contact: Contact) -> Any:
+def _moved_along(hand: Operator | None, contact: Contact, at: int) -> Any:
     """The hand and an object that the handle never leaves, as one, or one for each axis."""
     own = hand or NO_HAND
     both = Operator(own.mass + contact.mass, own.damper + contact.B, own.spring + contact.K)
     if contact.axis is None:
         return both
-    return (hand, both) if isinstance(arm, Arm) and contact.axis == "y" else (both, hand)
+    return (hand, both) if at else (both, hand)
 
 
 def _acting(given: Hardware | None, arm: MjcfArm | Arm) -> Hardware | None:
