@@ -4,6 +4,11 @@ PYTHON ?= python3
 BIN := .venv/bin
 unexport PYTHONDONTWRITEBYTECODE  # the tests start hundreds of processes, which would compile each module anew
 
+# pip would compile each module of each package; Python compiles those that it imports, when it does
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+# what an extra needs, and the package: an installation of the package itself would build the kernel again
+NEEDS := $(BIN)/python -c 'import sys, tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; print(*p["dependencies"], *p["optional-dependencies"][sys.argv[1]], sep="\n")'
+
 SOURCES := setup.py $(wildcard hapticclay/formulas/*.p* hapticclay/kernel/*.p*)
 KERNEL := hapticclay/native/built.py
 
@@ -13,16 +18,17 @@ KERNEL := hapticclay/native/built.py
 .venv/run.done: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "hapticclay needs Python 3.11 or newer, this is %s" % sys.version.split()[0])'
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	$(PIP) -e .
 	@touch $@
 
 # what the installation compiled, again if its sources are newer
 $(KERNEL): $(SOURCES) | .venv/run.done
-	@[ -z "$$(find $(SOURCES) -newer $@ 2>&1)" ] || $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
+	@[ -z "$$(find $(SOURCES) -newer $@ 2>&1)" ] || $(PIP) --no-deps -e .
 	@touch $@
 
 .venv/dev.done: .venv/run.done
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	$(NEEDS) dev >.venv/dev.txt
+	$(PIP) -r .venv/dev.txt
 	@touch $@
 
 demo: $(KERNEL)  ## set up, run the constant cut, reproduce the paper, say where plots and report are
@@ -46,7 +52,8 @@ check: .venv/dev.done  ## lint, types, layers
 	$(BIN)/lint-imports --no-cache
 
 .venv/docs.done: .venv/dev.done
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
+	$(NEEDS) docs >.venv/docs.txt
+	$(PIP) -r .venv/docs.txt
 	@touch $@
 
 docs: .venv/docs.done $(KERNEL)  ## the site, examples run, warnings are errors: out/docs/index.html

@@ -90,9 +90,10 @@ def one(seed: int, log: str) -> dict[str, Any]:
     f = rng.choice(np.arange(1, round(20.0 * PERIOD)), LINES, replace=False) / PERIOD
     s = 2j * math.pi * f
     push = np.exp(1j * rng.uniform(0.0, 2.0 * math.pi, LINES))
-    waves = np.exp(np.outer(times, s))
-    force = (waves @ push).real
-    place = (waves @ (push / (truth[0] * s**2 + truth[1] * s + truth[2]))).real
+    angle = np.outer(times, s.imag)
+    waves = np.cos(angle), np.sin(angle)
+    moved = push / (truth[0] * s**2 + truth[1] * s + truth[2])
+    force, place = (waves[0] @ x.real - waves[1] @ x.imag for x in (push, moved))
     place = place + NOISE * np.std(place) * rng.standard_normal(len(place))
     data = hc.studies.Measurement.resampled(stamps, force, place)
     found = hc.studies.identify_data(data, "S", band=BAND)
@@ -149,7 +150,7 @@ def page(found: list[dict[str, Any]]) -> str:
     table = tabulate(
         rows, ["rows", "", "covered", "half", "bias"], tablefmt="github", disable_numparse=True
     )
-    machine = "\n".join(f"- {x}" for x in common.machine())
+    machine = "\n".join(f"- {x}" for x in common.foot())
     head = "# Intervals from logs whose rows are not even"
     return "\n\n".join([head, about, table, "## Machine", machine]) + "\n"
 

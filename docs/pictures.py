@@ -14,7 +14,15 @@ import matplotlib.pyplot as plt
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
-OTHERS = EXAMPLES / "studies" / "pair_log.py", EXAMPLES / "records" / "replay.py"
+OTHERS = [
+    EXAMPLES / name
+    for name in (
+        "studies/pair_log.py",
+        "records/replay.py",
+        "runs/pair_at_a_wall.py",
+        "walls/arm_as_device.py",
+    )
+]
 
 
 def main(names: list[str]) -> None:

@@ -1,12 +1,14 @@
 """The suite in parallel: who shares a worker, and what runs alone.
 
-Workers are processes of pytest-xdist. The tests of a file share a worker, and with it fixtures and
+Workers are processes of pytest-xdist, three for two cores: tests of windows, streams and child
+processes wait for much of their time. The tests of a file share a worker, and with it fixtures and
 runs; so do those of some files (TOGETHER). A test marked `perf` compares run times: while it runs,
 the other workers wait.
 """
 
 import contextlib
 import gc
+import importlib
 import os
 import signal
 from pathlib import Path
@@ -17,6 +19,7 @@ from hypothesis import Phase, settings
 os.environ.setdefault("MPLBACKEND", "agg")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: workers share the cores
 
+gc.set_threshold(20_000, 20, 20)  # modules and figures are many objects and little garbage
 from tests.hunt import EXAMPLES, HUNTS, MORE  # noqa: E402
 
 try:
@@ -52,6 +55,28 @@ TOGETHER = {  # files that share a dear fixture, or the processor's time for a s
 }
 # folders with long files have the first turns, lest one be the last
 LONG = ("system", "views", "live", "kernel", "studies")
+
+
+def pytest_xdist_auto_num_workers():
+    """How many workers `-n logical` starts."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return 3 * cores // 2
+
+
+def pytest_collection(session):
+    """Imports this worker's share of the files, before each worker imports them all.
+
+    pytest rewrites the assertions of a file when it imports it, and keeps what it made for the next
+    one, which takes twenty times as long as to import that. A file that fails is told of later.
+    """
+    number = os.environ.get("PYTEST_XDIST_WORKER", "").removeprefix("gw")
+    if not number or [Path(x).resolve() for x in session.config.args] != [HERE]:
+        return
+    count = int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
+    for file in sorted(HERE.rglob("test_*.py"))[int(number) :: count]:
+        name = ".".join(file.relative_to(HERE.parent).with_suffix("").parts)
+        with contextlib.suppress(Exception, pytest.skip.Exception):
+            importlib.import_module(name)
 
 
 def folder_turn(item):

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from ..results import Result
     from ..scene.pair import Pair
 
-OF_THEORY = ("delay", "kind", "Ts", "map", "compare", "cells", "feel", "run", "film")
+OF_PAIR = ("map", "compare", "cells", "feel", "run", "film")
+OF_THEORY = ("delay", "kind", "Ts", "view", *OF_PAIR)
 OF_LOGS = ("columns", "band", "level", "units", "counts", "table", "where")
 
 
@@ -49,6 +50,10 @@ class PairCommand:
             by default a push of 1 N for 50 ms.
         film: Film of that run, of at least 8 s, in which small motion is magnified: .mp4, .webp or
             .gif.
+        view: Show the pair in a browser, with the mouse as the leader's hand and sliders for delay
+            and gains, until Ctrl-C; the record is then written.
+        host: Address of that page. Any address but that of this machine needs a token.
+        port: Port of that page; 0 for a free one.
         data: Log of one axis, in place of a file of the pair, in any format that is read, or a
             scope of Simulink: time [s], both positions [rad], torques of both motors and the force
             on the follower [N.m].
@@ -71,6 +76,9 @@ class PairCommand:
     feel: Literal["x", "y", "z"] | None = None
     run: Annotated[float | None, Bound(0.0, 1e4, "s", above=True)] = None
     film: Path | None = None
+    view: bool = False
+    host: str = "127.0.0.1"
+    port: int = 8080
     data: Path | None = None
     columns: tuple[str, ...] = ()
     band: Annotated[float, Bound(0.1, 1e5, "Hz")] = 80.0
@@ -83,7 +91,9 @@ class PairCommand:
         Unused(("data",), "is in place of a file of the pair: give one of the two", ("file",)),
         Unused(OF_THEORY, "is for a file of the pair, not for a log", ("data",)),
         Unused(OF_LOGS, "is for a log: give --data", (), ("data",)),
+        Unused(OF_PAIR, "is left out where the pair is shown: leave out --view", ("view",)),
         Unused(("film",), "shows a run: give --run", (), ("run",)),
+        Unused(("host", "port"), "is of the page: give --view too", (), ("view",)),
         Unused(("cells",), "is for a map: give --map delay-gain", (), ("map",)),
     )
 
@@ -96,6 +106,8 @@ class PairCommand:
         pair = self._pair(self.file)
         out = self.out or Path("out", "pair", self.file.stem)
         writable(out)
+        if self.view:
+            return self._viewed(pair, out)
         if self.film is not None:
             from ..views.film import ready
 
@@ -106,6 +118,17 @@ class PairCommand:
             console.deliver(found, out, self.figures)
         if self.film is not None:
             self._filmed(answers, self.film)
+        return 0
+
+    def _viewed(self, pair: Pair, out: Path) -> int:
+        """Shows the pair until Ctrl-C, then writes the record."""
+        from .view import show_pair
+
+        session = show_pair(pair, self.host, self.port)
+        if not session.recorded:
+            print("nothing was recorded")
+            return 0
+        console.deliver(session.record(), out, self.figures)
         return 0
 
     def _filmed(self, answers: Sequence[Result], file: Path) -> None:

@@ -19,9 +19,12 @@ from .run import deliver_record
 from .unused import FIGURE_WORDS, Unused
 
 if TYPE_CHECKING:
+    from ..live.pair_session import PairSession
     from ..live.replay import Replay
     from ..live.session import Session
+    from ..scene.pair import Pair
     from ..simulation.record import Record
+    from ..views.live_page import LivePage
 
 
 HAND, SERVER = ("device",), ("device-server",)
@@ -107,7 +110,9 @@ class ViewCommand:
         """Plays a session until its window or page is closed."""
         with console.ctrl_c() as stop, streaming(session, self.stream):
             if self.web:
-                _serve_page(session, self.host, self.port, stop.is_set)
+                from ..views.page import Page
+
+                serve_page(Page(session, self.host, self.port), self.host, stop.is_set)
             else:
                 from ..views.window import Window
 
@@ -144,11 +149,10 @@ def replay(record: Record, tool: Tool, stream: str | None = None) -> None:
         Window(play).show(stop.is_set)
 
 
-def _serve_page(session: Session, host: str, port: int, until: Callable[[], bool]) -> None:
+def serve_page(page: LivePage, host: str, until: Callable[[], bool]) -> None:
+    """Serves a page until it is to end, and says where it is."""
     from ..ports.guard import LOCAL
-    from ..views.page import Page
 
-    page = Page(session, host, port)
     if host not in LOCAL:
         print(
             f"warning: other machines can reach {host}, unencrypted; only this address grants "
@@ -157,3 +161,14 @@ def _serve_page(session: Session, host: str, port: int, until: Callable[[], bool
         )
     print(f"open {page.url} in a browser; Ctrl-C ends the session", flush=True)
     page.serve(until)
+
+
+def show_pair(pair: Pair, host: str = "127.0.0.1", port: int = 8080) -> PairSession:
+    """Serves the page of a pair until Ctrl-C, and returns its session."""
+    from ..live.pair_session import PairSession
+    from ..views.pair_page import PairPage
+
+    session = PairSession(pair)
+    with console.ctrl_c() as stop:
+        serve_page(PairPage(session, host, port), host, stop.is_set)
+    return session

@@ -53,6 +53,9 @@ def read_settings(path: str | os.PathLike[str], name: str = "scenario") -> dict[
             fault = f"byte {error.start} is not UTF-8"
         bound = f"must be {kind}: {fault}"
         raise ParameterError(name, str(path), bound) from None
+    if name == "scenario" and isinstance(data.get("leader"), Mapping):
+        bound = "must be a scenario; a leader and a follower are for hapticclay pair"
+        raise ParameterError(name, str(path), bound)
     data = with_present_names(data)
     arm = data.get("arm")
     if isinstance(arm, Mapping) and isinstance(arm.get("file"), str):

@@ -19,12 +19,11 @@ from ..scene import pair as pairs
 from ..scene.pair import Pair
 from ..theory.architectures import ARCHITECTURES
 from . import stepwise
-from .pair_arms import run_arm, run_scene
+from .pair_arms import MOST_PARTS, least_parts, run_arm, run_scene
 from .pair_host import Host
 from .pair_record import PairRecord
 from .stepwise import Simulation
 
-MOST_PARTS = 40  # engine steps of a control sample that are tried
 WHOLE = 1e-6  # of an engine step that a delay may be off
 ARRIVE, ACT = 0, 1  # order of events at the same step
 
@@ -107,8 +106,10 @@ class PairRun:
             self._send(i, (self.step, message, self.hosts[i].port.into))
         row = [self.t]
         row += [x.q for x in states] + [host.torque for host in self.hosts]
+        ends = (states[0].fh, self.hosts[1].pressed)
+        forces = [x[host.places.shown] for x, host in zip(ends, self.hosts, strict=True)]
         ports = [host.port.taken for host in self.hosts]
-        self.newest = [*row, states[0].fh, -states[1].fh, self.energy, ports]
+        self.newest = [*row, *forces, self.energy, ports]
         if self.step // self.parts % self.every == 0:
             self.rows.append(self.newest)
 
@@ -176,10 +177,10 @@ def parts_of(pair: Pair) -> int:
     """Engine steps of a control sample: the fewest of which all delays are whole multiples.
 
     Raises:
-        ParameterError: there are none up to 40.
+        ParameterError: there are none up to 40, or clay is too stiff.
     """
-    jitter = pair.link.jitter > 0.0
-    for parts in range(8 if jitter else 2, MOST_PARTS + 1):
+    least = max(8 if pair.link.jitter > 0.0 else 2, least_parts(pair))
+    for parts in range(least, MOST_PARTS + 1):
         late = [x * parts / pair.Ts for x in (*pair.link.delays, pair.delay)]
         if all(abs(x - round(x)) <= WHOLE * max(1.0, x) for x in late):
             return parts

@@ -427,6 +427,18 @@ def response(
     return a * s2 + b * s + c * one if what == "Th" else a / (s2 + b * s + c)
 
 
+def _slopes(
+    what: str, coefficients: np.ndarray, frequency: np.ndarray, dt: float | None
+) -> np.ndarray:
+    """Derivatives of `response` by the coefficients, (3, n)."""
+    s2, s, one = _derivatives(frequency, dt)
+    if what == "Th":
+        return np.stack((s2, s, one))
+    a, b, c = coefficients
+    size = 1.0 / (s2 + b * s + c)
+    return np.stack((size, -a * s * size**2, -a * size**2))
+
+
 def _derivatives(
     frequency: np.ndarray, dt: float | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -447,17 +459,15 @@ def estimate_response(signals: np.ndarray, n: int, bins: np.ndarray) -> Estimate
     The reference has no noise, so S_ry/S_ru is unbiased even with noise on the input and in a
     closed loop (Pintelon, Schoukens 2012, sec. 2.6.4). Windows of n samples, a period, do not leak.
     """
-    from scipy.signal import csd
-
-    r, u, y = np.moveaxis(signals, 1, 0)
-    single = len(r) == 1
+    windows = signals[..., : signals.shape[-1] // n * n]
+    windows = windows.reshape(*signals.shape[:2], -1, n)
+    single = len(windows) == 1
     if single:  # the scatter is that over its periods
-        r, u, y = (x.reshape(-1, n) for x in (r, u, y))
-
-    keep: Any = False
+        windows = np.swapaxes(windows, 0, 2)
+    r, u, y = np.moveaxis(np.fft.rfft(windows)[..., bins], 1, 0)
 
     def spectrum(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return csd(a, b, window="boxcar", nperseg=n, noverlap=0, detrend=keep)[1][:, bins]
+        return (a.conj() * b).mean(axis=1)
 
     ru, ry = spectrum(r, u), spectrum(r, y)
     H = ry.mean(axis=0) / ru.mean(axis=0)
@@ -528,7 +538,12 @@ def fit(
     def misfit(x: np.ndarray) -> np.ndarray:
         return real_and_imaginary((H - response(what, x * start, frequency, dt)) / sigma)
 
-    found = least_squares(misfit, np.ones(3), method="lm", xtol=1e-14, ftol=1e-14)
+    def slope(x: np.ndarray) -> np.ndarray:
+        columns = _slopes(what, x * start, frequency, dt) * start[:, None]
+        return -real_and_imaginary(columns / sigma).T
+
+    derivative: Any = slope
+    found = least_squares(misfit, np.ones(3), derivative, method="lm", xtol=1e-14, ftol=1e-14)
     if errors is None:
         freedom = 2 * len(H) - 3
         variance = np.diag(np.linalg.inv(found.jac.T @ found.jac)) * 2.0 * found.cost / freedom

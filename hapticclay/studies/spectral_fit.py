@@ -243,7 +243,6 @@ def _band(what: str, band: object, dt: float, n: int) -> tuple[float, float]:
 def _period(u: np.ndarray, high: float) -> int:
     """Samples per period of u, if it has at least three; else 0. `high`: in lines of a sample."""
     from scipy.fft import irfft, next_fast_len, rfft
-    from scipy.signal import find_peaks
 
     n = len(u)
     x = (u - u.mean()) / np.ptp(u)
@@ -253,7 +252,8 @@ def _period(u: np.ndarray, high: float) -> int:
     both = np.sqrt(power[n - lag] * (power[n] - power[lag]))  # of u before and after
     power_of_lines = np.abs(np.asarray(rfft(x, size))) ** 2
     share = np.asarray(irfft(power_of_lines, size))[: len(lag)] / np.maximum(both, 1e-9 * power[n])
-    for peak in find_peaks(share, height=REPEATED)[0][:20].tolist():
+    peaks = (share[1:-1] > share[:-2]) & (share[1:-1] > share[2:]) & (share[1:-1] >= REPEATED)
+    for peak in (1 + np.flatnonzero(peaks)[:20]).tolist():
         near = [k for k in (peak - 1, peak, peak + 1) if k <= n // 3]
         left, period = min((_between_lines(x, k, high), k) for k in near)
         if left <= PERIODIC:

@@ -53,18 +53,21 @@ class Motion:
         sliding: np.ndarray | None = None,
         sign: np.ndarray | None = None,
     ):
-        places, velocities, first = [], [], []
-        self.size = 0  # of the coefficients
-        for stretch in stretches:
-            P, V, at = _basis(stretch, spacing)
-            places.append(P)
-            velocities.append(V)
-            first.append(at + self.size)
-            self.size += int(at[-1]) + DEGREE + 1
-        self._first, self._place = np.concatenate(first), np.concatenate(places)
+        knots = [_knots(x, spacing) for x in stretches]
+        each = [len(x) - DEGREE - 1 for x in knots]
+        self.size = sum(each)  # of the coefficients
+        begin = np.cumsum([0, *map(len, knots[:-1])])
+        within = [
+            np.clip(np.searchsorted(u, x.t, "right") - 1, DEGREE, n - 1)  # an interval of knots
+            for u, x, n in zip(knots, stretches, each, strict=True)
+        ]
+        at = np.concatenate([i + low for i, low in zip(within, begin, strict=True)])
+        ahead = np.repeat(np.cumsum([0, *each[:-1]]) - begin, [len(x) for x in within])
+        self._first = at + ahead - DEGREE
+        times = np.concatenate([x.t for x in stretches])
+        self._place, velocity = _basis(times, np.concatenate(knots), at)
         self.counted = np.concatenate([x.counted for x in stretches])
         self._place[~self.counted] = 0.0  # samples that do not count have position 0
-        velocity = np.concatenate(velocities)
         chosen = np.arange(len(velocity)) if sliding is None else sliding
         self._velocity, self._near = velocity[chosen], self._first[chosen]
         if sign is not None:
@@ -132,30 +135,35 @@ def _solved(banded: np.ndarray, right: np.ndarray) -> np.ndarray:
     return solveh_banded(banded, right, lower=True, check_finite=False)
 
 
-def _basis(stretch: Stretch, spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rows of positions and of velocities, (n, DEGREE + 1), and the first coefficient of each."""
-    from scipy.interpolate import BSpline
-
+def _knots(stretch: Stretch, spacing: float) -> np.ndarray:
+    """Knots of a stretch [s]: at a bend as many as let the acceleration jump."""
     k, t, counted = DEGREE, stretch.t, stretch.t[stretch.counted]
     ends = [float(t[0]), *stretch.bends, float(t[-1])]
     knots = [np.full(k + 1, t[0])]
     for i, (a, b) in enumerate(zip(ends, ends[1:], strict=False)):
         within = int(np.searchsorted(counted, b) - np.searchsorted(counted, a))
         most = max(1, within // LEAST_PER_KNOT)
-        inner = np.linspace(a, b, int(np.clip(round((b - a) / spacing), 1, most)) + 1)
+        inner = np.linspace(a, b, min(max(round((b - a) / spacing), 1), most) + 1)
         knots += [inner[1:-1], np.full(k + 1 if i == len(ends) - 2 else k - 1, b)]
-    knots = np.concatenate(knots)
-    count = len(knots) - k - 1
-    first = np.clip(np.searchsorted(knots, t, "right") - 1, k, count - 1) - k
-    P = BSpline.design_matrix(t, knots, k).data.reshape(-1, k + 1)
-    D = BSpline.design_matrix(t, knots[1:-1], k - 1).data.reshape(-1, k)
-    scale = k / (knots[k + 1 : -1] - knots[1 : -k - 1])  # of each difference of coefficients
-    V = np.zeros_like(P)
-    for r in range(k):
-        part = D[:, r] * scale[first + r]
-        V[:, r + 1] += part
-        V[:, r] -= part
-    return P, V, first
+    return np.concatenate(knots)
+
+
+def _basis(t: np.ndarray, knots: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of positions and of velocities, (n, DEGREE + 1), of times in intervals `at` of knots.
+
+    By the recurrence of de Boor (1972) and Cox: a spline of degree d is a mean of two of d - 1.
+    """
+    near = knots[at[:, None] + np.arange(1 - DEGREE, DEGREE + 1)].T  # DEGREE on each side
+    rows, share = [np.ones(len(t))], []
+    for d in range(1, DEGREE + 1):
+        low, high = near[DEGREE - d : DEGREE], near[DEGREE : DEGREE + d]
+        share = [x / (b - a) for x, a, b in zip(rows, low, high, strict=True)]
+        ahead = [x * (b - t) for x, b in zip(share, high, strict=True)]
+        behind = [x * (t - a) for x, a in zip(share, low, strict=True)]
+        rows = [a + b for a, b in zip([*ahead, 0.0], [0.0, *behind], strict=True)]
+    slopes = [0.0, *(DEGREE * x for x in share), 0.0]
+    velocity = [a - b for a, b in zip(slopes, slopes[1:], strict=False)]
+    return np.stack(rows, axis=1), np.stack(velocity, axis=1)
 
 
 class Series(NamedTuple):

@@ -7,6 +7,7 @@ state spaces describe one axis, or both where a pose couples them.
 from __future__ import annotations
 
 import cmath
+import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -521,6 +522,7 @@ def held_arm(
     return HeldArm(place, s * place, held[:, 0], held[:, 1], before, hold)
 
 
+@functools.lru_cache(maxsize=256)  # a search for a limit asks for those of one arm again and again
 def split_motion(
     mass: float, damper: float, spring: float, Ts: float, delay: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:

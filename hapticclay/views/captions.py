@@ -46,8 +46,8 @@ def hand_name(operator: Operator | None | tuple[Operator | None, Operator | None
 def scenario_parts(s: Scenario) -> list[str]:
     """Phrases that describe a scenario in a title."""
 
-    def pair(x: tuple[float, float]) -> str:
-        return f"({x[0]:.3g}, {x[1]:.3g})"
+    def pair(x: tuple[float, ...]) -> str:
+        return f"({', '.join(f'{part:.3g}' for part in x)})"
 
     how = f"K = {pair(s.gain)}" if s.controller is None else "own controller"
     if isinstance(s.controller, JointPD):

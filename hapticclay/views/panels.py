@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from matplotlib import rcParams
 from matplotlib.axes import Axes
+from matplotlib.cbook import is_math_text
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
-from matplotlib.textpath import TextPath
+from matplotlib.textpath import text_to_path
 from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from .captions import unit_text
@@ -77,8 +78,8 @@ def set_title(ax: Axes, *parts: str, panel: bool = False, **more: Any) -> None:
 @functools.lru_cache(maxsize=4096)  # the figures of a run share phrases
 def _width(text: str, size: float, families: tuple[str, ...]) -> float:
     """Width of a text [pt], in the first of the font families that there is."""
-    font = FontProperties(family=list(families))
-    return TextPath((0.0, 0.0), text, size=size, prop=font).get_extents().width
+    font = FontProperties(family=list(families), size=size)
+    return text_to_path.get_text_width_height_descent(text, font, is_math_text(text))[0]
 
 
 def add_legend(figure: Figure, ncols: int = 5, handles: Iterable[Any] = (), **more: Any) -> None:

@@ -129,6 +129,14 @@ def test_the_arm_rests_where_no_program_drives_it(served):
     assert acting.sensed.position[2] < -0.02 or acting.ended  # it falls
 
 
+def test_late_motors_hold_the_weight_from_the_start():
+    """Until the first torque arrives, 2.5 ms late, they hold that of the pose: a fall is 3e-5 m."""
+    scene = replace(pen(), hardware=hc.Hardware(delay=2.5e-3))
+    device = SimulatedDevice(scene, period=PERIOD)
+    device.advance(40)
+    assert device.sensed.position == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+
+
 def test_a_target_is_held_within_the_pull_of_the_hand(served):
     """Springs of hand and target: p = (k h + K t)/(k + K), so |p - t| is at most F/K."""
     target, aim = np.array((0.004, -0.006, 0.005)), (0.01, 0.01, -0.01)
@@ -247,6 +255,33 @@ def test_a_closed_chain_is_served(served):
     for _ in range(300):
         state = c.state(tick(0.4, 0.6, -0.4))
     assert xyz(state["cursor_position"]) - REST == pytest.approx((0.002, 0.003, -0.002), abs=1e-7)
+
+
+URDF = """<robot name="boom"><link name="base"/>
+<joint name="swing" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="5" velocity="9"/></joint>
+<link name="arm"><inertial><origin xyz="0.1 0 0"/><mass value="0.4"/>
+<inertia ixx="1e-4" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="tilt" type="revolute"><parent link="arm"/><child link="tip"/><origin xyz="0.2 0 0"/>
+<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="5" velocity="9"/></joint>
+<link name="tip"><inertial><origin xyz="0.05 0 0"/><mass value="0.2"/>
+<inertia ixx="1e-4" iyy="2e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
+
+
+def test_a_body_of_a_urdf_is_a_handle(served, tmp_path):
+    """The frame of the last link moves on a circle, where hand and force balance along it."""
+    (tmp_path / "boom.urdf").write_text(URDF)
+    arm = hc.MjcfArm(tmp_path / "boom.urdf", site="tip")
+    _, client = served(held_scenario(arm, 1e-3, HAND), period=PERIOD)
+    c = client()
+    for _ in range(600):
+        state = c.state(tick(y=0.6, z=1.0))
+    angle = math.radians(state["angular_position"]["a0"])
+    x, y, z = xyz(state["cursor_position"]) - REST
+    circle = 0.2 * (math.cos(angle) - 1.0), 0.2 * math.sin(angle), 0.0
+    assert (x, y, z) == pytest.approx(circle, abs=1e-12)
+    force = np.array((-HAND.spring * x, 0.6 - HAND.spring * y))
+    assert force @ (-math.sin(angle), math.cos(angle)) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_joint_that_slides_is_shown_in_metres(served):

@@ -58,7 +58,7 @@ def controllers(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def walls(tmp_path_factory):
-    return commanded(tmp_path_factory.mktemp("w"), WALLS, "--format", "pdf", "--data")
+    return commanded(tmp_path_factory.mktemp("w"), WALLS, "--format", "svg", "--data")
 
 
 def test_numbers_are_those_of_the_analysis(controllers):
@@ -151,7 +151,7 @@ def test_an_inline_picture_takes_the_colours_of_the_page():
 def test_the_command_writes_page_numbers_and_figures(walls):
     out, said, _ = walls
     names = {p.name for p in out.iterdir()}
-    assert {"compare.html", "compare.json", "zwidth.pdf", "zwidth.csv"} <= names
+    assert {"compare.html", "compare.json", "zwidth.svg", "zwidth.csv"} <= names
     data = json.loads((out / "compare.json").read_text())
     assert data["files"]["near"]["stiffness K [N/m]"] == 500.0
     assert "near" in said

@@ -47,10 +47,12 @@ FEWER = {
     "tutorials/t4_sweep": {
         "2000:7log gain.y=0.1,0.3,0.5,0.7,0.9,1.2": "2000:3log gain.y=0.1,0.5,1.2"
     },
+    "walls/arm_as_device": {"range(240)": "range(60)"},
     "walls/client": {"range(300)": "range(60)"},
     "walls/device_hand": {"(0.0, 3.0), ((0.0": "(0.0, 0.6), ((0.0", "url, 3.0,": "url, 0.6,"},
     "walls/impedance": {"measure_impedance(wall)": "measure_impedance(wall, lines=5)"},
     "walls/limits": {"5e-3, 101)": "5e-3, 11)"},
+    "walls/pair_ends": {"range(200)": "range(40)"},
     "walls/press": {
         "(20e-6, 80e-6)": "(80e-6,)",
         '"os"': '"o"',

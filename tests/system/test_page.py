@@ -267,7 +267,7 @@ def test_a_socket_is_no_way_around_the_guard(page):
 
 def test_a_viser_that_cannot_be_guarded_is_refused(monkeypatch):
     """A server that does not start through websockets' `serve` finds the port taken."""
-    monkeypatch.setattr("hapticclay.views.page._guarded", lambda *_: contextlib.nullcontext())
+    monkeypatch.setattr("hapticclay.views.live_page._guarded", lambda *_: contextlib.nullcontext())
     with pytest.raises(RuntimeError, match="cannot be guarded"):
         Page(Session(hc.constant_cut()), port=0)
 

@@ -435,7 +435,7 @@ AGAIN = {  # drawn by the function of another case, of a run or result of the sa
     *(n for n in CASES if re.match("compared walls: (spare|impedance|parts)", n)),
 }  # fmt: skip
 # in one column text has the least room
-WIDE = CASES if HUNTS else some((n for n in CASES if n not in AGAIN), 12)
+WIDE = CASES if HUNTS else some((n for n in CASES if n not in AGAIN), 8)
 PRINTED = [(n, "print") for n in CASES] + [(n, "print-wide") for n in WIDE]
 
 
@@ -465,7 +465,7 @@ def test_text_can_be_read_in_print(name, style, monkeypatch):
 
 
 # CASES are printed above
-SHOWN = [(n, "screen") for n in some(LABELLED, 8)] + [("narrow family", "print")]
+SHOWN = [(n, "screen") for n in some(LABELLED, 4)] + [("narrow family", "print")]
 
 
 @pytest.mark.parametrize("name, style", SHOWN)
