@@ -124,6 +124,22 @@ def test_three_axes_of_an_arm_are_where_its_kinematics_say():
     assert np.abs(record.follower[-1] - record.follower[0]).max() > 1e-4
 
 
+def test_two_links_in_closed_form_at_a_wall():
+    """A force along x presses the follower's tool on the wall, whose depth is force over K."""
+    law, wall = (
+        hc.JointPD((60.0,) * 2, (3.0,) * 2),
+        hc.Contact(400.0, 20.0, axis="x", unilateral=True),
+    )
+    pair = hc.Pair(hc.Arm(), hc.Arm(), law, hc.Link(), Ts=1e-3, follower_clay=wall)
+    with serve_pair(pair, period=0.01) as ends, clients(ends) as (hand, tool):
+        for _ in range(300):
+            hand.state(tick(x=2.0))
+            x = along_x(tool.state(tick()))
+        record = ends.record()
+    force = record.contact[-1, 0]
+    assert force == pytest.approx(400.0 * x, rel=0.02) and 1.0 < force < 2.05
+
+
 def test_in_real_time_both_arms_run_and_forces_are_let_go():
     with serve_pair(PAIR, clock="wall", every=5) as ends, clients(ends) as (hand, tool):
         end = time.monotonic() + 20.0
