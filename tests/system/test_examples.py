@@ -29,15 +29,23 @@ FEWER = {
     "runs/columns": {"0.8, 120)": "0.8, 30)", "200.0, 120)": "200.0, 30)"},
     "runs/energy": {"1e-3, 5e-4, 2.5e-4]": "1e-3]"},
     "runs/many_step_by_step": {"t_max=8.0": "t_max=1.0"},
+    "runs/pair_run": {"t_max=6.0": "t_max=1.5"},
     "runs/maneuver": {"stability_test(K)": "stability_test(K, t_max=5.0)"},
     "studies/fit_law": {"t_max=8.0": "t_max=4.0"},
+    "studies/identify": {"Noise())": "Noise(), realisations=3, lines=20)"},
     "studies/measured_columns": {"    t_max=30.996": "    dt=1e-3,\n    t_max=30.996"},
+    "studies/pair_log": {"arange(8000)": "arange(4000)", "[Ts / 20] * 20": "[Ts / 5] * 5"},
     "studies/stored_columns": {"0.5, 120)": "0.5, 30)", "0.7, 120)": "0.7, 30)"},
     "studies/sweep": {"1000:7log gain.y=0.1,0.2,0.4,0.8,1.6": "1000:3log gain.y=0.1,0.4,1.6"},
+    "symptoms/arm_vibrates": {"poses=20": "poses=3", "(None, 4000)": "(4000,)"},
     "symptoms/device_from_data": {"12.0, muscle": "8.0, muscle"},
     "symptoms/fast_enough": {"5000.0, 60)": "5000.0, 12)"},
+    "symptoms/pair_oscillates": {
+        "gains=12": "gains=2", "1.0, 9)": "1.0, 2)", ', ("Kp/2, 1.5 Kd", softer)': ",",
+    },  # fmt: skip
     "symptoms/sticks_and_jumps": {"dt=1e-3": "dt=2e-3"},
     "symptoms/wall_vibrates": {"scenario(0.6,": "scenario(0.3,", "t > 0.5": "t > 0.2"},
+    "theory/pair_transparency": {"samples=20": "samples=4"},
     "tutorials/t2_stability": {"3e4, 60)": "3e4, 12)", "t_max=3.0": "t_max=1.0"},
     "tutorials/t3_own_controller": {
         "t_max=3.0": "t_max=1.2",
