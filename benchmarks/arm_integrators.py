@@ -11,17 +11,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-import mujoco
 import numpy as np
 
 import hapticclay as hc
 
+from .peers.arm_mujoco import MujocoArm
+
 FILE = Path(__file__).parents[1] / "mjcf" / "arms" / "leader_7.xml"
-TS, CUTOFF, SECONDS = 2e-3, 90.0, 2.0
+TS, CUTOFF, SECONDS = 2e-3, 90.0, 4.0
 KP = np.array([240.0, 240.0, 240.0, 240.0, 24.0, 31.0, 25.0])
 KD = np.array([3.0, 3.0, 3.0, 3.0, 0.2, 0.2, 0.2])
-HALVINGS = 9
+HALVINGS = 11
 CASES = [
     *(("Euler", "mjINT_EULER", n) for n in (1, 4, 16, 64)),
     *(("implicitfast", "mjINT_IMPLICITFAST", n) for n in (1, 4, 16)),
@@ -37,25 +39,21 @@ def grows(
     late: bool,
     seconds: float = SECONDS,
 ) -> bool:
-    """Whether a run from a small deviation grows."""
-    model = mujoco.MjModel.from_xml_path(str(FILE))
-    model.dof_frictionloss[:], model.jnt_limited[:] = 0.0, 0
-    model.opt.integrator = getattr(mujoco.mjtIntegrator, integrator)
-    model.opt.timestep = TS / substeps
-    data, static = mujoco.MjData(model), mujoco.MjData(model)
-    data.qpos[:] = arm.q + 1e-7 * np.random.default_rng(0).normal(size=model.nv)
-    rate, last, sizes, held = np.zeros(model.nv), data.qpos.copy(), [], None
+    """Whether a run of MuJoCo from a small deviation grows."""
+    return run_grows(MujocoArm(FILE, integrator, TS, substeps), arm.q, Kp, late, seconds)
+
+
+def run_grows(peer: Any, home: np.ndarray, Kp: np.ndarray, late: bool, seconds: float) -> bool:
+    """Whether a run of an arm of a package from a small deviation grows under the law."""
+    peer.start(home + 1e-7 * np.random.default_rng(0).normal(size=len(home)))
+    rate, last, sizes, held = np.zeros(len(home)), peer.q, [], None
     for _ in range(round(seconds / TS)):
-        q = data.qpos.copy()
+        q = peer.q
         rate, last = (rate + CUTOFF * (q - last)) / (1.0 + CUTOFF * TS), q
-        static.qpos[:] = q
-        mujoco.mj_fwdPosition(model, static)
-        mujoco.mj_fwdVelocity(model, static)
-        torque = static.qfrc_bias - Kp * (q - arm.q) - KD * rate
-        data.qfrc_applied[:] = held if late and held is not None else torque
-        mujoco.mj_step(model, data, substeps)
+        torque = peer.weight() - Kp * (q - home) - KD * rate
+        peer.hold(held if late and held is not None else torque)
         held = torque
-        sizes.append(np.abs(data.qpos - arm.q).max())
+        sizes.append(np.abs(peer.q - home).max())
         if not sizes[-1] < 1e-2:
             return True
     return outgrows(np.array(sizes))
@@ -68,16 +66,23 @@ def outgrows(sizes: np.ndarray) -> bool:
 
 
 def limit(arm: hc.MjcfArm, integrator: str, substeps: int, late: bool, guess: float) -> float:
-    """Factor of all Kp at which runs begin to grow; inf above 8 times the guess."""
+    """Factor of all Kp at which runs of MuJoCo begin to grow; inf above 8 times the guess."""
+    return run_limit(MujocoArm(FILE, integrator, TS, substeps), arm.q, late, guess)
+
+
+def run_limit(peer: Any, home: np.ndarray, late: bool, guess: float) -> float:
+    """Factor of all Kp at which runs of an arm of a package begin to grow; inf above 8 guesses."""
     low, high = 0.5 * guess, 8.0 * guess
-    if not grows(arm, high * KP, integrator, substeps, late):
+    if not run_grows(peer, home, high * KP, late, SECONDS):
         return np.inf
-    return bisected(lambda x: grows(arm, x * KP, integrator, substeps, late), low, high)
+    return bisected(lambda x: run_grows(peer, home, x * KP, late, SECONDS), low, high)
 
 
-def bisected(is_over: Callable[[float], bool], low: float, high: float) -> float:
+def bisected(
+    is_over: Callable[[float], bool], low: float, high: float, halvings: int | None = None
+) -> float:
     """Factor between two at which runs begin to grow."""
-    for _ in range(HALVINGS):
+    for _ in range(HALVINGS if halvings is None else halvings):
         middle = math.sqrt(low * high)
         low, high = (low, middle) if is_over(middle) else (middle, high)
     return math.sqrt(low * high)

@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import platform
+import time
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ from tabulate import tabulate
 
 import hapticclay as hc
 from hapticclay import files
+
+from . import provenance
 
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 DISTRIBUTIONS = (
@@ -58,6 +61,11 @@ def machine() -> list[str]:
         f"load average {os.getloadavg()[1]:.1f} at the end; "
         "run times are those of a quiet machine only where it is low",
     ]
+
+
+def foot() -> list[str]:
+    """Return lines on which code, when, where and with what the figures of a page were made."""
+    return [f"commit `{provenance.commit()}`, {time.strftime('%Y-%m-%d')}", *machine()]
 
 
 def number(x: float | None) -> str:

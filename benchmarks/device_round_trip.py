@@ -112,7 +112,7 @@ def report(figures: dict[str, Any]) -> str:
         f"# Round trips to the simulated device, {figures['seconds']:g} s",
         tabulate(table(figures), ("", ""), "github", disable_numparse=True),
         "![Round trips](device_round_trip.png)",
-        "\n".join(f"- {x}" for x in common.machine()),
+        "\n".join(f"- {x}" for x in common.foot()),
     ]
     return "\n\n".join(lines) + "\n"
 

@@ -169,7 +169,7 @@ def page(found: list[dict[str, Any]]) -> str:
                 "\n".join(sensors),
                 tabulate(rows, head, tablefmt="github", disable_numparse=True),
                 "## Machine",
-                "\n".join(f"- {x}" for x in common.machine()),
+                "\n".join(f"- {x}" for x in common.foot()),
             ]
         )
         + "\n"

@@ -1,15 +1,16 @@
 """Environments against the floor: a bare mj_step loop in C of as many engine steps, in turns.
 
-    python -m benchmarks.gym_speed [--out DIR] [--rounds N] [--seconds N] [--processor]
+    python -m benchmarks.gym_speed [--out DIR] [--rounds N] [--seconds N] [--processor] [--docs]
 
 Ratios hold on a noisy machine, steps per second do not; where others use all cores, --processor
 counts processor time, of all threads, in place of time. Also: Gymnasium's own four numbers
 (gymnasium.utils.performance), the time of a reset, and the memory of 1,000 copies. Writes
-gym_speed.json.
+gym_speed.json. --docs writes it into docs/, too, and its table into docs/gym.md.
 """
 
 from __future__ import annotations
 
+import json
 import statistics
 import sys
 import time
@@ -23,10 +24,12 @@ import numpy as np
 from gymnasium.utils import performance
 
 import hapticclay as hc
+from hapticclay import files
 from hapticclay.gym import registry
 
-from . import common
+from . import common, gym_baselines, provenance
 
+PUBLISHED = gym_baselines.DOCS / "gym_speed.json"
 COPIES, MANY = 64, 1000
 Clock = Callable[[], float]
 PERIODS = 20  # of an environment between two looks at the clock
@@ -121,6 +124,44 @@ def measured(
     return row
 
 
+def rounded(x: float) -> str:
+    """A number of periods to two digits."""
+    return f"{float(f'{x:.2g}'):,.0f}"
+
+
+def table(data: dict[str, Any]) -> str:
+    """The table of docs/gym.md, and what it was measured on."""
+    clock = "processor time" if data["processor"] else "time"
+    copies = data["environments"][0]["vector"]["copies"]
+    kept = data["environments"][0]["copies_kept"]
+    head = ("environment", "single, periods per second", "of the bare steps")
+    head += (f"{copies} copies, periods per second", "of the bare steps on all cores", "reset")
+    lines = [
+        f"Measured on {data['made']['date']} at commit {data['made']['commit']}: "
+        f"{data['machine'][0]}, Gymnasium {data['gymnasium']}; medians of {data['rounds']} turns, "
+        f"{clock}; load average {data['made']['load'][0]} before.",
+        "",
+        f"| {' | '.join(head)} | {kept:,} copies |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row in data["environments"]:
+        one, many = row["single"], row["vector"]
+        name = row["id"].removeprefix("hapticclay/").partition("-")[0]
+        lines.append(
+            f"| {name} | {rounded(one['steps_per_second'])} | {one['share_of_floor']:.2f} | "
+            f"{rounded(many['steps_per_second'])} | {many['share_of_floor']:.2f} | "
+            f"{row['reset_ms']:.1f} ms | {row['memory_MB']:.0f} MB |"
+        )
+    return "\n".join(lines)
+
+
+def publish(data: dict[str, Any]) -> None:
+    """Write the data into docs/, and the table into docs/gym.md."""
+    with files.atomic(PUBLISHED) as f:
+        f.write((json.dumps(data, indent=1) + "\n").encode())
+    gym_baselines.put(gym_baselines.DOCS / "gym.md", "speed", table(data))
+
+
 def main(argv: list[str] | None = None) -> dict[str, Any]:
     """Measure, print and write."""
     parser = common.parser(__doc__)
@@ -128,10 +169,12 @@ def main(argv: list[str] | None = None) -> dict[str, Any]:
     parser.add_argument("--seconds", type=float, default=5.0)
     parser.add_argument("--copies", type=int, default=MANY)
     parser.add_argument("--processor", action="store_true")
+    parser.add_argument("--docs", action="store_true")
     parser.add_argument("--engine", default="native")
     parser.add_argument("--ids", nargs="*", default=list(registry.IDS))
     a = parser.parse_args(argv)
     rows, clock = [], time.process_time if a.processor else time.perf_counter
+    watch = provenance.Stopwatch()
     for id in a.ids:
         row = measured(id, a.engine, a.rounds, a.seconds, a.copies, clock)
         rows.append(row)
@@ -144,7 +187,12 @@ def main(argv: list[str] | None = None) -> dict[str, Any]:
             f"{row['copies_kept']} copies {row['memory_MB']:.0f} MB",
             flush=True,
         )
-    return common.write(a.out, "gym_speed", {"environments": rows})
+    found = {"processor": a.processor, "rounds": a.rounds, "gymnasium": gymnasium.__version__}
+    found |= {"environments": rows, "made": watch.stamp()}
+    data = common.write(a.out, "gym_speed", found)
+    if a.docs:
+        publish(data)
+    return data
 
 
 if __name__ == "__main__":

@@ -132,7 +132,7 @@ def page(found: list[dict[str, Any]]) -> str:
                     disable_numparse=True,
                 ),
                 "## Machine",
-                "\n".join(f"- {x}" for x in common.machine()),
+                "\n".join(f"- {x}" for x in common.foot()),
             ]
         )
         + "\n"

@@ -106,7 +106,7 @@ def page(rows: list[dict[str, Any]], steps: tuple[float, ...] = STEPS) -> str:
                 f"of its amplitude and {100.0 * worst[1]:.2g} % of its frequency.",
                 tabulate(cells, head, tablefmt="github", disable_numparse=True),
                 "## Machine",
-                "\n".join(f"- {x}" for x in common.machine()),
+                "\n".join(f"- {x}" for x in common.foot()),
             ]
         )
         + "\n"

@@ -150,7 +150,7 @@ def page(found: list[dict[str, Any]]) -> str:
     table = tabulate(
         rows, ["rows", "", "covered", "half", "bias"], tablefmt="github", disable_numparse=True
     )
-    machine = "\n".join(f"- {x}" for x in common.machine())
+    machine = "\n".join(f"- {x}" for x in common.foot())
     head = "# Intervals from logs whose rows are not even"
     return "\n\n".join([head, about, table, "## Machine", machine]) + "\n"
 

@@ -23,6 +23,7 @@ from . import (
     diagrams,
     extremes,
     hits,
+    pairs,
     parts,
     ranking,
     sampled_loop,
@@ -42,6 +43,7 @@ PARTS: dict[str, Any] = {
     "stiffness": stiffness,
     "extremes": extremes,
     "arms": arms,
+    "pairs": pairs,
     "throughput": throughput,
     "parts": parts,
     "scaling": scaling,
@@ -54,6 +56,7 @@ TITLES = {
     "stiffness": "Stiff clay",
     "extremes": "Stiff and extreme scenes",
     "arms": "Gain limits of arms in runs",
+    "pairs": "Leader and follower: gain and delay in runs",
     "throughput": "Throughput",
     "parts": "What each part costs",
     "scaling": "Scaling of a sweep",
@@ -62,7 +65,7 @@ LIMITATIONS = (
     "Run times are those of one machine, named below, with other programs on it: compare numbers "
     "within a table, not with those of another machine. Run times leave out imports, and the "
     "compilation of SciPy's right-hand sides.",
-    "All jobs but the gain limits of arms are of the planar arm in clay. Contact geometry "
+    "All jobs but the limits of arms and pairs are of the planar arm in clay. Contact geometry "
     "or a larger model was not measured.",
     "The programs for the other packages are ours, written from the same equations "
     "(`benchmarks/peers`). Their authors might tune them better; a corrected program is welcome.",

@@ -192,7 +192,7 @@ def main(
     models = {name: make() for name, make in ENGINE.items()}
     found = {
         "engine": compare(list(models), lambda name: step(models[name], steps), rounds),
-        "loop": compare(list(LOOP), lambda name: run(name, steps), rounds),
+        "loop": compare(list(LOOP), lambda name: run(name, steps // 2), rounds),
     }
     if native.is_there():
         common.warm()

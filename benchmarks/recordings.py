@@ -347,7 +347,7 @@ def page(rows: list[dict[str, Any]], missing: int) -> str:
         common.table([list(x) for x in NOT_HAD], ["recording", "licence", "why"]),
         "## Data and machine",
         "All numbers: [recordings.json](recordings.json).",
-        "\n".join(f"- {x}" for x in common.machine()[:2]),
+        "\n".join(f"- {x}" for x in common.foot()[:3]),
     ]
     if missing:
         text.insert(4, f"{missing} logs were not at hand.")

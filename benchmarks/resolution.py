@@ -117,7 +117,7 @@ def page(rows: list[dict[str, Any]]) -> str:
                 "mean fe over mean v. Made by `benchmarks/resolution.py`.",
                 tabulate(cells, head, tablefmt="github", disable_numparse=True),
                 "## Machine",
-                "\n".join(f"- {x}" for x in common.machine()),
+                "\n".join(f"- {x}" for x in common.foot()),
             ]
         )
         + "\n"

@@ -141,7 +141,7 @@ def report(rows: list[dict[str, Any]], speed: dict[str, Any]) -> str:
         + tabulate(body, head, "github")
         + f"\n\n{speed['runs']} runs of the first case: {speed['wall [s]']:.0f} s, "
         f"{each:.2f} ms of one processor each.\n\n## Machine\n\n"
-        + "\n".join(f"- {x}" for x in common.machine())
+        + "\n".join(f"- {x}" for x in common.foot())
         + "\n"
     )
 

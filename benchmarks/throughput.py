@@ -2,9 +2,9 @@
 
     python -m benchmarks.throughput [--out DIR] [--rounds N] [--steps N] [--full]
 
-Ratios hold on a noisy machine, microseconds do not. Short runs, of 100 steps, are 1e6, and 1e4
-where it is quick. --full takes minutes more: 16384 runs in a batch, 100 000 runs for linearity, and
-a stability map. Writes throughput.json; benchmarks.pages
+Ratios hold on a noisy machine, microseconds do not. Short runs, of 100 steps, are 1e5 from a
+generator, and up to 1e6 as columns; 1e4 where it is quick. --full takes minutes more: 16384 runs in
+a batch, 100 000 runs for linearity, and a stability map. Writes throughput.json; benchmarks.pages
 makes the page.
 """
 
@@ -31,7 +31,9 @@ from hapticclay.simulation import batch
 from . import common
 
 LONG = 5555  # steps of 2 s, as the runs of the map
-SHORT, SHORT_QUICK, SHORT_STEPS = 1_000_000, 10_000, 100  # runs, steps of each
+SHORT, SHORT_QUICK, SHORT_STEPS = 100_000, 10_000, 100  # runs, steps of each
+COLUMNS = {"continuous": 6, "sampled": 5}  # powers of ten of the runs of columns
+FEW, TURNS = 10_000, 5  # runs of columns up to which they are made so often
 OFTEN = 5  # compiled runs to one in Python, which takes as long
 SCENES = {
     "constant cut": hc.constant_cut(start=(0.06, 0.0)),
@@ -325,22 +327,31 @@ def column_runs(sizes: list[int], control: str) -> list[dict[str, Any]]:
     rows = []
     for n in sizes:
         base, columns = drawn_columns(n, control)
-        before = floor(base, 20_000, time.process_time)
-        (wall, spent), found = timed(hc.simulate_columns, base, columns)
-        steps = int(found["steps"].sum())  # late torques add some between the samples
-        bare = 0.5 * (before + floor(base, 20_000, time.process_time)) * steps
+        made = [column_run(base, columns, n) for _ in range(TURNS if n <= FEW else 1)]
+        wall, spent, bare = np.median(made, axis=0).tolist()
         rows.append(
             {
                 "runs": n,
                 "control": control,
-                "runs_a_second": n / float(wall),
-                "over_floor_cpu": float(spent) / bare,
+                "runs_a_second": n / wall,
+                "over_floor_cpu": statistics.median(x[1] / x[2] for x in made),
                 "floor_us_a_run": 1e6 * bare / n,
-                "us_a_run": 1e6 * float(spent) / n,
+                "us_a_run": 1e6 * spent / n,
                 "peak_MiB": memory(),
             }
         )
     return rows
+
+
+def column_run(
+    base: hc.Scenario, columns: dict[str, np.ndarray], n: int
+) -> tuple[float, float, float]:
+    """Time and processor time of runs of columns, and that of their engine steps alone [s]."""
+    least = max(20_000, min(200_000, n * SHORT_STEPS // 50))  # steps of the floor
+    before = floor(base, least, time.process_time)
+    (wall, spent), found = timed(hc.simulate_columns, base, columns)
+    after = floor(base, least, time.process_time)
+    return float(wall), float(spent), 0.5 * (before + after) * int(found["steps"].sum())
 
 
 def draw(rows: list[dict[str, Any]], out: Path) -> None:
@@ -413,6 +424,8 @@ def sections(data: dict[str, Any]) -> list[str]:
                 for r in data[name]
             ]
             out += [title, common.table(cells)]
+            if name == "columns" and "column_turns" in data:
+                out.append(f"Up to {FEW:,} runs: medians of {data['column_turns']} calls.")
     return out
 
 
@@ -454,9 +467,11 @@ def main(
         sizes = [(64, 1000)] if quick else [(64, 1000), (1024, 1000), (64, LONG), (1024, LONG)]
         data["batch"] = batches(sizes + full * [(16384, LONG)], 1 if quick else min(rounds, 5))
         runs = SHORT_QUICK if quick else SHORT
-        data["short"] = [short_runs(runs, "continuous"), short_runs(runs // 10, "sampled")]
-        sizes = [10**k for k in range(2, 5 if quick else 7)]
-        data["columns"] = [row for x in ("continuous", "sampled") for row in column_runs(sizes, x)]
+        data["short"] = [short_runs(runs, "continuous"), short_runs(runs // 4, "sampled")]
+        powers = {x: 4 if quick else most for x, most in COLUMNS.items()}
+        sizes = {x: [10**k for k in range(2, most + 1)] for x, most in powers.items()}
+        data["columns"] = [row for x, some in sizes.items() for row in column_runs(some, x)]
+        data["column_turns"] = TURNS
         out.mkdir(parents=True, exist_ok=True)
         draw(data["columns"], out)
     if compiled and full:

@@ -8,7 +8,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-LONG = 5.0  # [s] of run time from which a run is not repeated
+LONG = 5.0  # [s] of run time, of all repetitions, from which a run is not repeated
 
 
 def take_turns(
@@ -18,7 +18,7 @@ def take_turns(
 
     Args:
         jobs: a name to show and the run, which returns a result with its run time `wall` [s].
-        rounds: how often each is run; one that takes longer than LONG, once.
+        rounds: how often each is run, until its runs have taken LONG.
 
     Returns:
         The results of the first round, and for each job the median of its run times [s].
@@ -29,7 +29,7 @@ def take_turns(
         for n in range(rounds):
             for i, (name, run) in enumerate(jobs):
                 bar.set_description(name)
-                if n == 0 or statistics.median(walls[i]) < LONG:
+                if sum(walls[i]) < LONG:
                     r = run()
                     walls[i].append(r.wall)
                     if n == 0:

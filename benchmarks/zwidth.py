@@ -89,7 +89,7 @@ def page(rows: Sequence[dict[str, Any]]) -> str:
                 f"the linear loop; {len(below)} were unstable below a line that is sufficient.",
                 tabulate(cells, head, tablefmt="github", disable_numparse=True),
                 "## Machine",
-                "\n".join(f"- {x}" for x in common.machine()),
+                "\n".join(f"- {x}" for x in common.foot()),
             ]
         )
         + "\n"

@@ -16,7 +16,12 @@ DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
 OTHERS = [
     EXAMPLES / name
-    for name in ("studies/pair_log.py", "records/replay.py", "walls/arm_as_device.py")
+    for name in (
+        "studies/pair_log.py",
+        "records/replay.py",
+        "runs/pair_at_a_wall.py",
+        "walls/arm_as_device.py",
+    )
 ]
 
 

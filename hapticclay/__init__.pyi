@@ -41,6 +41,7 @@ from .model.spring import Spring as Spring
 from .model.tool import Tool as Tool
 from .results import Result as Result
 from .scene.changes import with_fields as with_fields
+from .scene.contact import Contact as Contact
 from .scene.experiments import EXPERIMENTS as EXPERIMENTS
 from .scene.experiments import SCENARIOS as SCENARIOS
 from .scene.experiments import Experiment as Experiment
@@ -49,7 +50,6 @@ from .scene.experiments import free as free
 from .scene.experiments import stability_test as stability_test
 from .scene.experiments import variable_cut as variable_cut
 from .scene.link import Link as Link
-from .scene.pair import Contact as Contact
 from .scene.pair import Pair as Pair
 from .scene.scenario import Scenario as Scenario
 from .scene.virtual_wall import Device as Device

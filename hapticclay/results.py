@@ -35,6 +35,7 @@ ROOMS = (
     "studies",
     "ports",
 )  # packages of classes that a file may name
+OWN_MODULES = ("arms.joint_law",)  # and modules of other packages
 MOVED = {  # modules of earlier releases, and where their classes are
     "hapticclay.stepping.monitor": "hapticclay.simulation.monitor",
     "hapticclay.stepping.run": "hapticclay.simulation.run",
@@ -315,7 +316,8 @@ def _made(name: str, fields: Mapping[str, Any]) -> Any:
 
 def _is_own(module: str) -> bool:
     package, *rooms = module.split(".")
-    return package == __package__ and rooms[:1] != [] and rooms[0] in ROOMS
+    own = rooms[:1] != [] and (rooms[0] in ROOMS or ".".join(rooms) in OWN_MODULES)
+    return package == __package__ and own
 
 
 def _is_part(kind: type) -> bool:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import logging
 import math
 import sys
+import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -22,10 +24,12 @@ from .unused import Unused
 if TYPE_CHECKING:
     from ..ports.device import Trajectory
     from ..ports.server import DeviceServer
+    from ..ports.service import Service
     from ..scene.scenario import Scenario
 
 WAIT = 0.1  # [s] between two looks at whether the session is to end
 LONGEST = 1e9  # [s] longest session
+EVERY = 10  # of the control samples of a pair by the wall clock are kept: every so many
 PERIOD = 0.005  # [s] of a message, by default
 RATE = 1000.0  # [Hz] of the control of an arm from a file, by default
 OF_ARM = "site", "joints", "pose", "armature", "damping", "friction", "gravity"  # its options
@@ -48,6 +52,9 @@ class DeviceCommand:
             paper's arm and hand. To report: the folder of a session.
         arm: MJCF or URDF file of an arm to serve, or the name of one of the package: planar_2r,
             five_bar, haptic_3, leader_7. Its handle moves along x, y and z of its world.
+        pair: TOML or JSON file of a leader and a follower to serve, in place of one arm: a program
+            at the leader is the hand, one at the follower the environment.
+        end: The one end of --pair to serve; by default both, the follower on the next port.
         rate: Control rate of that arm [Hz], by default 1000.
         operator: Mass, damper and spring of the hand that holds the handle [kg, N.s/m, N/m]; by
             default those of the paper, 0.25 2 6, and 0.25 5 200 at the arm of a file.
@@ -80,6 +87,8 @@ class DeviceCommand:
     action: Loose[Literal["serve", "report"]]
     source: Loose[Path | None] = None
     arm: str | None = None
+    pair: Path | None = None
+    end: Literal["leader", "follower"] | None = None
     rate: Annotated[float | None, Bound(1.0, 1e5, "Hz")] = None
     operator: walls.Hand | None = None
     protocol: Literal["inverse", "rosbridge"] = "inverse"
@@ -104,6 +113,9 @@ class DeviceCommand:
     unused: ClassVar[tuple[Unused, ...]] = (
         Unused(("period",), "is for --clock tick: give it too", (), ("clock=tick",)),
         Unused(("arm", "operator"), "is in the scenario file: give one of the two", ("source",)),
+        Unused(("arm", "operator", "hand", "clay"), "is in the file of the pair", ("pair",)),
+        Unused(("pair",), "is in place of a scenario file: give one of the two", ("source",)),
+        Unused(("end",), "is of a pair: give --pair", (), ("pair",)),
         Unused(("rate", *OF_ARM), "is of an arm from a file: give --arm", (), ("arm",)),
     )
 
@@ -111,23 +123,64 @@ class DeviceCommand:
         out = self.out or Path("out", "loop" if self.action == "report" else "device")
         if self.action == "report":
             return self._report(out)
-        duration = math.inf if self.duration is None else self.duration
         writable(out)
+        if self.pair is not None:
+            return self._serve_pair(self.pair, out)
         with self._server() as server, console.ctrl_c() as stop:
-            shown = "an Inverse3" if self.protocol == "inverse" else "a device of ROS"
-            print(f"{shown} listens at {server.url}; Ctrl-C ends the session", flush=True)
-            end = time.monotonic() + duration
-            while not stop.wait(WAIT) and time.monotonic() < end:
-                if ended := server.service.device.ended:
-                    print(f"hapticclay: the arm stopped: {ended}", file=sys.stderr)
-                    break
+            print(f"{self._shown} listens at {server.url}; Ctrl-C ends the session", flush=True)
+            self._wait(stop, lambda: server.service.device.ended)
             planned = not stop.is_set()
             server.close()
             return self._deliver(server, out, planned)
 
+    @property
+    def _shown(self) -> str:
+        return "an Inverse3" if self.protocol == "inverse" else "a device of ROS"
+
+    def _wait(self, stop: threading.Event, ended: Callable[[], str]) -> None:
+        """Waits for Ctrl-C, for the end of the duration or for that of the run."""
+        duration = math.inf if self.duration is None else self.duration
+        end = time.monotonic() + duration
+        while not stop.wait(WAIT) and time.monotonic() < end:
+            if why := ended():
+                print(f"hapticclay: the arm stopped: {why}", file=sys.stderr)
+                return
+
+    def _serve_pair(self, file: Path, out: Path) -> int:
+        """Serves one end of a pair, or both, then writes the record and the exchanges."""
+        from ..ports.exchanges import FILE
+        from ..ports.pair_ends import serve_pair
+        from ..scene.pair import Pair
+
+        given = self._how()
+        every = EVERY if self.clock == "wall" else 1
+        pair = Pair.load(file)
+        with serve_pair(pair, end=self.end, every=every, **given) as ends, console.ctrl_c() as stop:
+            for name, server in ends.served.items():
+                print(f"{name}: {self._shown} listens at {server.url}", flush=True)
+            print("Ctrl-C ends the session", flush=True)
+            self._wait(stop, lambda: ends.ended)
+            ends.close()
+            if not ends.recorded:
+                print("nothing was recorded")
+                return 0
+            console.deliver(ends.record(), out, self.figures if self.plots else None)
+            for name, server in ends.served.items():
+                _tell_skipped(server.service)
+                talks = sorted(server.exchanges, key=len, reverse=True)
+                if talks and len(talks[0]) > 1:
+                    talks[0].save(out / name / FILE)
+        return 0
+
     def _server(self) -> Any:
-        from ..ports.buttons import ButtonScript
         from ..ports.server import serve
+
+        hand = trajectory_of(self.hand)
+        return serve(self._scenario(), hand=hand, clay=self.clay, **self._how())
+
+    def _how(self) -> dict[str, Any]:
+        """Where to listen, the clock, and what the device says that it is."""
+        from ..ports.buttons import ButtonScript
         from ..ports.sessions import PORTS, Inverse3
 
         logging.basicConfig(format="hapticclay: %(message)s", level=logging.WARNING)
@@ -140,18 +193,14 @@ class DeviceCommand:
             self.protocol,
             self.origin,
         )
-        return serve(
-            self._scenario(),
-            host=self.host,
-            port=PORTS[self.protocol] if self.port is None else self.port,
-            clock=self.clock,
-            period=(PERIOD if self.period is None else self.period)
-            if self.clock == "tick"
-            else None,
-            hand=trajectory_of(self.hand),
-            clay=self.clay,
-            inverse3=shown,
-        )
+        period = PERIOD if self.period is None else self.period
+        return {
+            "host": self.host,
+            "port": PORTS[self.protocol] if self.port is None else self.port,
+            "clock": self.clock,
+            "period": period if self.clock == "tick" else None,
+            "inverse3": shown,
+        }
 
     def _scenario(self) -> Scenario:
         """What is served: a scenario file, an arm from a file, or the paper's arm and hand."""
@@ -177,11 +226,7 @@ class DeviceCommand:
             return 0
         record = ended_as_planned(server.record()) if planned else server.record()
         deliver_record(record, out, self.figures if self.plots else None, paced=True)
-        if service.skipped:
-            share = service.skipped / (service.skipped + service.samples)
-            text = f"{service.skipped} control samples ({share:.1%}) were skipped"
-            why = "the computer was late; --clock tick skips none"
-            print(f"hapticclay: {text}: {why}", file=sys.stderr)
+        _tell_skipped(service)
         figures = self.figures if self.plots else None
         deliver_loops(server.exchanges, record.scenario, out, figures)
         return 0
@@ -197,6 +242,15 @@ class DeviceCommand:
         scenario = Record.load(self.source).scenario
         write_report(exchanges, scenario, out, self.figures if self.plots else None)
         return 0
+
+
+def _tell_skipped(service: Service) -> None:
+    """Says how many control samples a busy computer has skipped."""
+    if service.skipped:
+        share = service.skipped / (service.skipped + service.samples)
+        text = f"{service.skipped} control samples ({share:.1%}) were skipped"
+        why = "the computer was late; --clock tick skips none"
+        print(f"hapticclay: {text}: {why}", file=sys.stderr)
 
 
 def trajectory_of(words: tuple[str, ...]) -> Trajectory | None:

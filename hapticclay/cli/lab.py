@@ -4,22 +4,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..files import writable
 from . import console
 from .options import Loose
 
+if TYPE_CHECKING:
+    from ..scene.pair import Pair
+    from ..scene.scenario import Scenario
+
 
 @dataclass(frozen=True)
 class LabCommand:
-    """Do a lab of a course: wall, zwidth, delay or jnd.
+    """Do a lab of a course: wall, zwidth, delay, jnd or pair.
 
     Attributes:
-        source: The lab: a wall and its rate, Z-width, delay and passivity, or a just-noticeable
-            difference.
+        source: The lab: a wall and its rate, Z-width, delay and passivity, a just-noticeable
+            difference, or leader and follower.
         out: Folder for lab.json and the figures; by default out/lab/NAME.
         quick: Make fewer runs.
-        view: At the end, show a run of the lab in a window.
+        view: At the end, show a run of the lab in a window, the pair in a browser.
         figures: Formats and style of the figures.
     """
 
@@ -40,9 +45,18 @@ class LabCommand:
             found = lab(name, self.quick, bar.set_description_str)
         console.deliver(found, out, self.figures)
         if self.view:
-            from ..simulation.simulate import simulate
-            from ..studies.removal import TOOL
-            from .view import replay
-
-            replay(simulate(found.scene), TOOL)
+            _show(found.scene)
         return 0
+
+
+def _show(scene: Scenario | Pair) -> None:
+    from ..scene.pair import Pair
+    from . import view
+
+    if isinstance(scene, Pair):
+        view.show_pair(scene)
+        return
+    from ..simulation.simulate import simulate
+    from ..studies.removal import TOOL
+
+    view.replay(simulate(scene), TOOL)

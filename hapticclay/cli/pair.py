@@ -122,13 +122,9 @@ class PairCommand:
 
     def _viewed(self, pair: Pair, out: Path) -> int:
         """Shows the pair until Ctrl-C, then writes the record."""
-        from ..live.pair_session import PairSession
-        from ..views.pair_page import PairPage
-        from .view import serve_page
+        from .view import show_pair
 
-        session = PairSession(pair)
-        with console.ctrl_c() as stop:
-            serve_page(PairPage(session, self.host, self.port), self.host, stop.is_set)
+        session = show_pair(pair, self.host, self.port)
         if not session.recorded:
             print("nothing was recorded")
             return 0

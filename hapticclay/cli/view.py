@@ -19,8 +19,10 @@ from .run import deliver_record
 from .unused import FIGURE_WORDS, Unused
 
 if TYPE_CHECKING:
+    from ..live.pair_session import PairSession
     from ..live.replay import Replay
     from ..live.session import Session
+    from ..scene.pair import Pair
     from ..simulation.record import Record
     from ..views.live_page import LivePage
 
@@ -159,3 +161,14 @@ def serve_page(page: LivePage, host: str, until: Callable[[], bool]) -> None:
         )
     print(f"open {page.url} in a browser; Ctrl-C ends the session", flush=True)
     page.serve(until)
+
+
+def show_pair(pair: Pair, host: str = "127.0.0.1", port: int = 8080) -> PairSession:
+    """Serves the page of a pair until Ctrl-C, and returns its session."""
+    from ..live.pair_session import PairSession
+    from ..views.pair_page import PairPage
+
+    session = PairSession(pair)
+    with console.ctrl_c() as stop:
+        serve_page(PairPage(session, host, port), host, stop.is_set)
+    return session

@@ -3,6 +3,7 @@ from .records cimport Kick, Model, State
 from . cimport joint_friction
 from . cimport joints
 from . cimport kick
+from . cimport springs
 
 cdef void move_under(Model m, State s, Kick k) noexcept nogil
 @cython.locals(x=cython.double)

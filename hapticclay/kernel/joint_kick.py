@@ -1,6 +1,6 @@
 """A kick of an arm on the engine's terms, under torques that the motors hold."""
 
-from . import joint_friction, joints, kick
+from . import joint_friction, joints, kick, springs
 
 
 def move_under(m, s, k):
@@ -65,7 +65,11 @@ def put_free_rates(m, k):
 def drive(m, s, k):
     """Motion where something acts on the handle: by the law of the plane."""
     e = m.engine
+    fx, fy = k.x.f, k.y.f
+    if m.acts and m.springs:  # the friction of the joints bears their force, too
+        springs.load(s, k)
     put_free_rates(m, k)
+    k.x.f, k.y.f = fx, fy
     rate = 1.0 / k.H
     for i in range(m.axes):
         o, x = k.axis[i], joints.along(m, e.joint_J, i, e.free, 0)

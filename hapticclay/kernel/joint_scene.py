@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..arms.joint_law import JointPD, compensated
+from ..model.operator import NO_HAND
 from ..scene.scenario import Scenario
 from . import joint_law, records
 
@@ -36,8 +37,10 @@ def put_weight(m: Any, s: Scenario, axes: list[int]) -> None:
     """Weight of the hand, and whether the law holds it and the arm."""
     mechanism = s.file_arm.mechanism
     weighs, gravity = mechanism.weighs, np.array(mechanism.model.opt.gravity)[axes]
-    hand = s.operators[0]
-    m.weight[: len(axes)] = ((hand.mass if hand and weighs else 0.0) * gravity).tolist()
+    hands = [s.operators[min(i, 1)] or NO_HAND for i in range(len(axes))]
+    m.weight[: len(axes)] = [
+        x.mass * g if weighs else 0.0 for x, g in zip(hands, gravity, strict=True)
+    ]
     law = s.controller if isinstance(s.controller, JointPD) else None
     m.feeds_gravity = int(compensated(s.arm, law) and weighs)
 

@@ -58,7 +58,7 @@ def turn(m, k, rates, g, h):
         return
     for i in range(m.axes):
         k.axis[i].c = 0.0
-    if m.x.mass > 0.0:
+    if m.x.mass > 0.0 or m.y.mass > 0.0:
         for i in range(n):
             e.w[m.dof[i]] = rates[i]
         e.com_vel(e.model, e.data)

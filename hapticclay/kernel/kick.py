@@ -111,6 +111,8 @@ def move_in_clay(m, s, k):
         x.f, y.f = x.f + (owesx - x.back), y.f + (owesy - y.back)
         x.d, y.d = x.d + softx, y.d + softy
     x.u, y.u = servo.solve(k)
+    if m.springs and not owing and springs.let_go(m, s, k):
+        x.u, y.u = servo.solve(k)
     if m.flow:
         yielding.resist(m, s, k)
     if owing:
@@ -120,6 +122,8 @@ def move_in_clay(m, s, k):
     x.net = x.f - x.mean - x.d * x.u - k.dxy * y.u
     y.net = y.f - y.mean - y.d * y.u - k.dxy * x.u
     damped(k)
+    if m.springs:
+        springs.put_freed(k)
     besidex, besidey = x.back + x.mean + x.pull, y.back + y.mean + y.pull
     if m.laws:
         besidex += barex - dx * x.u - dxy * y.u - (ownx - own_dx * x.u - own_dxy * y.u)

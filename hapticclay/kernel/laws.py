@@ -49,7 +49,7 @@ def without_clay(m, s, k, fx, fy):
     if m.special and (m.springs or m.laws):
         ax = ay = gx = gy = 0.0
         if m.springs:
-            ax, ay = s.x.force_before, s.y.force_before
+            ax, ay = springs.beside(m, s, 0, bx), springs.beside(m, s, 1, by)
         if m.laws:
             gx, gy = own_laws.force(m, x.p, y.p, x.v, y.v, 0.0)
         fx, fy = fx - (ax + gx), fy - (ay + gy)
@@ -68,8 +68,11 @@ def force_for_controller(m, s, k):
     if m.flow:
         fx, fy = motion_force(m, s, vx, vy, k.x.pull, k.y.pull)
     if m.springs:
-        fx = fx + springs.force_for_controller(m, s, 0, px)
-        fy = fy + springs.force_for_controller(m, s, 1, py)
+        gx = springs.force_for_controller(m, s, 0, px)
+        gy = springs.force_for_controller(m, s, 1, py)
+        gx = -x if springs.pulls(m, s.x, x + gx) else gx
+        gy = -y if springs.pulls(m, s.y, y + gy) else gy
+        fx, fy = fx + gx, fy + gy
     if m.laws:
         gx, gy = own_laws.force(m, px, py, vx, vy, 0.0)
         fx, fy = fx + gx, fy + gy

@@ -311,6 +311,7 @@ class KickAxis:
     net: real  # net force [N]
     fe: real  # mean force of the clay [N]
     pull: real  # of its springs [N]
+    freed: real  # 1 where a surface would pull, and has let go
     back: real  # what stiff clay returns less what it owes [N]
     owed0: real  # impulse owed before [N.s]
     owed: real  # and after

@@ -45,10 +45,10 @@ def write(m, s, k, after):
 def write_force(m, s, k, end, vx, vy, fx, fy):
     """Writes the force of the clay where b v does not give it; f is that of yielding."""
     out, n = m.rendered, 3 * s.row
-    x, y = viscous.force(m, viscous.damping(m, s, 0, end), viscous.damping(m, s, 1, end), vx, vy)
-    x, y = x + fx, y + fy
+    bx, by = viscous.force(m, viscous.damping(m, s, 0, end), viscous.damping(m, s, 1, end), vx, vy)
+    x, y = bx + fx, by + fy
     if m.springs:
-        x, y = x + springs.force(s, 0, k.L), y + springs.force(s, 1, k.L)
+        x, y = springs.added(m, s, 0, k.L, bx, x), springs.added(m, s, 1, k.L, by, y)
     if m.laws:
         ax, ay = own_laws.force(m, k.x.p, k.y.p, vx, vy, 0.0)
         x, y = x + ax, y + ay

@@ -291,6 +291,7 @@ def reaction(m, s, k, fx, fy):
     vx, vy = viscous.along(m, x.v, y.v)
     x.stuck0, y.stuck0 = s.e.x.stuck, s.e.y.stuck
     vx, vy = 0.0 if x.stuck0 > 0.0 else vx, 0.0 if y.stuck0 > 0.0 else vy
+    B = yielding.of_plane(B)
     B = h * B[0], h * B[1], h * B[2], h * B[3]
     k.L = 1.0
     fyk = yielding.laws_in_kick(m, s, k, B, vx, vy, ax, ay)

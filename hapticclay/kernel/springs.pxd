@@ -8,6 +8,12 @@ cdef double NEAR
 
 cdef double force(State s, long i, double L) noexcept nogil
 cdef void load(State s, Kick k) noexcept nogil
+cdef bint pulls(Model m, StateAxis z, double f) noexcept nogil
+cdef bint let_go(Model m, State s, Kick k) noexcept nogil
+cdef void put_freed(Kick k) noexcept nogil
+cdef double added(Model m, State s, long i, double L, double damping, double f) noexcept nogil
+cdef double beside(Model m, State s, long i, double damping) noexcept nogil
+cdef bint is_outside(StateAxis z, double p) noexcept nogil
 cdef double longest_step(State s, double after) noexcept nogil
 cdef double force_for_controller(Model m, State s, long i, double p) noexcept nogil
 cdef void move(Model m, State s, double px, double py, double h) noexcept nogil

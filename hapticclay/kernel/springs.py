@@ -18,8 +18,52 @@ def load(s, k):
     """Adds their force to the load of a kick."""
     for i in range(2):
         o = k.axis[i]
-        o.pull = force(s, i, k.L)
+        o.pull, o.freed = force(s, i, k.L), 0.0
         o.f -= o.pull
+
+
+# ---- surfaces, which push and never pull ---------------------------------------------------------
+
+
+def pulls(m, z, f):
+    """Whether a force of spring and damping is one by which a surface would pull.
+
+    Stiff clay, whose damping a step splits, holds what it has.
+    """
+    return m.stiff == 0 and z.way * f < 0.0
+
+
+def let_go(m, s, k):
+    """Takes surfaces that would pull out of the load of a kick; returns whether there are any."""
+    found = 0
+    for i in range(2):
+        o = k.axis[i]
+        if pulls(m, s.axis[i], o.pull + o.clay + o.clay_d * o.u):
+            o.f, o.d, o.freed = o.f + (o.pull + o.clay), o.d - o.clay_d, 1.0
+            found = 1
+    return found
+
+
+def put_freed(k):
+    """Makes spring and damping of a surface that has let go no force, in a kick."""
+    for i in range(2):
+        o = k.axis[i]
+        if o.freed > 0.0:
+            o.pull = -(o.clay + o.damped)
+
+
+def added(m, s, i, L, damping, f):
+    """A force with that of the spring of an axis; without its damping where a surface would pull.
+
+    f: force of the damping, and more [N].
+    """
+    pull = force(s, i, L)
+    return f - damping if pulls(m, s.axis[i], pull + damping) else f + pull
+
+
+def beside(m, s, i, damping):
+    """Force of an axis before a sample besides its damping, which a surface takes back [N]."""
+    return added(m, s, i, 1.0, damping, 0.0)
 
 
 def longest_step(s, after):
@@ -70,6 +114,8 @@ def enter(m, s, px, py, crossed):
     most = 0.0
     for i in range(2):
         z, p = s.axis[i], py if i else px
+        if i == crossed and m.stiff == 0 and is_outside(z, p):
+            z.old = z.old_rate = 0.0  # it has let go before
         at = regions.spring_place(m.table, i, s.x.index, s.y.index)
         z.rest, z.way = rest_on_entry(m.table, z, at, p, i == crossed, crossed < 0)
         z.k, z.k_limit, z.k1, z.tau = m.table[at], m.table[at + 1], m.table[at + 2], m.table[at + 3]
@@ -79,6 +125,11 @@ def enter(m, s, px, py, crossed):
     s.spring_step = m.spring_step if most > 0.0 and m.springs == 1 else math.inf
     if most > 0.0:
         move(m, s, px, py, 0.0)
+
+
+def is_outside(z, p):
+    """Whether the handle has left a surface by its border: z has that surface, and new borders."""
+    return z.way != 0.0 and (z.way > 0.0) == (z.high - p < p - z.low)
 
 
 def rest_on_entry(table, z, at, p, crosses, begins):

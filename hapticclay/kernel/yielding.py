@@ -6,6 +6,9 @@ from ..formulas import controller, regions
 from ..formulas import flow as law
 from . import groove, viscous
 
+LINE = 1e-12  # share of its determinant that the mobility of a handle in a plane has at least
+TRACE = 1e-9  # share of its mobility that a handle on a line gets across it
+
 
 def law_now(m, s, k, i, speed):
     """Fy, K, n of an axis; half a step of other clay before it counts as steady force."""
@@ -61,6 +64,17 @@ def resist_by(m, B, v, end, fyk, L):
     return law.resist_axes(B, v, end, fyk, L)
 
 
+def of_plane(B):
+    """A velocity per force; of a handle that moves on a line alone with a trace of one across it.
+
+    Nothing pushes across, where it so stays at rest.
+    """
+    size = B[0] + B[3]
+    if B[0] * B[3] - B[1] * B[2] > LINE * size * size:
+        return B
+    return B[0] + TRACE * B[3], (1.0 - TRACE) * B[1], (1.0 - TRACE) * B[2], B[3] + TRACE * B[0]
+
+
 def flows_freely(m, s):
     """Whether the clay around a kick does not yield."""
     if m.groove:
@@ -80,6 +94,7 @@ def resist(m, s, k):
     ax, ay = viscous.along(m, x.v + lead * x.c, y.v + lead * y.c)
     ux, uy = x.u - on * x.c, y.u - on * y.c
     B = controller.velocity_per_force((x.n, y.n), (k.Sxx, k.Sxy, k.Syy), (x.d, y.d, k.dxy))
+    B = of_plane(B)
     ax, ay = 0.0 if x.stuck0 > 0.0 else ax, 0.0 if y.stuck0 > 0.0 else ay
     fyk = laws_in_kick(m, s, k, B, ax, ay, ux, uy)
     B = viscous.rotated_matrix(m, B)

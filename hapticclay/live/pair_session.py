@@ -126,10 +126,11 @@ class PairSession:
 
     def _force(self) -> list[float]:
         """With the spring of the hand, the force to the point; released, its spring alone."""
-        hand = self.pair.leader_operator
-        p = self.run.hosts[0].run.state.p
-        place = p if self.point is None else self.point
-        return (hand.spring * np.asarray(place)).tolist() if hand else [0.0] * len(p)
+        hand, host = self.pair.leader_operator, self.run.hosts[0]
+        place = np.array(host.run.state.p)
+        if self.point is not None:
+            place[host.places.shown] = self.point
+        return (hand.spring * place).tolist() if hand else [0.0] * len(place)
 
     def _observe(self) -> None:
         t, leader, follower, *_, hand, contact, _, ports = self.run.newest

@@ -58,7 +58,7 @@ Methods: **fast** and **accurate** integration of continuous control; sampled co
 **held** by the motors, or **physical**. Linear theory (gain limits, margins, poles, impedance)
 includes a part (yes), leaves it out (its limit is that of the scene without the part), or refuses
 the scene (no). Bounds that depend on numbers, such as that of stiff clay, are on the page of the
-part.
+part. What leaders and followers may touch, and their hardware, is on [their page](pair.md).
 """
 
 

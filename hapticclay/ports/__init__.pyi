@@ -12,6 +12,8 @@ from .coupled import render as render
 from .device import Trajectory as Trajectory
 from .exchanges import Exchanges as Exchanges
 from .limits import Limits as Limits
+from .pair_ends import PairServers as PairServers
+from .pair_ends import serve_pair as serve_pair
 from .report import LoopReport as LoopReport
 from .report import loop_report as loop_report
 from .server import DeviceServer as DeviceServer

@@ -46,6 +46,7 @@ class Device(Protocol):
     """The device of a service: a `SimulatedDevice`, or the arm of a session with a viewer."""
 
     paced: bool  # whether anything but the clock of the service advances the device
+    takes_torques: bool = True  # whether programs may drive its joints
 
     @property
     def t(self) -> float:
@@ -136,14 +137,7 @@ class DrivenArm:
 
     def _at(self, seen: Sensed) -> Numbers:
         """Force on the handle at a measurement."""
-        force, target = self.asked.force or self._still, self.asked.target
-        if target is not None:
-            force = tuple(
-                f + (TARGET_STIFFNESS * (to - p) - TARGET_DAMPING * v)
-                for f, p, v, to in zip(force, seen.position, seen.velocity, target, strict=True)
-            )
-        scale = shortening(force, self.largest_force)
-        return tuple(f * scale for f in force) if scale else self._still
+        return force_at(self.asked, seen, self.largest_force)
 
     def _law(self, t: float, q: Numbers, qd: Numbers, fh: Any, state: Any, params: Any) -> Any:
         """Torques of a control sample: the transposed Jacobian at the measured angles."""
@@ -208,6 +202,19 @@ class MechanismMotors(DrivenArm):
     def torques_of(self, force: Numbers, at: Any) -> Numbers:
         J, held = at
         return tuple((held + J.T @ force).tolist())
+
+
+def force_at(asked: Drive, seen: Sensed, largest: float) -> Numbers:
+    """Force of a command on the handle at a measurement, shortened to the largest one [N]."""
+    still = (0.0,) * len(seen.position)
+    force, target = asked.force or still, asked.target
+    if target is not None:
+        force = tuple(
+            f + (TARGET_STIFFNESS * (to - p) - TARGET_DAMPING * v)
+            for f, p, v, to in zip(force, seen.position, seen.velocity, target, strict=True)
+        )
+    scale = shortening(force, largest)
+    return tuple(f * scale for f in force) if scale else still
 
 
 def driven_arm(scenario: Scenario, largest_force: float = LARGEST_FORCE) -> DrivenArm:

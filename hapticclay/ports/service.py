@@ -123,6 +123,9 @@ class Service:
                 self.count(f"force {where} is recorded and cannot act")
         if torques is None:
             return command
+        if not self.device.takes_torques:
+            self.count("joint torques cannot act: the motors are those of the pair")
+            return replace(command, torques=None)
         if len(torques) < n:
             self.count(f"{len(torques)} joint torques were given: this arm has {n} joints")
             return replace(command, torques=None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -13,38 +13,23 @@ from ..arms.joint_law import JointPD, checked_law
 from ..arms.mechanism import Linear
 from ..arms.mjcf_arm import MjcfArm
 from ..errors import Bound, ParameterError
-from ..formulas.constants import B_MAX
 from ..model import arm as closed_form
 from ..model.arm import Arm
+from ..model.clay import Clay
+from ..model.hardware import Hardware
 from ..model.operator import Operator
 from ..model.shapes import Pulse
 from ..model.signals import Signal
-from ..model.spring import STIFFNESS_MAX
 from . import pair_files
+from .contact import Contact, Load, load_of
 from .link import Link
+from .pair_hardware import check_hardware
 from .virtual_wall import Device
 
 NOMINAL = (0.5 * math.pi, -0.5 * math.pi)  # [rad] elbow square, link 2 along x
 UNKNOWN_ROTOR = "rotor inertia (armature): part of the mass or inertia that is given"
-AXES = ("x", "y", "z")
+STILL = 1e-9  # [m] least motion of the handle per joint rate
 TOUCH = Pulse((1.0, 0.0), 0.0, 0.05)  # [N] for 50 ms
-
-
-@part("contact.")
-class Contact:
-    """What the follower touches and never leaves: clay, a wall or an object.
-
-    Attributes:
-        K: stiffness [N/m], 0 to 1e9.
-        B: damping [N.s/m], 0 to 1e9; clay has this alone.
-        mass: mass that moves along [kg], 0 to 1e6.
-        axis: axis of the world along which it acts; None for all, and for an arm of one axis.
-    """
-
-    K: Annotated[float, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
-    B: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 0.0
-    mass: Annotated[float, Bound(0.0, 1e6, "kg")] = 0.0
-    axis: Literal["x", "y", "z"] | None = None
 
 
 @part("pair.", eq=False)
@@ -65,12 +50,19 @@ class Pair:
         Ts: control sample of both hosts [s], 1e-6 to 1.
         delay: from a sample to the torque computed from it [s], 0 to 10.
         leader_operator: the hand at the leader's handle; None for none.
-        follower_clay: what the follower touches; None for free motion.
+        follower_clay: what the follower touches: an object that it never leaves, a wall, or clay,
+            whose axes are those of the arm's plane, counted from the handle's pose. Theory takes
+            the linear part of wall and clay. None for free motion.
         axes: for each joint of the follower, the number of the leader's joint that it follows, from
             1 on, negative for the opposite sense; None for the same order.
         muscle: in runs, muscle force of the leader's hand [N], any signal; None for none. By
             default 1 N along x for 50 ms.
         t_max: runs end at this time [s], > 0, at most 1e4.
+        follower_operator: a hand at the follower's handle; None for none.
+        leader_clay: what the leader touches, as `follower_clay`.
+        leader_hardware: in runs, encoders, converters, torque limits and, of the two-link arm,
+            joint friction; None for ideal ones. What cannot act in a pair is refused.
+        follower_hardware: the same of the follower.
     """
 
     leader: MjcfArm | Arm | Device
@@ -81,10 +73,14 @@ class Pair:
     Ts: Annotated[float, Bound(1e-6, 1.0, "s")] = 1e-3
     delay: Annotated[float, Bound(0.0, 10.0, "s")] = 0.0
     leader_operator: Operator | None = None
-    follower_clay: Contact | None = None
+    follower_clay: Contact | Clay | None = None
     axes: Annotated[tuple[int, ...] | None, Bound(-1000, 1000)] = None
     muscle: Signal | None = TOUCH
     t_max: Annotated[float, Bound(0.0, 1e4, "s", above=True)] = 2.0
+    follower_operator: Operator | None = None
+    leader_clay: Contact | Clay | None = None
+    leader_hardware: Hardware | None = None
+    follower_hardware: Hardware | None = None
 
     def __post_init__(self):
         n, m = len(joint_names(self.leader)), len(joint_names(self.follower))
@@ -112,6 +108,9 @@ class Pair:
         if self.link.passivity and self.delay > 0.0:
             bound = "must be 0 with passivity controllers: a damper that acts late feeds motion"
             raise ParameterError("pair.delay", self.delay, bound)
+        for i in range(2):
+            _check_touched(self, i)
+            check_hardware(self, i)
 
     def __repr__(self) -> str:
         names = (type(arm).__name__ for arm in self.arms)
@@ -126,6 +125,21 @@ class Pair:
     def laws(self) -> tuple[JointPD, JointPD]:
         """Joint laws of leader and follower."""
         return self.law, self.follower_law or self.law
+
+    @property
+    def operators(self) -> tuple[Operator | None, Operator | None]:
+        """Hands at leader and follower."""
+        return self.leader_operator, self.follower_operator
+
+    @property
+    def touched(self) -> tuple[Contact | Clay | None, Contact | Clay | None]:
+        """What leader and follower touch."""
+        return self.leader_clay, self.follower_clay
+
+    @property
+    def hardware(self) -> tuple[Hardware | None, Hardware | None]:
+        """Hardware of leader and follower."""
+        return self.leader_hardware, self.follower_hardware
 
     @property
     def n(self) -> int:
@@ -158,6 +172,29 @@ class Pair:
             ParameterError: the file cannot be read, or holds no pair.
         """
         return pair_files.read_pair(file, cls)
+
+
+def _check_touched(pair: Pair, i: int) -> None:
+    """Refuses a wall without an axis, and an axis along which the handle cannot move."""
+    touched, arm = pair.touched[i], pair.arms[i]
+    if not isinstance(touched, Contact):
+        return
+    if touched.unilateral and touched.axis is None and not isinstance(arm, Device):
+        bound = "must be given for a wall that an arm of more than one axis may leave"
+        raise ParameterError("contact.axis", None, bound)
+    if touched.axis is None or not has_handle(arm):
+        return
+    if not np.abs(linear_arm(arm).jacobian["xyz".index(touched.axis)]).max() > STILL:
+        bound = f"must be one along which the {('leader', 'follower')[i]}'s handle can move"
+        raise ParameterError("contact.axis", touched.axis, bound)
+
+
+def touched_load(pair: Pair, i: int) -> Load:
+    """What an arm of a pair touches, linear, along x, y and z."""
+    arm, touched = pair.arms[i], pair.touched[i]
+    if not isinstance(touched, Clay):
+        return load_of(touched, "xy")
+    return load_of(touched, arm.axes[:2] if isinstance(arm, MjcfArm) else "xy")
 
 
 def joint_names(arm: Any) -> tuple[str, ...]:

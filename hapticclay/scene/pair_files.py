@@ -19,7 +19,18 @@ from .virtual_wall import Device
 
 ARMS = ("leader", "follower")
 LAWS = ("law", "follower_law")
-OF_ARM = ("file", "site", "joints", "pose", "armature", "damping", "friction", "gravity")
+OF_ARM = (
+    "file",
+    "site",
+    "joints",
+    "pose",
+    "armature",
+    "damping",
+    "friction",
+    "gravity",
+    "torque_limit",
+    "plane",
+)
 
 
 def read_pair(path: str | os.PathLike[str], kind: type) -> Any:

@@ -74,7 +74,7 @@ class Scenario:
         force: constant part of the operator's muscle force uh on each axis [N], of two or all axes
             of the handle; none for an arm from a file where it is not given.
         operator: impedance Th of the operator's arm, of both axes or a pair (x, y); None for a
-            pure force (Th = 0).
+            pure force (Th = 0). That of y acts along z, too, where an arm from a file moves there.
         inertia_shaping: whether the servo shapes the handle's inertia, so that Sh holds at every
             pose.
         dt: physics and control step [s], 1e-6 to 0.02; where it is not given, 0.36 ms, or the
@@ -432,7 +432,6 @@ def _check_arm(s: Scenario) -> None:
     given = {
         "controller": (law is None, f"must be given {with_arm}: a JointPD, or your own"),
         "command": (s.command is not None, f"must be None {with_arm}, which has no compensator"),
-        "operator": (s.operators[0] != s.operators[1], f"must be one for all axes {with_arm}"),
     }
     for name, default in (("start", (0.0, 0.0)), ("velocity", (0.0, 0.0)), ("origin", ORIGIN)):
         bound = f"must be left out {with_arm}, which starts at rest at its pose"

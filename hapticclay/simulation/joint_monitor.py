@@ -177,8 +177,8 @@ class JointMonitor:
 def is_stable_at_start(scenario: Scenario) -> bool:
     """Whether the loop of the joints is stable at the arm's pose; so is one that is not known."""
     arm = scenario.file_arm
-    law, hand = scenario.controller, scenario.operators[0]
-    if not isinstance(law, JointPD):
+    law, (hand, other) = scenario.controller, scenario.operators
+    if not isinstance(law, JointPD) or hand != other:
         return True
     linear = held_arm(arm.linear(), hand or NO_HAND)
     delay = scenario.hardware.delay if scenario.hardware else 0.0

@@ -10,6 +10,8 @@ from ..scene.pair import Pair
 from ..theory.architectures import ARCHITECTURES
 from ..theory.architectures.control import Control
 from .pair_passivity import Port
+from .pair_places import Places
+from .pair_sensors import Sensors
 from .stepwise import Simulation
 
 
@@ -18,34 +20,28 @@ class Host:
 
     def __init__(self, pair: Pair, i: int, control: Control, run: Simulation):
         self.pair, self.i, self.control, self.run = pair, i, control, run
-        self.arm, self.law = run.scenario.file_arm, pair.laws[i]
-        self.axes = ["xyz".index(c) for c in self.arm.axes]
+        self.law = pair.laws[i]
         self.start = run.state.q.copy()
         self.own, self.other = np.zeros(pair.n), np.zeros(pair.n)
         self.arrived = np.zeros(len(control.message))  # waves; others pull as they arrive
         self.newest, self.x = -1, np.zeros(control.states)
         self.last_q, self.rate = np.zeros(pair.n), np.zeros(pair.n)
-        self.held = compensated(pair.arms[i], self.law)
+        held = compensated(pair.arms[i], self.law)
+        self.places = Places(run.scenario, pair.arms[i], held)
+        self.sensors = Sensors(pair, i, len(self.places.axes))
+        self.zero = self.sensors.positions(self.start)
         self.acts = i == 1 or ARCHITECTURES[pair.link.kind].leader_law
-        self.weight = self._weight(self.start)
+        self.weight = self.places.weight(self.start)
         self.port = Port(pairs.linear_arm(pair.arms[i]).inertia, pair.Ts, pair.link.reserve)
         self.pull = np.zeros(pair.n)  # as it arrived, with passivity controllers
-
-    def _weight(self, q: np.ndarray) -> np.ndarray:
-        """Torque against the arm's weight."""
-        mechanism = self.arm.mechanism
-        if not (self.held and mechanism.weighs):
-            return np.zeros(len(q))
-        mechanism.at(q)
-        return mechanism.weights()
 
     def sampled(self) -> tuple[np.ndarray, np.ndarray]:
         """Measures, and returns the own torque and the message."""
         state = self.run.state
-        q = state.q - self.start
+        seen = self.sensors.positions(state.q)
+        q = seen - self.zero
         v = self._rate(q, state.qd)
-        jacobian = self.arm.jacobian(state.q)[self.axes]  # type: ignore[union-attr]
-        F = -jacobian.T @ state.fh[: len(self.axes)]
+        F = self.places.jacobian(seen).T @ self.sensors.forces(self.pressed)
         y = np.concatenate([q, v, F])
         signals = np.concatenate([y, self.arrived, self.x])
         own = self.control.torque @ signals
@@ -55,8 +51,14 @@ class Host:
         if self.pair.link.passivity:
             self.port.observe()
             own = self.port.guarded(own + self.pull, v)
-        self.weight = self._weight(state.q)
+        self.weight = self.places.weight(seen)
         return own + self.weight, message
+
+    @property
+    def pressed(self) -> np.ndarray:
+        """Force of the handle on what it carries and touches, along the axes of its run [N]."""
+        state, n = self.run.state, len(self.places.axes)
+        return state.fe[:n] - state.fh[:n]
 
     def _rate(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
         """The measured rate, as the law estimates it."""

@@ -15,16 +15,16 @@ from typing import Any
 import numpy as np
 
 from ..errors import ParameterError
+from ..physics import warnings_caught
 from ..scene import pair as pairs
 from ..scene.pair import Pair
 from ..theory.architectures import ARCHITECTURES
 from . import stepwise
-from .pair_arms import run_arm, run_scene
+from .pair_arms import MOST_PARTS, least_parts, run_arm, run_scene
 from .pair_host import Host
 from .pair_record import PairRecord
 from .stepwise import Simulation
 
-MOST_PARTS = 40  # engine steps of a control sample that are tried
 WHOLE = 1e-6  # of an engine step that a delay may be off
 ARRIVE, ACT = 0, 1  # order of events at the same step
 
@@ -71,18 +71,22 @@ class PairRun:
 
     def advance(self) -> None:
         """Makes a control sample: measures, sends, and steps both arms; does nothing once ended."""
-        for _ in range(self.parts):
-            if self.ended:
-                return
-            self._act(ARRIVE)
-            if self.step % self.parts == 0:
-                self._sample()
-            self._act(ACT)
-            self.ended = self._beyond()
-            if not self.ended:
-                self.energy += sum(map(self._advanced, self.hosts))
-                self.ended = self._ended()
-                self.step += 1
+        with warnings_caught():  # of arms that diverge, which is an outcome
+            for _ in range(self.parts):
+                if not self.ended:
+                    self._step()
+
+    def _step(self) -> None:
+        """Makes a step of both arms, at a sample after the hosts have measured and sent."""
+        self._act(ARRIVE)
+        if self.step % self.parts == 0:
+            self._sample()
+        self._act(ACT)
+        self.ended = self._beyond()
+        if not self.ended:
+            self.energy += sum(map(self._advanced, self.hosts))
+            self.ended = self._ended()
+            self.step += 1
 
     def to_end(self) -> PairRecord:
         """Runs for the time of the pair, or until something ends it."""
@@ -107,8 +111,10 @@ class PairRun:
             self._send(i, (self.step, message, self.hosts[i].port.into))
         row = [self.t]
         row += [x.q for x in states] + [host.torque for host in self.hosts]
+        ends = (states[0].fh, self.hosts[1].pressed)
+        forces = [x[host.places.shown] for x, host in zip(ends, self.hosts, strict=True)]
         ports = [host.port.taken for host in self.hosts]
-        self.newest = [*row, states[0].fh, -states[1].fh, self.energy, ports]
+        self.newest = [*row, *forces, self.energy, ports]
         if self.step // self.parts % self.every == 0:
             self.rows.append(self.newest)
 
@@ -176,10 +182,10 @@ def parts_of(pair: Pair) -> int:
     """Engine steps of a control sample: the fewest of which all delays are whole multiples.
 
     Raises:
-        ParameterError: there are none up to 40.
+        ParameterError: there are none up to 40, or clay is too stiff.
     """
-    jitter = pair.link.jitter > 0.0
-    for parts in range(8 if jitter else 2, MOST_PARTS + 1):
+    least = max(8 if pair.link.jitter > 0.0 else 2, least_parts(pair))
+    for parts in range(least, MOST_PARTS + 1):
         late = [x * parts / pair.Ts for x in (*pair.link.delays, pair.delay)]
         if all(abs(x - round(x)) <= WHOLE * max(1.0, x) for x in late):
             return parts

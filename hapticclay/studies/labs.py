@@ -1,4 +1,4 @@
-"""Four labs for a course on haptics: a wall and its rate, Z-width, delay, and a JND."""
+"""Five labs for a course on haptics: a wall and its rate, Z-width, delay, a JND, and a pair."""
 
 from __future__ import annotations
 
@@ -10,13 +10,19 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
+from ..arms.joint_law import JointPD
 from ..errors import choice
 from ..model.shapes import Constant
 from ..results import Result, figure_of
+from ..scene.link import Link
+from ..scene.pair import Pair
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import Device, VirtualWall
 from ..simulation.batch import simulate_batch
+from ..simulation.pair_record import PairRecord
+from ..simulation.simulate import simulate
 from ..theory import wall_limits
+from ..theory.pair_verdict import pair_limits
 from .chart import Chart, curve
 from .port_energy import passivity_limit
 from .staircase import Observer, Staircase, run_staircase, staircase_mean
@@ -45,6 +51,11 @@ STAIRCASES = (  # the rules, with small steps: large ones shift the point of con
 )
 TRIED, QUICK_TRIED = 100, 30  # staircases whose mean is taken
 
+ARM, ARM_TS = Device(1.0, 1.0), 2e-3  # of leader and follower; s
+GAINS, KD = (200.0, 400.0, 800.0, 1600.0), 10.0  # Kp [N/m], and Kd [N.s/m]
+SWUNG = 1.5  # [s] of a run of the pair
+TRIED_DELAYS = (0.6, 1.1)  # of the rule, between which the largest delay is sought
+
 Tell = Callable[[str], None]
 
 
@@ -61,7 +72,7 @@ class Lab(Result):
         found: answer to the first question, in one line.
         columns: its table, by column.
         charts: its figures.
-        scene: run that shows the effect live.
+        scene: run that shows the effect live, or a pair for the page.
     """
 
     drawn_by = "hapticclay.views.chart_plots:lab_plot"
@@ -73,7 +84,7 @@ class Lab(Result):
     found: str
     columns: dict[str, tuple]
     charts: tuple[Chart, ...]
-    scene: Scenario
+    scene: Scenario | Pair
 
     def headline(self) -> str:
         """The result, in one line."""
@@ -305,11 +316,96 @@ def jnd_lab(quick: bool, tell: Tell) -> Lab:
     )  # fmt: skip
 
 
+def pushed_pair(Kp: float, steps: int) -> Pair:
+    """A leader, pushed, and a follower, `steps` half samples apart each way."""
+    link = Link(delay=0.5 * ARM_TS * steps)
+    return Pair(ARM, ARM, JointPD((Kp,), (KD,)), link, Ts=ARM_TS, t_max=SWUNG)
+
+
+def swings_grow(record: PairRecord) -> bool:
+    """Whether both arms swing against each other farther in the last quarter than before it."""
+    third, last = np.array_split(np.abs(record.off), 4)[2:]
+    return bool(record.ended) or bool(last.max() > third.max())
+
+
+def delay_rule(Kp: float) -> float:
+    """One-way delay at which late stiffness cancels the damping of opposed arms [s]."""
+    return (ARM.damper + 2.0 * KD) / Kp - ARM_TS
+
+
+def latest(Kp: float) -> int:
+    """Largest stable one-way delay by runs [half samples]."""
+    low, high = (round(x * delay_rule(Kp) / (0.5 * ARM_TS)) for x in TRIED_DELAYS)
+    while high - low > 1:
+        middle = (low + high) // 2
+        grows = swings_grow(simulate(pushed_pair(Kp, middle)))
+        low, high = (low, middle) if grows else (middle, high)
+    return low
+
+
+def pair_lab(quick: bool, tell: Tell) -> Lab:
+    """Leader and follower: how much delay their link may have, over their gain."""
+    gains = GAINS[1::2] if quick else GAINS
+    found = []
+    for Kp in gains:
+        tell(f"Kp = {Kp:g} N/m")
+        found.append(latest(Kp))
+    limits = [pair_limits(pushed_pair(Kp, 0)) for Kp in gains]
+    runs, exact = [0.5e3 * ARM_TS * n for n in found], [1e3 * x.delay for x in limits]
+    line = np.geomspace(gains[0], gains[-1], 41)
+    rule = [1e3 * delay_rule(float(Kp)) for Kp in line]
+    all_exact = [1e3 * pair_limits(pushed_pair(float(Kp), 0)).delay for Kp in line]
+    late = Chart(
+        "delay", "Largest delay over the gain",
+        "Link one way; stable below. Marks are runs, in steps of half a sample.",
+        "gain Kp [N/m]", "largest one-way delay [ms]",
+        (
+            curve("exact", line, all_exact), curve("runs: stable", gains, runs, "marks"),
+            curve("(b + 2 Kd)/Kp - Ts", line, rule, "dashed"),
+        ),
+        "xy",
+    )  # fmt: skip
+    steps, Kp = found[-1], gains[-1]
+    tell("below and beyond the limit")
+    shown = {n: simulate(pushed_pair(Kp, n)) for n in (round(0.7 * steps), round(1.3 * steps))}
+    swings = Chart(
+        "swings", "Beyond the limit both arms swing against each other",
+        f"Follower less leader after a push of the leader; Kp = {Kp:g} N/m.",
+        "time [s]", "follower off [mm]",
+        tuple(
+            curve(f"{0.5e3 * ARM_TS * n:g} ms", x.t, 1e3 * x.off[:, 0]) for n, x in shown.items()
+        ),
+    )  # fmt: skip
+    return Lab(
+        "pair", "Leader and follower",
+        f"Two devices of {ARM.mass:g} kg and {ARM.damper:g} N.s/m follow each other, Kd = "
+        f"{KD:g} N.s/m, at {1.0 / ARM_TS:g} Hz; what one sends comes late to the other.",
+        (
+            "Opposed arms obey m s^2 + b s + (Kp + Kd s)(1 + exp(-s delay)) = 0. Derive the rule "
+            "(b + 2 Kd)/Kp - Ts from it, and say why low gains carry less than the rule says.",
+            "Which of limit and frequency changes with the mass? What changes if all of the delay "
+            "is on the way back?",
+            "Wave variables carry any delay. What does the hand pay for it in free motion, and "
+            "what at a wall?",
+        ),
+        f"from Kp = {gains[0]:g} to {Kp:g} N/m: {runs[0]:g} to {runs[-1]:g} ms one way by runs, "
+        f"{exact[0]:.4g} to {exact[-1]:.4g} ms exact; they swing at "
+        f"{limits[0].frequency:.3g} to {limits[-1].frequency:.3g} Hz",
+        {
+            "Kp [N/m]": tuple(gains), "delay by runs [ms]": tuple(runs), "exact [ms]": tuple(exact),
+            "rule [ms]": tuple(1e3 * delay_rule(Kp) for Kp in gains),
+            "frequency [Hz]": tuple(x.frequency for x in limits),
+        },
+        (late, swings), pushed_pair(Kp, math.ceil(BEYOND * steps)),
+    )  # fmt: skip
+
+
 LABS: dict[str, Callable[[bool, Tell], Lab]] = {
     "wall": wall_lab,
     "zwidth": zwidth_lab,
     "delay": delay_lab,
     "jnd": jnd_lab,
+    "pair": pair_lab,
 }
 
 
@@ -318,7 +414,7 @@ def lab(name: str, quick: bool = False, tell: Tell | None = None) -> Lab:
     """Make the runs of a lab.
 
     Args:
-        name: "wall", "zwidth", "delay" or "jnd".
+        name: "wall", "zwidth", "delay", "jnd" or "pair".
         quick: whether to make fewer runs.
         tell: called with the name of each step before it begins; None for nothing.
     """

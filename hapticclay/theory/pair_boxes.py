@@ -12,9 +12,10 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..errors import Bound, ParameterError
+from ..model.clay import Clay
 from ..model.operator import Operator
 from ..results import Result, Tables
-from ..scene.pair import Contact, Pair
+from ..scene.pair import Contact, Pair, touched_load
 from .hand_boxes import Box
 from .pair_verdict import Study
 
@@ -112,7 +113,7 @@ def pair_hands(
     members = list(itertools.product(hands.corners(), touched))
     drawn = touched * samples if contacts is None else contacts.sample(samples, seed + 1)
     members += zip(hands.sample(samples, seed), drawn, strict=True)
-    axis = own.axis if own is not None else None
+    axis = own.axis if isinstance(own, Contact) else None
     found = [_member(pair, hand, _contact(each, own, axis)) for hand, each in members]
     hand, clay, stable, delay = zip(*found, strict=True)
     study = Study(pair)
@@ -127,11 +128,11 @@ def pair_hands(
     )
 
 
-def _contact(drawn: Operator | None, own: Contact | None, axis: Any) -> Contact | None:
+def _contact(drawn: Operator | None, own: Any, axis: Any) -> Contact | Clay | None:
     return own if drawn is None else Contact(drawn.spring, drawn.damper, drawn.mass, axis)
 
 
-def _member(pair: Pair, hand: Operator, clay: Contact | None) -> tuple[Any, Any, bool, float]:
+def _member(pair: Pair, hand: Operator, clay: Any) -> tuple[Any, Any, bool, float]:
     study = Study(replace(pair, leader_operator=hand, follower_clay=clay))
-    touched = (0.0, 0.0, 0.0) if clay is None else (clay.mass, clay.B, clay.K)
+    touched = tuple(float(x.max()) for x in touched_load(study.pair, 1))
     return (hand.mass, hand.damper, hand.spring), touched, study.stable, study.delay()

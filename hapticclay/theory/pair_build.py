@@ -11,10 +11,10 @@ import numpy as np
 from ..arms.joint_law import JointPD, compensated
 from ..arms.mechanism import Linear
 from ..arms.mjcf_arm import MjcfArm
-from ..errors import ParameterError
 from ..model.operator import NO_HAND
+from ..scene import contact, pair_hardware
 from ..scene import pair as pairs
-from ..scene.pair import Contact, Pair
+from ..scene.pair import Pair
 from .architectures import ARCHITECTURES
 from .client_loop import held_arm
 from .joint_gains import IGNORED, joint_loop
@@ -22,8 +22,6 @@ from .joint_loop import JointLoop
 from .linear_loop import whole_samples
 from .pair_end import End, Load
 from .pair_loop import PairLoop
-
-STILL = 1e-9  # [m] least motion of the handle per joint rate
 
 
 class Build:
@@ -36,7 +34,7 @@ class Build:
 
     def __init__(self, pair: Pair):
         self.pair, self.architecture = pair, ARCHITECTURES[pair.link.kind]
-        self._arms = _leader_arm(pair), _follower_arm(pair)
+        self._arms = _carried(pair, 0), _carried(pair, 1)
 
     @cached_property
     def delays(self) -> tuple[float, float]:
@@ -98,6 +96,9 @@ class Build:
             out += [f"{name}: {note}" for note in pairs.notes_of(arm)]
         if pair.leader is pair.follower:
             out = [f"both arms: {note}" for note in pairs.notes_of(pair.leader)]
+        for i, name in enumerate(("leader", "follower")):
+            words = contact.left_out(pair.touched[i]), pair_hardware.left_out(pair, i)
+            out += [f"{name}: {x}" for x in words if x]
         if pair.link.jitter or pair.link.loss:
             out.append("jitter and loss: as the constant delay that they come to")
         if pair.link.passivity:
@@ -115,45 +116,26 @@ def _scaled(pair: Pair, gain: float) -> Pair:
     return replace(pair, law=laws[0], follower_law=laws[1])
 
 
-def _leader_arm(pair: Pair) -> tuple[Linear, Load]:
-    """The leader with the hand at its handle."""
-    linear = pairs.linear_arm(pair.leader)
-    if pair.leader_operator is None:
-        return linear, _load(linear.jacobian[:0], NO_HAND.mass, NO_HAND.damper, NO_HAND.spring)
-    _check_handle(pair.leader)
-    hand = pair.leader_operator
-    load = _load(linear.jacobian, hand.mass, hand.damper, hand.spring)
-    return held_arm(linear, hand), load
-
-
-def _follower_arm(pair: Pair) -> tuple[Linear, Load]:
-    """The follower with what it touches at its handle."""
-    linear, contact = pairs.linear_arm(pair.follower), pair.follower_clay
-    if contact is None:
-        return linear, _load(linear.jacobian[:0], 0.0, 0.0, 0.0)
-    _check_handle(pair.follower)
-    load = _load(_touched(linear, contact), contact.mass, contact.B, contact.K)
-    return linear._replace(
-        inertia=linear.inertia + load.inertia,
-        damping=linear.damping + load.damping,
-        stiffness=linear.stiffness + load.stiffness,
+def _carried(pair: Pair, i: int) -> tuple[Linear, Load]:
+    """An arm with the hand and what it touches at its handle, and that load."""
+    arm, hand, touched = pair.arms[i], pair.operators[i], pair.touched[i]
+    linear = pairs.linear_arm(arm)
+    none = np.zeros((pair.n, pair.n))
+    if hand is None and touched is None:
+        return linear, Load(none, none, none)
+    _check_handle(arm)
+    J, hand = linear.jacobian, hand or NO_HAND
+    square = J.T @ J
+    met = [J.T @ x @ J for x in pairs.touched_load(pair, i)]
+    held = held_arm(linear, hand)
+    load = Load(
+        hand.mass * square + met[0], hand.damper * square + met[1], hand.spring * square + met[2]
+    )
+    return held._replace(
+        inertia=held.inertia + met[0],
+        damping=held.damping + met[1],
+        stiffness=held.stiffness + met[2],
     ), load
-
-
-def _touched(linear: Linear, contact: Contact) -> np.ndarray:
-    """Rows of the Jacobian along which a contact acts."""
-    if contact.axis is None:
-        return linear.jacobian
-    along = linear.jacobian[pairs.AXES.index(contact.axis)]
-    if not np.abs(along).max() > STILL:
-        bound = "must be one along which the follower's handle can move"
-        raise ParameterError("contact.axis", contact.axis, bound)
-    return along[None]
-
-
-def _load(rows: np.ndarray, mass: float, damper: float, spring: float) -> Load:
-    square = rows.T @ rows
-    return Load(mass * square, damper * square, spring * square)
 
 
 def _check_handle(arm: Any) -> None:

@@ -20,7 +20,7 @@ from ..errors import Bound, ParameterError
 from ..results import Result, Tables
 from ..scene import pair as pairs
 from ..scene.pair import Pair
-from .pair_build import STILL, Build
+from .pair_build import Build
 
 LOWEST = 0.05  # [Hz] of the curves
 HIGHEST = 0.9  # of the Nyquist frequency
@@ -198,8 +198,8 @@ def _along(pair: Pair, axis: str) -> tuple[np.ndarray, np.ndarray]:
     for name, arm in zip(("leader", "follower"), pair.arms, strict=True):
         if not pairs.has_handle(arm):
             arm.check_handle()
-        row = pairs.linear_arm(arm).jacobian[pairs.AXES.index(axis)]
-        if not np.abs(row).max() > STILL:
+        row = pairs.linear_arm(arm).jacobian["xyz".index(axis)]
+        if not np.abs(row).max() > pairs.STILL:
             bound = f"must be one along which the handle of the {name} can move"
             raise ParameterError("axis", axis, bound)
         out.append(row)
@@ -208,11 +208,9 @@ def _along(pair: Pair, axis: str) -> tuple[np.ndarray, np.ndarray]:
 
 def _contact(pair: Pair, omega: np.ndarray, axis: str) -> np.ndarray:
     """Impedance of what the follower touches, along an axis."""
-    clay = pair.follower_clay
-    if clay is None or clay.axis not in (None, axis):
-        return np.zeros(len(omega), complex)
-    s = 1j * omega
-    return clay.mass * s + clay.B + clay.K / s
+    s, i = 1j * omega, "xyz".index(axis)
+    mass, damping, stiffness = (x[i, i] for x in pairs.touched_load(pair, 1))
+    return mass * s + damping + stiffness / s
 
 
 def _bandwidth(f: np.ndarray, ratio: np.ndarray) -> float:

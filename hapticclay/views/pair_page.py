@@ -19,12 +19,12 @@ from .arm_sticks import axes_of, in_space, sticks_of
 from .live_page import PLOT_TIME, LivePage, banner_html
 from .palette import BLACK, BLUE, CLAY_DEEP, PART_COLORS, VERMILION, rgb_bytes
 from .sticks import JOINT, KNOB, LINK, SHAFT, look
+from .touched import AROUND, CLEAR, body_of
 
 NAMES, COLORS = ("leader", "follower"), (BLUE, VERMILION)
 SPAN = 0.15  # [m] of a rail to either side
 GAP = 0.4  # between both arms, as a share of their size
 LONGEST, LEAST_FORCE = 0.35, 5.0  # longest arrow, as a share of the size, and the least force of it
-TOUCHED, CLEAR = 0.09, 0.45  # radius of what the follower touches, and its opacity
 AZIMUTH, ELEVATION = -50.0, 24.0  # [deg] of the first view
 MOST_GAIN = 4.0  # factor of all gains of the slider
 DELAYS, LEAST_DELAYS = 2.5, 20  # largest delay of the slider: of the limit, and control samples
@@ -84,15 +84,25 @@ class PairPage(LivePage):
             self._arrows.append(
                 add.add_arrows(f"/{name}/force", np.zeros((1, 2, 3)), color, **form)
             )
-        touched = self.session.pair.follower_clay
-        if touched is not None:
-            form = dict(opacity=CLEAR, cast_shadow=False, position=figures[1].handle)
-            add.add_icosphere("/touched", TOUCHED * size, rgb_bytes(CLAY_DEEP), **form)
+        self._touched = [self._add_touched(i, x.handle) for i, x in enumerate(figures)]
         free: Any = [k in self._axes for k in range(3)]
         form = dict(active_axes=tuple(free), disable_rotations=True, depth_test=False)
         self.target = add.add_transform_controls("/hand", scale=0.25 * size, **form)
         self.target.position = self._start
         self.target.on_update(self._dragged)
+
+    def _add_touched(self, i: int, start: np.ndarray) -> Any:
+        """Adds what an arm touches; returns it if it moves with the handle."""
+        add, body = self.server.scene, body_of(self.session.pair, i, start, self._size)
+        if body is None:
+            return None
+        form: Any = dict(opacity=CLEAR, cast_shadow=False, position=body.place)
+        name, color = f"/{NAMES[i]}/touched", rgb_bytes(CLAY_DEEP)
+        if body.half is None:
+            add.add_icosphere(name, AROUND * self._size, color, **form)
+            return None
+        made = add.add_box(name, color, tuple(2.0 * body.half), **form)
+        return made if body.moves else None
 
     @property
     def _axes(self) -> list[int]:
@@ -232,6 +242,8 @@ class PairPage(LivePage):
                 shown = self._sticks(i, q)
                 self._pose(i, shown)
                 self._point(i, shown.handle, forces[i])
+                if self._touched[i] is not None:
+                    self._touched[i].position = shown.handle
                 if i == 0 and point is None:
                     self.target.position = shown.handle
         if frames:

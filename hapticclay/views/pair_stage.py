@@ -15,16 +15,16 @@ from ..simulation.pair_record import PairRecord
 from .arm_sticks import in_space, sticks_of
 from .palette import BLUE, CLAY_DEEP, VERMILION
 from .sticks import SHAFT, VIEWS, arrow, box, capsule, draw_sticks, fit, look, room, sphere
+from .touched import AROUND, CLEAR, body_of
 
 POSES = 40  # of a run, from which the cameras see all
 NAMES, COLORS = ("leader", "follower"), (BLUE, VERMILION)
 GAP = 0.3  # between both arms, as a share of their size
-TOUCHED = 0.09  # radius of what the follower touches, as a share of the size
-CLEAR = 0.45  # opacity of clay around the handle
 LONGEST = 0.35  # arrow, of the size
 LEAST = 0.02  # of the longest arrow: shorter ones are not drawn
 SWUNG = 0.25  # [rad] to which the largest motion of a joint is magnified
 SHARE = 0.25  # of the rail of a slide that its motion takes
+ABOVE = np.array([0.0, 0.0, 0.07])  # of a slide's handle, where its arrow is, of the size
 ABOUT = 0.12  # space around both arms, of the size
 WATCHED = 8.0  # [s] that a film takes at least
 
@@ -80,6 +80,7 @@ class PairStage:
         places = [np.concatenate([x.segments.reshape(-1, 3) for x in end]) for end in figures]
         self._size = max(float(np.ptp(x, axis=0).max()) for x in places)
         self._shift[1] = self._beside(places, camera)
+        self._starts = [self._sticks(i, q).handle for i, q in enumerate(self._start)]
         self._most = float(np.linalg.norm(forces, axis=-1).max(initial=0.0)) or 1.0
         handles = np.array([x.handle for x in figures[1]]) + self._shift[1]
         seen = self._seen(np.concatenate([places[0], places[1] + self._shift[1]]))
@@ -136,7 +137,8 @@ class PairStage:
             self._draw_name(scene, i)
             length = LONGEST * size / self._most * self._pressed[i]
             if np.linalg.norm(length) > LEAST * LONGEST * size:
-                arrow(scene, shown.handle, shown.handle + length, SHAFT * size, COLORS[i])
+                begin = shown.handle + (ABOVE * size if self._slides else 0.0)
+                arrow(scene, begin, begin + length, SHAFT * size, COLORS[i])
 
     def _draw_name(self, scene: mujoco.MjvScene, i: int) -> None:
         """Writes which arm it is, at its foot."""
@@ -145,14 +147,16 @@ class PairStage:
             geom.label = NAMES[i]
 
     def _draw_touched(self, scene: mujoco.MjvScene) -> None:
-        """Clay where the follower started, or the object that moves with it, and its spring."""
-        touched, size = self._pair.follower_clay, self._size
-        if touched is None:
-            return
-        start, now = self._sticks(1, self._start[1]).handle, self._shown[1].handle
-        if touched.mass:
-            box(scene, now, np.full(3, 0.6 * TOUCHED * size), CLAY_DEEP, CLEAR)
-        else:
-            sphere(scene, start, TOUCHED * size, CLAY_DEEP, CLEAR)
-        if touched.K:
-            capsule(scene, start, now, 0.3 * SHAFT * size, CLAY_DEEP)
+        """Walls and clay, objects that move with a handle, and their springs."""
+        size = self._size
+        for i, start in enumerate(self._starts):
+            body = body_of(self._pair, i, start, size, self._magnify)
+            if body is None:
+                continue
+            now = self._shown[i].handle
+            if body.half is None:
+                sphere(scene, body.place, AROUND * size, CLAY_DEEP, CLEAR)
+            else:
+                box(scene, now if body.moves else body.place, body.half, CLAY_DEEP, CLEAR)
+            if body.spring:
+                capsule(scene, start, now, 0.3 * SHAFT * size, CLAY_DEEP)

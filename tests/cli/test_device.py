@@ -86,6 +86,63 @@ def test_a_session_leaves_its_record_messages_and_report(session, tmp_path, monk
     assert json.loads((tmp_path / "out/loop/loop.json").read_text())["schema"]
 
 
+PAIR = """
+Ts = "2 ms"
+[leader]
+mass = 0.5
+damper = 1.0
+[law]
+Kp = [400.0]
+Kd = [20.0]
+[link]
+delay = {}
+"""
+
+
+def test_both_ends_of_a_pair_are_served_and_their_record_is_written(tmp_path):
+    (tmp_path / "pair.toml").write_text(PAIR.format("4e-3"))
+    words = "device serve --pair pair.toml --port 0 --clock tick --period 10ms --no-plots --out s"
+    with subprocess.Popen(
+        [sys.executable, "-m", "hapticclay", *words.split()], cwd=tmp_path, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    ) as process:  # fmt: skip
+        lines = [process.stdout.readline() for _ in range(3)]
+        hand, tool = (Client(re.findall(r"ws://\S+", x)[0]) for x in lines[:2])
+        for _ in range(5):
+            hand.state(tick(x=1.0))
+            tool.state(tick(x=-0.5))
+        for client in (hand, tool):
+            client.socket.close()
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 0 and not err and "controllers and link took" in out
+    assert [x.split(":")[0] for x in lines[:2]] == ["leader", "follower"]
+    for end in ("leader", "follower"):
+        assert len(Exchanges.load(tmp_path / "s" / end)) == 5
+    found = json.loads((tmp_path / "s" / "pair_run.json").read_text())
+    assert len(found["tables"]["samples"]["t [s]"]) == 25
+
+
+@pytest.mark.parametrize(
+    "words, told",
+    [
+        (["--end", "leader"], "give --pair"),
+        (["arm.toml", "--pair", "good.toml"], "give one of the two"),
+        (["--pair", "good.toml", "--hand", "0", "0"], "is in the file of the pair"),
+        (["--pair", "good.toml", "--end", "leder"], "did you mean 'leader'"),
+        (["--pair", "late.toml"], "whole parts"),
+        (["--pair", "none.toml"], "can be read"),
+    ],
+)
+def test_what_no_pair_serves_is_said_in_a_line(words, told, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "good.toml").write_text(PAIR.format("4e-3"))
+    (tmp_path / "late.toml").write_text(PAIR.format("3.1415e-4"))
+    assert app.main(["device", "serve", "--port", "0", "--duration", "0", *words]) == 2
+    error = capsys.readouterr().err
+    assert told in error and error.count("\n") == 1
+
+
 def test_nobody_came(capsys, tmp_path):
     words = ["device", "serve", "--port", "0", "--clock", "tick", "--duration", "0"]
     assert app.main([*words, "--out", str(tmp_path)]) == 0

@@ -43,6 +43,49 @@ def test_verdict_map_and_architectures(file, tmp_path, capsys):
     assert found["tables"]["pair"]["stable"] == [True]
 
 
+SCENE = """
+t_max = 0.1
+[leader]
+l1 = 0.3
+[law]
+Kp = [20.0, 10.0]
+Kd = [1.0, 0.5]
+[follower_clay]
+x = {edges = [0.001], values = [0, 20], Fy = [0, 0.5]}
+y = {edges = [], values = [3]}
+[leader_hardware]
+encoder = 4096
+"""
+
+
+def test_arms_in_closed_form_with_clay_and_hardware_run(tmp_path, capsys):
+    path = tmp_path / "pair.toml"
+    path.write_text(SCENE)
+    words = ["pair", str(path), "--run", "0.05", "--out", str(tmp_path / "out")]
+    assert main(words) == 0
+    text = capsys.readouterr().out
+    assert "to its end" in text
+    assert "follower: clay: as its largest damping" in text and "leader: encoder: left out" in text
+
+
+@pytest.mark.parametrize(
+    "change, told",
+    [
+        (("encoder = 4096", "encodr = 4096"), "encoder"),
+        (("encoder = 4096", "delay = 0.001"), "Pair(delay)"),
+        (("encoder = 4096", "encoder = 3"), "leader_hardware.encoder = 3: must be"),
+        (("Fy = [0, 0.5]", "Fy = [0, -1]"), "Fy"),
+        (("edges = []", "edge = []"), "edges"),
+    ],
+)
+def test_scenes_of_pairs_are_refused_in_one_line(change, told, tmp_path, capsys):
+    path = tmp_path / "pair.toml"
+    path.write_text(SCENE.replace(*change))
+    assert main(["pair", str(path), "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert told in error and error.count("\n") == 1, error
+
+
 def test_options_replace_what_the_file_says(file, tmp_path, capsys):
     words = ["pair", file, "--delay", "0.4", "--Ts", "2ms", "--kind", "four-channel"]
     assert main([*words, "--out", str(tmp_path / "out")]) == 0

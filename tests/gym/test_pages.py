@@ -1,5 +1,6 @@
 """Pages of the environments: tables are those of the spaces, snippets run; benchmarks; command."""
 
+import json
 import re
 import subprocess
 import sys
@@ -61,6 +62,13 @@ def test_extreme_episodes_are_finite(tmp_path):
     for row in found["environments"]:
         assert row["episodes"] >= 6 and row["bad"] == 0
     assert (tmp_path / "gym_extremes.json").is_file()
+
+
+def test_the_published_table_is_that_of_the_published_speeds():
+    data = json.loads(gym_speed.PUBLISHED.read_text())
+    text = (ROOT / "docs" / "gym.md").read_text()
+    assert section(text, "speed") == gym_speed.table(data)
+    assert [row["id"] for row in data["environments"]] == list(registry.IDS)
 
 
 def test_speed_is_measured_beside_the_floor(tmp_path):

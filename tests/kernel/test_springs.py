@@ -11,6 +11,7 @@ from scipy.linalg import expm
 import hapticclay as hc
 from hapticclay.theory import linear_loop
 from tests.kernel.test_yield import V0, M, slider
+from tests.oracles import touched_pairs
 
 HIT = 0.01 / V0  # when the slider comes to the wall [s]
 
@@ -41,6 +42,27 @@ def test_a_wall_throws_the_slider_back(k):
         assert abs(r.energy["residual"]) < 1e-14
     if k == 1e3:
         assert np.log2(errors[0] / errors[2]) / np.log2(10.0) == pytest.approx(2.0, abs=0.2)
+
+
+@pytest.mark.parametrize("b", [3.0, 60.0])
+def test_a_damped_wall_never_pulls(b):
+    """Against SciPy from touch to letting go; of second order in the step, the same in Python."""
+    k, T = 4000.0, HIT + 0.1
+    there = touched_pairs.Wall(M, 0.0, k, b, 0.03)
+    x, v = there.step(np.array([0.02, V0]), 0.0, T)
+    errors = []
+    for dt in (1e-3, 5e-4, 2.5e-4):
+        s = slider(wall(hc.Spring(k=k, unilateral=True), b), dt, T)
+        r = hc.simulate(s)
+        errors.append(abs(r.v[-1, 0] - v))
+        assert r.fe[:, 0].min() == 0.0 and abs(r.energy["residual"]) < 1e-14
+        # (w h)^2/12 in each of touch, spring and letting go
+        assert errors[-1] < 0.25 * abs(v) * k * r.scenario.mobility * dt**2
+    python = hc.simulate(s, engine="python")
+    np.testing.assert_array_equal(r.fe, python.fe)
+    np.testing.assert_array_equal(r.p, python.p)
+    if b == 3.0:
+        assert x < 0.03 and v < 0.0  # it has left
 
 
 def test_a_dent_stays():

@@ -186,7 +186,6 @@ BAD = {
     "velocity": (dict(velocity=(0.1, 0.0)), "velocity", "must be left out"),
     "origin": (dict(origin=(0.1, 0.3)), "origin", "must be left out"),
     "limits of the servo": (dict(torque_limit=(3.0, 2.0)), "torque_limit", "must be left out"),
-    "two hands": (dict(operator=(HAND, None)), "operator", "must be one for all axes"),
     "command": (dict(command=hc.Step((0.01, 0.0), 0.1)), "command", "must be None"),
     "shaping": (dict(inertia_shaping=True), "inertia_shaping", "must be left out"),
     "groove": (
@@ -245,3 +244,40 @@ def test_a_law_that_fails_is_told(torques):
     law = hc.Controller(lambda t, q, qd, fh, state, params: (torques, state))
     with pytest.raises(hc.LawFailed if hasattr(hc, "LawFailed") else RuntimeError):
         hc.simulate(hc.Scenario(arm=ARM, controller=law, Ts=1e-3, t_max=0.01))
+
+
+# ---- clay of an arm that moves on a line ---------------------------------------------------------
+
+RAIL = """<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="x" type="slide"
+axis="{} {} 0" damping="0.5" frictionloss="{}"/><geom size="0.01" mass="1"/><site name="handle"/>
+</body></worldbody></mujoco>"""
+
+
+def on_rail(direction, friction, clay, force, t_max):
+    arm = hc.MjcfArm(mujoco.MjSpec.from_string(RAIL.format(*direction, friction)))
+    none = hc.JointPD((0.0,), (0.0,))
+    return hc.simulate(
+        hc.Scenario(arm=arm, clay=clay, controller=none, render="physical", dt=1e-3, t_max=t_max,
+                    force=force, stop_when_unstable=False)
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("direction", [(1.0, 0.0), (0.6, 0.8)])
+def test_clay_yields_on_a_rail(direction):
+    """v' = F - Fy - 1.5 v along the rail, in closed form."""
+    flow = hc.Profile((), (1.0,), Fy=(3.0,))
+    force = tuple(5.0 * x for x in direction)
+    r = on_rail(direction, 0.0, hc.Clay(flow, flow, isotropic=True), force, 0.2)
+    want = np.outer((2.0 / 1.5) * (1.0 - np.exp(-1.5 * r.t)), direction)
+    np.testing.assert_allclose(r.v, want, atol=1e-6)  # (1.5 dt)^2/12 of 0.35 m/s, and the trace
+    held = on_rail(direction, 0.0, hc.Clay(flow, flow, isotropic=True), (1.0, 0.0), 0.1)
+    assert np.abs(held.p).max() < 1e-12
+
+
+def test_friction_of_joints_bears_springs_of_clay():
+    """Pressed by 2 N and let go, a mass with 0.5 N of friction rests where k p is within 0.5 N."""
+    clay = hc.Clay(hc.Profile((), (5.0,), springs=(hc.Spring(k=400.0),)), hc.Profile((), (0.0,)))
+    r = on_rail((1.0, 0.0), 0.5, clay, (2.0, 0.0), 2.0)
+    assert np.abs(r.v[-1]).max() < 1e-15 and 1.5 <= 400.0 * r.p[-1, 0] <= 2.5
+    still = on_rail((1.0, 0.0), 0.5, clay, (0.4, 0.0), 0.1)
+    assert not np.any(still.p)

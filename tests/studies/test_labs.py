@@ -24,7 +24,7 @@ def test_a_lab_has_a_table_questions_figures_and_a_run(found, tmp_path):
     assert len(found.questions) == 3 and len({len(x) for x in found.columns.values()}) == 1
     assert found.title in repr(found) and found._repr_html_().startswith("<table")
     assert found.to_frame().shape[1] == len(found.columns)
-    assert found.plot().axes and isinstance(found.scene, hc.Scenario)
+    assert found.plot().axes and isinstance(found.scene, hc.Scenario | hc.Pair)
     again = Result.load(found.save(tmp_path / "lab.json"))
     assert plain(again) == plain(found)
 
@@ -40,6 +40,11 @@ def test_its_runs_find_what_theory_says(found):
     elif found.name == "delay":
         assert c["stable K by runs"] == pytest.approx(c["rule"], rel=0.01)  # of first order
         assert np.all(c["passive K by runs"] <= 1.001 * c["stable K by runs"])
+    elif found.name == "pair":
+        step = 0.5e3 * labs.ARM_TS  # runs are tried at whole steps: the last stable one
+        assert np.all((c["delay by runs"] <= c["exact"]) & (c["exact"] < c["delay by runs"] + step))
+        # opposed arms of two springs Kp at each end of a mass: to the damping's share, 2 %
+        assert c["frequency"] == pytest.approx(np.sqrt(2.0 * c["Kp"] / 1.0) / 2.0 / np.pi, rel=0.02)
     else:
         # a step's share of the spread, and four standard errors
         gap = np.abs(c["by staircases"] - c["of the observer"])
@@ -79,3 +84,23 @@ def test_view_shows_the_run_of_the_lab(tmp_path, monkeypatch):
     assert app.main(["lab", "jnd", "--quick", "--view", "--out", str(tmp_path)]) == 0
     (((record, tool),),) = (shown,)
     assert record.scenario.name == "virtual wall" and tool.width > 0.0
+
+
+@pytest.mark.parametrize("Kp", [4e3, 1.6e4])
+def test_the_rule_of_delay_is_the_limit_of_stiff_pairs(Kp, monkeypatch):
+    """Of first order: what is left is a twelfth of the squared angle of the delay, to a quarter."""
+    monkeypatch.setattr(labs, "ARM_TS", 1e-5)
+    limits = hc.theory.pair_limits(labs.pushed_pair(Kp, 0))
+    angle = 2.0 * np.pi * limits.frequency * limits.delay
+    left = labs.delay_rule(Kp) / limits.delay - 1.0
+    assert left == pytest.approx(angle**2 / 12.0, rel=0.25)
+
+
+def test_view_shows_the_pair_of_the_lab(tmp_path, monkeypatch):
+    from hapticclay.cli import view
+
+    shown = []
+    monkeypatch.setattr(view, "show_pair", shown.append)
+    monkeypatch.setattr(labs, "GAINS", (1600.0,) * 2)
+    assert app.main(["lab", "pair", "--quick", "--view", "--out", str(tmp_path)]) == 0
+    assert shown[0].link.delay == pytest.approx(11e-3)

@@ -60,6 +60,7 @@ FEWER = {
     "walls/device_hand": {"(0.0, 3.0), ((0.0": "(0.0, 0.6), ((0.0", "url, 3.0,": "url, 0.6,"},
     "walls/impedance": {"measure_impedance(wall)": "measure_impedance(wall, lines=5)"},
     "walls/limits": {"5e-3, 101)": "5e-3, 11)"},
+    "walls/pair_ends": {"range(200)": "range(40)"},
     "walls/press": {
         "(20e-6, 80e-6)": "(80e-6,)",
         '"os"': '"o"',

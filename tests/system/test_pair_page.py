@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -100,6 +101,17 @@ def test_arms_stand_where_the_film_has_them(name):
         for i, parts in enumerate(page._parts):
             handle = arm.handle() + page._shift[i]
             assert until(lambda h=handle, p=parts: np.allclose(p["knob"][0].position, h, atol=0.02))
+
+
+def test_a_wall_stands_and_an_object_moves_with_the_handle(file):
+    wall = hc.Contact(500.0, unilateral=True, start=0.02)
+    pair = replace(hc.Pair.load(file), follower_clay=wall, leader_clay=hc.Contact(mass=0.2))
+    with shown(pair) as page:
+        assert page._touched[0] is not None and page._touched[1] is None
+        page.hold.value = True
+        page.target.position = tuple(page._start + np.array([0.05, 0.0, 0.0]))
+        page._dragged(None)
+        assert until(lambda: page._touched[0].position[0] > 0.02)
 
 
 def test_ctrl_c_ends_it_and_the_record_is_there(file, tmp_path):

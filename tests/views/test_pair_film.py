@@ -11,7 +11,8 @@ from hapticclay.views import film
 from hapticclay.views.arm_sticks import in_space, sticks_of
 from hapticclay.views.film import FilmOptions
 from hapticclay.views.pair_stage import PairReel, PairStage, look_of
-from hapticclay.views.sticks import LEAST_ASPECT
+from hapticclay.views.sticks import KNOB, LEAST_ASPECT
+from hapticclay.views.touched import body_of
 from tests.views.test_film import needs_gl
 
 DEVICE = hc.Device(6.0, 0.1)
@@ -70,6 +71,37 @@ def test_cameras_see_both_arms_apart(name, camera):
         assert np.abs(across).max() < 1.0 and np.abs(high).max() < 1.0
         spans.append((across.min(), across.max()))
     assert spans[0][1] < spans[1][0]  # leader left of follower
+
+
+@pytest.mark.parametrize("start, along", [(5e-3, 1.0), (-5e-3, -1.0)])
+def test_a_wall_stands_where_the_handle_meets_it(start, along):
+    """Its face is a knob's radius beyond the handle that has just reached it."""
+    pair = slides(follower_clay=hc.Contact(500.0, unilateral=True, start=start))
+    body = body_of(pair, 1, np.array([0.1, 0.2, 0.3]), 0.5)
+    face = body.place - along * body.half * [1.0, 0.0, 0.0]
+    np.testing.assert_allclose(face, [0.1 + start + along * KNOB * 0.5, 0.2, 0.3])
+    assert not body.moves and body_of(pair, 0, np.zeros(3), 0.5) is None
+
+
+def test_clay_ahead_begins_at_its_border_and_clay_around_is_a_ball():
+    beyond = hc.Clay(hc.Profile((5e-3,), (0.0, 10.0)), hc.Profile((), (0.0,)))
+    body = body_of(slides(follower_clay=beyond), 1, np.zeros(3), 1.0)
+    assert body.place[0] - body.half[0] == pytest.approx(5e-3 + KNOB)
+    around = hc.Clay(hc.Profile((), (10.0,)), hc.Profile((), (10.0,)))
+    assert body_of(slides(leader_clay=around), 0, np.ones(3), 1.0).half is None
+
+
+def test_objects_move_on_their_spring():
+    body = body_of(slides(follower_clay=hc.Contact(50.0, 1.0, 3.0)), 1, np.zeros(3), 1.0)
+    assert body.moves and body.spring and body.half is not None
+
+
+@needs_gl
+def test_two_links_in_closed_form_are_filmed():
+    law = hc.JointPD((20.0,) * 2, (1.0,) * 2)
+    found = hc.simulate(hc.Pair(hc.Arm(), hc.Arm(), law, hc.Link(), t_max=0.02))
+    shots = [x.copy() for x in film.frames(found, FilmOptions(magnify=50.0, plots=False), 200)]
+    assert any((a != b).any() for a, b in zip(shots, shots[1:], strict=False))
 
 
 @needs_gl
