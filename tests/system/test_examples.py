@@ -41,7 +41,9 @@ FEWER = {
     "symptoms/device_from_data": {"12.0, muscle": "8.0, muscle"},
     "symptoms/fast_enough": {"5000.0, 60)": "5000.0, 12)"},
     "symptoms/pair_oscillates": {
-        "gains=12": "gains=2", "1.0, 9)": "1.0, 2)", ', ("Kp/2, 1.5 Kd", softer)': ",",
+        "gains=12": "gains=2",
+        "1.0, 9)": "1.0, 2)",
+        ', ("Kp/2, 1.5 Kd", softer)': ",",
     },  # fmt: skip
     "symptoms/sticks_and_jumps": {"dt=1e-3": "dt=2e-3"},
     "symptoms/wall_vibrates": {"scenario(0.6,": "scenario(0.3,", "t > 0.5": "t > 0.2"},
