@@ -384,6 +384,13 @@ class Mechanism:
 
     def _follow(self) -> np.ndarray:
         """Rates of all joints per rate of the arm's, shape (nv, n); locked joints rest."""
+        here = self._data.qpos.tobytes()
+        if getattr(self._own, "followed_at", None) != here:  # a step asks three times at a pose
+            self._own.followed_at, self._own.follow = here, self._followed()
+        return self._own.follow
+
+    def _followed(self) -> np.ndarray:
+        """`_follow`, computed."""
         out = np.zeros((self._model.nv, len(self.dofs)))
         out[self.dofs, range(len(self.dofs))] = 1.0
         if self.following:

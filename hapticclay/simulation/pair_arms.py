@@ -24,7 +24,6 @@ from ..scene.virtual_wall import Device
 BALL = 0.01  # [m] of the body of a device, which has no other meaning
 STRONG = (1e6, 1e6)  # [N.m] motors of a two-link arm without limits
 MOST_PARTS = 40  # engine steps of a control sample that are tried
-SHARE = 0.5  # of the inertia of link 1 that the mass of link 2 makes, in a model of such an arm
 
 
 def run_arm(pair: Pair, i: int, acts: bool) -> MjcfArm | Arm:
@@ -61,21 +60,13 @@ def _slide(device: Device, drive: JointPD | None, limit: float | None = None) ->
 
 
 def _two_links(arm: Arm, friction: tuple[float, float]) -> MjcfArm:
-    """The two-link arm as a model, elbow square: link 2 is balanced, its mass at the elbow."""
-    from ..physics import mujoco
+    """The two-link arm as a model, elbow square."""
+    from ..kernel.engine import compose_spec  # imported only for drives
 
-    spec = mujoco.MjSpec()
-    spec.modelname, spec.option.gravity = "two_links", [0.0, 0.0, 0.0]
-    at_elbow = SHARE * arm.I1 / arm.l1**2
-    parent = spec.worldbody
-    for k, inertia in enumerate((arm.I1 * (1.0 - SHARE), arm.I2)):
-        body = parent.add_body(name=f"link{k + 1}", pos=[arm.l1 * k, 0.0, 0.0])
-        body.mass, body.inertia, body.explicitinertial = at_elbow, [inertia] * 3, True
-        body.ipos = [0.0, 0.0, 0.0]
-        body.add_joint(name=f"joint{k + 1}", axis=[0.0, 0.0, 1.0])
-        parent = body
-    parent.add_site(name="handle", pos=[arm.l2, 0.0, 0.0])
-    return MjcfArm(spec, pose=NOMINAL, friction=friction)
+    spec = compose_spec(["arm.xml"], arm)
+    for motor in list(spec.actuators):
+        spec.delete(motor)
+    return MjcfArm(spec, site="handle", pose=NOMINAL, friction=friction)
 
 
 def _driven(arm: MjcfArm, drive: JointPD) -> MjcfArm:

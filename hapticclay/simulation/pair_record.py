@@ -60,6 +60,11 @@ class PairRecord(Result):
     pair: Pair | None = None
 
     @property
+    def unit(self) -> str:
+        """Unit of the joints' positions, "m" for a device of one axis, which may be rotary."""
+        return "m" if self.names == ("x",) else "rad"
+
+    @property
     def motion(self) -> np.ndarray:
         """Largest motion of a joint of either arm from its pose [rad], shape (m,)."""
         both = np.hstack([self.leader - self.leader[0], self.follower - self.follower[0]])
@@ -100,9 +105,10 @@ class PairRecord(Result):
     def headline(self) -> str:
         """The run in one line."""
         how = f"ended at {self.t[-1]:.4g} s: {self.ended}" if self.ended else "to its end"
-        grows = "motion grows" if self.grows else "motion decays"
+        grows = f"rates {'grow' if self.grows else 'fall'} in its last quarter"
+        off = f"follower off by {1e3 * self.error:.3g} m{self.unit} rms"
         return (
-            f"{self.kind}, {how}; {grows}; follower off by {1e3 * self.error:.3g} mrad rms; "
+            f"{self.kind}, {how}; {grows}; {off}; "
             f"controllers and link took {self.energy[-1]:.3g} J, at least {self.energy.min():.3g} J"
         )
 
@@ -111,13 +117,15 @@ class PairRecord(Result):
         end: dict[str, Any] = {
             "t [s]": [float(self.t[-1])],
             "grows": [self.grows],
-            "error [rad]": [self.error],
+            f"error [{self.unit}]": [self.error],
             "energy [J]": [float(self.energy[-1])],
         }
         samples: dict[str, Any] = {"t [s]": self.t, "energy [J]": self.energy}
         for i, name in enumerate(("leader", "follower")):
             samples[f"energy at {name} [J]"] = self.port_energy[:, i]
+        samples["hand [N]"] = np.linalg.norm(self.hand, axis=1)
+        samples["contact [N]"] = np.linalg.norm(self.contact, axis=1)
         for j, name in enumerate(self.names):
-            samples[f"leader {name} [rad]"] = self.leader[:, j]
-            samples[f"follower {name} [rad]"] = self.follower[:, j]
+            samples[f"leader {name} [{self.unit}]"] = self.leader[:, j]
+            samples[f"follower {name} [{self.unit}]"] = self.follower[:, j]
         return {"end": end, "samples": samples}

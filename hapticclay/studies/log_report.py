@@ -123,20 +123,23 @@ def log_report(log: Log) -> LogReport:
     if stamps is not None and stamps.even < 1.0:
         share = 100.0 * (1.0 - stamps.even)
         warnings.append(f"{share:.3g} % of the steps are off by more than 5 %: {TREATED}")
-    rows, accepted, columns, unknown = [], _accepted(log), {}, set()
+    rows, accepted, columns = [], _accepted(log), {}
+    unknown: set[str] = set()  # columns whose unit is
+    still: set[str] = set()  # those that do not change
     for place, head in enumerate(log.table.heads):
         size, unit, faults = _unit(log, place, accepted.get(head.text, ()))
         unknown |= {head.text} if faults else set()
         x = log.table.loose_numbers(place)
         kept = x[np.isfinite(x)] * size
         low, high = (float(kept.min()), float(kept.max())) if len(kept) else (math.nan, math.nan)
+        still |= set() if low < high else {head.text}
         rows.append((head.text, unit, low, high, "; ".join([*faults, *_remarks(x)])))
         if len(kept) and head.text != time:
             columns[_label(head, unit)] = size * np.where(np.abs(x) > HUGE, math.nan, x)
     warnings += _unstated([x.name for x in log.table.heads if x.text in unknown])
     table = table_of(("column", "unit", "lowest", "highest", "remarks"), rows)
     t = None if stamps is None else stamps.t
-    said = tuple(log.table.notes), tuple(warnings), tuple(_commands(log, time, unknown))
+    said = tuple(log.table.notes), tuple(warnings), tuple(_commands(log, time, unknown, still))
     name, form = log.path.name, log.table.form
     return LogReport(name, form, log.rows, time, table, t, columns, *said)
 
@@ -268,10 +271,11 @@ def _remarks(x: np.ndarray) -> list[str]:
     return out
 
 
-def _commands(log: Log, time: str, unknown: set[str]) -> list[str]:
-    """Commands that the columns suit, those of unknown units aside."""
+def _commands(log: Log, time: str, unknown: set[str], still: set[str]) -> list[str]:
+    """Commands that the columns suit, but those of unknown units and those that do not change."""
     every = {x: candidates(log, x) for x in ("force", "position", "command")}
-    found = {x: [name for name in names if name not in unknown] for x, names in every.items()}
+    unfit = unknown | still
+    found = {x: [name for name in names if name not in unfit] for x, names in every.items()}
     file = shlex.quote(str(log.path))
     if is_pair(log) and not unknown:
         return [f"hapticclay pair --data {file}"]

@@ -40,8 +40,7 @@ def most_moved(r: PairRecord) -> tuple[int, list[np.ndarray]]:
     return j, [x[:, j] for x in moved]
 
 
-def pair_unit(names: tuple[str, ...], turned: Any) -> tuple[str, float]:
+def pair_unit(unit: str, turned: Any) -> tuple[str, float]:
     """Unit in which a joint's motion is drawn, and its size."""
     small = max(float(np.abs(x).max(initial=0.0)) for x in turned) < SMALL
-    unit = "m" if names == ("x",) else "rad"
     return (f"m{unit}", 1e3) if small else (unit, 1.0)

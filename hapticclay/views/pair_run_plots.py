@@ -20,9 +20,9 @@ def run_plot(found: PairRecord) -> Figure:
     """Plots the joint that moves most, its error, forces of hand and contact, and energy taken."""
     figure, (motion, error, force, energy) = stacked(4, 7.6)
     j, turned = most_moved(found)
-    unit, scale = pair_unit(found.names, turned)
+    unit, scale = pair_unit(found.unit, turned)
     _draw(motion, found.t, [scale * x for x in turned], LOOKS)
-    near, per = pair_unit(found.names, [found.off[:, j]])
+    near, per = pair_unit(found.unit, [found.off[:, j]])
     error.plot(found.t, per * found.off[:, j], color=BLACK)
     level(error)
     sizes = [np.linalg.norm(f, axis=1) for f in (found.hand, found.contact)]
@@ -37,7 +37,9 @@ def run_plot(found: PairRecord) -> Figure:
     label_axes(energy, "time [s]", "energy taken [mJ]")
     for ax in (motion, force, energy):
         ax.legend(fontsize=points(8), ncols=2 if ax is energy else 1)
-    set_title(motion, found.kind, found.ended or ("grows" if found.grows else "decays"))
+    set_title(
+        motion, found.kind, found.ended or f"rates {'grow' if found.grows else 'fall'} at the end"
+    )
     figure.align_ylabels()
     return figure
 

@@ -130,7 +130,7 @@ def _draw_clay(panels: Any, record: Record) -> None:
 def _pair_panels(r: PairRecord) -> tuple[Panel, ...]:
     """The joint that moves most, forces of hand and contact, and energy taken, over time."""
     j, turned = most_moved(r)
-    unit, scale = pair_unit(r.names, turned)
+    unit, scale = pair_unit(r.unit, turned)
     forces = [np.linalg.norm(f, axis=1) for f in (r.hand, r.contact)]
     ports = [1e3 * x for x in r.port_energy.T]
 

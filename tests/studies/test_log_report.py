@@ -153,6 +153,14 @@ def test_a_coarse_sensor_is_not_held(tmp_path):
     assert held_rows(slow) == 1
 
 
+def test_a_column_that_does_not_change_is_in_no_command(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(
+        "\n".join(["t [s],force [N],pos [m]", *(f"{0.001 * i},1,{i}" for i in range(30))])
+    )
+    assert hc.studies.log_report(hc.Log.read(path)).commands == ()
+
+
 def test_a_table_on_its_side_is_refused_in_a_line(tmp_path):
     path = tmp_path / "side.csv"
     path.write_text("\n".join(",".join(f"{i + j}.5" for i in range(1500)) for j in range(3)))
