@@ -14,6 +14,7 @@ from . import methods
 
 COSINES = 2**22  # cosines that are tabulated at once where a multisine drives the accurate method
 NEAR = 1e-6  # of dt: a jump of a signal so close to the end of a step counts as at its end
+AHEAD = 64  # steps that are prepared at once, at least: of one alone it takes longer than the step
 
 
 class Drives:
@@ -26,14 +27,27 @@ class Drives:
             for name, signal in both.items()
             if signal is not None and signal.varies
         }
+        self._arrays: Any = None  # of the row in which steps are prepared ...
+        self._first, self._end = 0, 0  # ... and which steps
 
     def prepare(self, row: Any, n: int) -> int:
         """Prepares the signals over the next whole steps; returns how many."""
+        i = row.s.i
+        if row.arrays is self._arrays and self._first <= i and i + n <= self._end:
+            return n
+        made = self._prepared(row, n)
+        self._arrays, self._first, self._end = row.arrays, i, i + made
+        return min(n, made)
+
+    def _prepared(self, row: Any, n: int) -> int:
+        """Prepares at least n steps, or as many as may be at once; returns how many."""
         m, i, dt, tables = row.m, row.s.i, row.m.dt, self.signals.values()
         if m.method == methods.ACCURATE:
             counts = row.substeps(i)
             cosines = max(1, *(x.cosines for x in tables))
             n = min(n, max(1, COSINES // (2 * counts * cosines)))
+        else:
+            n = max(n, min(AHEAD, m.last - i + 1))
         begin, end = max(i - 1, 0) * dt, min((i + n + 2 + m.ratio) * dt, m.t_max)
         for drive in tables:
             drive.prepare(begin, end)
