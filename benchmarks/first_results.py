@@ -99,13 +99,17 @@ FIRST: dict[str, Any] = {
 }
 
 
+def clean() -> dict[str, str]:
+    """The environment without what leads Python elsewhere."""
+    return {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "XDG_"))}
+
+
 class Home:
     """A user's empty folder, in which processes of an interpreter run."""
 
     def __init__(self, python: str, folder: str, limit: float):
         self.python, self.folder, self.limit = python, folder, limit
-        kept = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "XDG_"))}
-        self.env = {**kept, "HOME": folder, "TMPDIR": folder, "MPLBACKEND": "Agg"}
+        self.env = {**clean(), "HOME": folder, "TMPDIR": folder, "MPLBACKEND": "Agg"}
 
     def spent(self, *arguments: str) -> float | None:
         """Processor time of a process [s]; None beyond the limit.
@@ -189,7 +193,7 @@ def installed(wheel: str) -> float:
             subprocess.run([sys.executable, "-m", "venv", folder], check=True)
             pip = [f"{folder}/bin/python", "-m", "pip", "install", "--quiet", wheel]
             begin = time.perf_counter()
-            subprocess.run(pip, check=True, capture_output=True)
+            subprocess.run(pip, check=True, capture_output=True, env=clean())
             took.append(time.perf_counter() - begin)
     return took[-1]
 
@@ -258,7 +262,8 @@ def page(data: dict[str, Any]) -> str:
         "Processor time [s] from the start of a process to its end, imports included: *first* in "
         "an empty home folder, *again* in the same one. The release before made single runs in "
         "Python, compiled a kind of scene where that paid, and kept the code in the home folder; "
-        "this one is compiled when it is installed. *Not there*: the release before lacks it.",
+        "this one is compiled when it is installed. *Not there*: the release before lacks it. "
+        f"A job that is not done after {data['limit']:g} s on the clock is stopped.",
         common.table(cells, ["job", "before, first", "before, again", "now, first", "now, again"]),
         "## Data and machine",
         "All numbers: [first_results.json](first_results.json).",

@@ -85,6 +85,7 @@ def good_values(folder):
         "lab": {"name": "jnd"},
         "simulate_columns": {"base": cut, "columns": {"gain.x": np.ones(3)}},
         "run_columns": {"base": cut, "columns": {"gain.x": np.ones(3)}},
+        "serve_pair": {"pair": hc.Pair(hc.Device(), hc.Device(), hc.JointPD((9.0,), (1.0,)))},
         "PairLog": {"t": t, "leader": np.sin(t), "follower": np.cos(t), "follower_torque": t},
         "identify_pair": {"log": logged},
         "Recording": {"t": (0.0, 0.01), "p": np.zeros((2, 2))},

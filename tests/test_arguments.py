@@ -124,6 +124,7 @@ def test_every_public_name_suggests_the_nearest_argument(good):
         *((f"SCENARIOS[{name!r}]", made) for name, made in hc.SCENARIOS.items()),
     ]
     own = (ParameterError, hc.Bound, hc.Figure, hc.Sample, hc.Signal, hc.ports.DeviceServer)
+    own += (hc.ports.PairServers,)
     count = 0
     for name, made in asked:
         if made in own or (isinstance(made, type) and issubclass(made, tuple)):

@@ -258,10 +258,13 @@ class Row(Node):
         return _as_tuple(value, items)
 
     def fits(self, value: Any, old: Any = UNSET) -> bool:
+        return isinstance(old, tuple) if isinstance(value, Mapping) else errors.is_series(value)
+
+    def is_as_long(self, value: Any, old: Any) -> bool:
+        """Whether a row that fits has as many items."""
         row = old if isinstance(value, Mapping) else value
-        if isinstance(value, Mapping) and not isinstance(old, tuple) or not errors.is_series(row):
-            return False
-        return self.any_length or not hasattr(row, "__len__") or len(row) == self.arity
+        sized = hasattr(row, "__len__") and getattr(row, "shape", None) != ()
+        return self.any_length or not sized or len(row) == self.arity
 
     def _read(self, value: Any, path: str, old: Any) -> Any:
         if isinstance(value, Mapping):
@@ -388,7 +391,11 @@ class Either(Node):
 
     def member(self, value: Any, old: Any = UNSET) -> Node:
         """The type that a value is meant to be of."""
-        return next((m for m in self.members if m.fits(value, old)), self.members[-1])
+        meant = [m for m in self.members if m.fits(value, old)] or [self.members[-1]]
+        if not isinstance(meant[0], Row):
+            return meant[0]
+        rows = [m for m in meant if isinstance(m, Row)]
+        return next((m for m in rows if m.is_as_long(value, old)), rows[0])
 
     def check(self, field: str, value: Any, owner: Any = None) -> Any:
         if value is None and self.none:

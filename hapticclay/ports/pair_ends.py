@@ -115,6 +115,7 @@ class PairEnd(Device):
             self._plant.advance(self._plant.samples if samples is None else samples)
 
 
+@checked
 class PairServers:
     """Servers of the ends of a pair that are served.
 

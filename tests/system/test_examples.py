@@ -44,7 +44,7 @@ FEWER = {
         "gains=12": "gains=2",
         "1.0, 9)": "1.0, 2)",
         ', ("Kp/2, 1.5 Kd", softer)': ",",
-    },  # fmt: skip
+    },
     "symptoms/sticks_and_jumps": {"dt=1e-3": "dt=2e-3"},
     "symptoms/wall_vibrates": {"scenario(0.6,": "scenario(0.3,", "t > 0.5": "t > 0.2"},
     "theory/pair_transparency": {"samples=20": "samples=4"},

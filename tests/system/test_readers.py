@@ -149,7 +149,10 @@ def good(tmp_path_factory):
     (here / "pair.csv").write_text(
         "t,leader,follower,tau_s\n" + "".join(f"{x},{np.sin(x)},{np.cos(x)},{x}\n" for x in t)
     )
-    signals = [{"label": "p (rad) leader, follower, tau_s", "values": np.outer(t, [1.0, 2.0, 3.0])}]
+    signals = [
+        {"label": "p (rad) leader, follower", "values": np.outer(t, [1.0, 2.0])},
+        {"label": "torque (Nm) tau_s", "values": 3.0 * t},
+    ]
     savemat(here / "scope.mat", {"s": {"time": t, "signals": signals}})
     (here / "buttons.csv").write_text("t,a,b,c,home\n0,0,0,0,0\n1,1,0,0,0\n")
     Exchanges.of_table(np.arange(24.0).reshape(2, 12)).save(here / "exchanges.csv")
