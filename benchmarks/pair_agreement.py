@@ -139,8 +139,9 @@ def delayed(pair: hc.Pair, limit: float) -> Iterator[tuple[str, hc.Pair]]:
     Above, the one of those up to a percent at which the map grows fastest: where a measured force
     jumps, some are stable again.
     """
-    fitting = (p for p in PARTS if pair.Ts / p <= FINE * BESIDE * limit)
-    parts = 1 if Build(pair).architecture.whole else next(fitting, 0)
+    whole = Build(pair).architecture.whole  # read at samples
+    fitting = (p for p in ((1,) if whole else PARTS) if pair.Ts / p <= FINE * BESIDE * limit)
+    parts = next(fitting, 0)
     if not parts:
         return
     step = pair.Ts / parts

@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 
 from . import joint_crossings
-from .joint_loop import AT_REST, MOST_STATES, ROUNDING, near_resonances
-from .pair_loop import PairLoop
+from .joint_loop import AT_REST, FREE, MOST_STATES, ROUNDING, near_resonances
+from .pair_loop import NO_DRAG, PairLoop
 
 SLOWEST = 1e-4  # [rad] least angle of the search
 TURN = 1e-6  # of an angle: of differences
@@ -125,7 +125,11 @@ class Delays:
             return []
         here = self.loop.drag()
         later = self.loop.between(self.loop.there + 1, self.loop.back).drag()
-        values = np.linalg.eigvals(np.linalg.pinv(here) @ (here - later))
+        # a direction without resistance at any delay, as of an arm that nothing holds, has no edge
+        none = max(FREE, NO_DRAG / max(float(np.linalg.norm(here, 2)), NO_SIZE))
+        if none >= 1.0:
+            return []
+        values = np.linalg.eigvals(np.linalg.pinv(here, rcond=none) @ (here - later))
         real = values[(np.abs(values.imag) <= REAL * np.abs(values)) & (values.real > REAL)]
         return [self._steady_edge(1.0 / x) for x in real.real.tolist()]
 

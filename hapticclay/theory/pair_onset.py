@@ -21,6 +21,7 @@ from .pair_loop import PairLoop
 LATEST = 2.0  # [s] largest one-way delay that is looked for
 BEFORE = 1e-6  # of a sample: a switch just before one
 BETWEEN = (0.0, 0.25, 0.5, 0.75, 1.0 - BEFORE)  # of a sample after a switch at a sample
+SMALL = 200  # states of a map whose eigenvalues cost less than a count
 FINE = 1e-9  # of a sample: of the delay that is found
 
 
@@ -101,9 +102,13 @@ class _Search:
     def _crossed(self, low: float, high: _Unstable) -> _Unstable:
         """Where instability begins between a stable delay and an unstable one, without a jump."""
         low, edge = max(low, 0.0), high.edge
+        while low > 0.0 and self._unstable(low):  # of an edge that the search passed over
+            low, high = max(low - 1.0, 0.0), high._replace(delay=low)
         if edge is not None and self._beyond(low, edge) > 0.0 >= self._beyond(high.delay, edge):
-            return high._replace(delay=self._passed(low, high.delay, edge))
-        width = FINE / max(high.delay, 1.0)
+            high = high._replace(delay=self._passed(low, high.delay, edge))
+            if high.delay - BEFORE <= low or not self._unstable(high.delay - BEFORE):
+                return high
+        width = FINE / max(high.delay, 1.0)  # another edge is passed before that one
         found = roots.bisect(lambda x: not self._unstable(x), low, high.delay, width)
         return high._replace(delay=found[1])
 
@@ -117,6 +122,10 @@ class _Search:
         return self._delays(late).near(edge).samples - 2.0 * self._whole(late)
 
     def _unstable(self, late: float) -> bool:
+        """By the map where it is small, else by what is counted."""
+        loop = self.build.loop((late * self.Ts,) * 2, self.gain)
+        if loop.states <= SMALL:
+            return not loop.stable()
         return self._delays(late).count(2.0 * self._whole(late)) > 0
 
     def _whole(self, late: float) -> int:

@@ -622,3 +622,20 @@ def test_published_arms(file, slopes):
     found = hc.theory.pair_limits(hc.Pair(arm, arm, DRIVE, Ts=1e-3, delay=1e-3))
     for j, slope in zip((1, 2, 3, 5, 6), slopes, strict=True):
         assert found.slope[j] == pytest.approx(slope, abs=0.005)
+
+
+@pytest.mark.parametrize("seed", [17, 42, 80, 104])
+def test_edges_that_lie_close_or_are_none(seed):
+    """Arms that nothing holds have no limit; of two edges in a sample the first one counts."""
+    from benchmarks.pair_agreement import drawn as with_arms
+
+    pair = with_arms(seed)
+    build, limit = Build(pair), hc.theory.pair_limits(pair).delay
+    if seed == 17:
+        assert math.isinf(limit)
+        return
+    samples = limit / pair.Ts
+    below = [*np.arange(0.0, samples, 0.5), *(samples - np.array([0.1, 0.01, 1e-5]))]
+    sizes = [build.loop((x * pair.Ts,) * 2).radius() for x in below]
+    assert max(sizes) < 1.0 + 1e-9
+    assert build.loop((limit * (1.0 + 1e-6),) * 2).radius() > 1.0
