@@ -68,11 +68,12 @@ nitpicky = True
 nitpick_ignore_regex = [
     ("py:obj", ".*"),  # `text` in a docstring may be any code
     ("py:class", r"hapticclay\.scene\.\w+\.T|mujoco\._structs\.MjModel"),
-    ("py:class", r"hapticclay\.model\.traits\.\w+|.*\.Ladder|Service"),  # of no public name
+    ("py:class", r"hapticclay\.model\.traits\.\w+|.*\.Ladder|Service|PairPlant"),  # not public
     ("py:class", r".*\.Exchanged|Chart"),  # what logs and labs hold
     ("py:class", r".*\.(StabilityMap|YieldMap)"),  # made by the command line
     ("py:class", r".*\.Mechanism|(.*\.)?(Stamps|Table|Progress)"),  # what arms and logs hold
     ("py:class", r"(.*\.)?Saved"),  # what a snapshot holds
+    ("py:class", r"[\d.]+"),  # bounds of one kind of force of several
     ("py:class", r"gymnasium\..*"),  # by their private modules
     ("py:class", r"collections\.abc\.Callable\[\[\]"),  # beside a default that is a function
 ]

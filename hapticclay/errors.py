@@ -104,7 +104,8 @@ def _middle_cut(text: str) -> str:
 
 def nearest(word: str, names: Collection[str]) -> list[str]:
     """The name that a word means or is most like, in a list; an empty list if there is none."""
-    if (same := SYNONYMS.get(word)) in names:
+    same = SYNONYMS.get(word)
+    if same is not None and same in names:
         return [same]
     return difflib.get_close_matches(word[:MOST_COMPARED], names, n=1)
 

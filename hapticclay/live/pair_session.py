@@ -137,8 +137,8 @@ class PairSession:
         starts = [host.start for host in self.run.hosts]
         asked = self.pair.link.scale[0] * self.pair.mapping @ (leader - starts[0])
         off = float(np.abs(follower - starts[1] - asked).max())
-        sizes = (float(np.linalg.norm(x)) for x in (hand, contact))
-        self.frames.append(PairFrame(t, off, *sizes, (ports[0], ports[1])))
+        pressed, touched = (float(np.linalg.norm(x)) for x in (hand, contact))
+        self.frames.append(PairFrame(t, off, pressed, touched, (ports[0], ports[1])))
 
     def verdict(self) -> LiveVerdict:
         """What theory says of the pair, or how it ended."""

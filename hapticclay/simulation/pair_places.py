@@ -33,7 +33,7 @@ class Places:
         """Velocity of the handle along the axes of its run per joint rate, shape (axes, n)."""
         if not isinstance(self.arm, Arm):
             return self.arm.jacobian(q)[self.axes]
-        u1x, u1y, u2x, u2y = closed_form.jacobians(*q, self.arm.links)
+        u1x, u1y, u2x, u2y = closed_form.jacobians(q[0], q[1], self.arm.links)
         return np.array([[u1x + u2x, u2x], [u1y + u2y, u2y]])
 
     def weight(self, q: np.ndarray) -> np.ndarray:

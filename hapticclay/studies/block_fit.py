@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -83,10 +83,13 @@ def block_fit(
     def of(x: np.ndarray) -> np.ndarray:
         return residuals(x * size)
 
+    def slopes(x: np.ndarray) -> Any:
+        return _slopes(of, x, step, high / size)
+
     found = least_squares(
         of,
         np.clip(start / size, low / size, high / size),
-        lambda x: _slopes(of, x, step, high / size),
+        slopes,  # type: ignore[arg-type]
         bounds=(low / size, high / size),
         xtol=1e-3 * step,
         ftol=1e-5 * step,

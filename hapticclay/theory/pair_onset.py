@@ -123,7 +123,8 @@ class _Search:
 
     def _unstable(self, late: float) -> bool:
         """By the map where it is small, else by what is counted."""
-        loop = self.build.loop((late * self.Ts,) * 2, self.gain)
+        each = late * self.Ts
+        loop = self.build.loop((each, each), self.gain)
         if loop.states <= SMALL:
             return not loop.stable()
         return self._delays(late).count(2.0 * self._whole(late)) > 0

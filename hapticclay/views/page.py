@@ -158,7 +158,7 @@ class Page(LivePage):
 
     def _press(self) -> None:
         """Presses along the scenario's force, or along x if there is none."""
-        fx, fy = self.session.given.force
+        fx, fy = self.session.given.force[:2]
         size = math.hypot(fx, fy)
         along = (fx / size, fy / size) if size else (1.0, 0.0)
         self.session.push((self.force.value * along[0], self.force.value * along[1]))

@@ -29,7 +29,7 @@ ABOUT = 0.12  # space around both arms, of the size
 WATCHED = 8.0  # [s] that a film takes at least
 
 
-def look_of(record: PairRecord) -> dict[str, float]:
+def look_of(record: PairRecord) -> dict[str, Any]:
     """Speed and magnification of a film in which the motion can be seen."""
     moved = float(record.motion.max(initial=0.0))
     slides = record.pair is not None and isinstance(record.pair.leader, Device)
