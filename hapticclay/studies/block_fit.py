@@ -83,13 +83,13 @@ def block_fit(
     def of(x: np.ndarray) -> np.ndarray:
         return residuals(x * size)
 
-    def slopes(x: np.ndarray) -> Any:
+    def slopes_at(x: np.ndarray) -> Any:
         return _slopes(of, x, step, high / size)
 
     found = least_squares(
         of,
         np.clip(start / size, low / size, high / size),
-        slopes,  # type: ignore[arg-type]
+        slopes_at,  # type: ignore[arg-type]
         bounds=(low / size, high / size),
         xtol=1e-3 * step,
         ftol=1e-5 * step,
