@@ -41,7 +41,7 @@ class Host:
         seen = self.sensors.positions(state.q)
         q = seen - self.zero
         v = self._rate(q, state.qd)
-        F = self.places.jacobian(seen).T @ self.sensors.forces(self.pressed)
+        F = self._felt(seen) if self.control.feels else np.zeros(len(q))
         y = np.concatenate([q, v, F])
         signals = np.concatenate([y, self.arrived, self.x])
         own = self.control.torque @ signals
@@ -59,6 +59,10 @@ class Host:
         """Force of the handle on what it carries and touches, along the axes of its run [N]."""
         state, n = self.run.state, len(self.places.axes)
         return state.fe[:n] - state.fh[:n]
+
+    def _felt(self, seen: np.ndarray) -> np.ndarray:
+        """Torques of the joints against the force at the handle, as measured [N.m]."""
+        return self.places.jacobian(seen).T @ self.sensors.forces(self.pressed)
 
     def _rate(self, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
         """The measured rate, as the law estimates it."""
@@ -80,15 +84,20 @@ class Host:
         return out
 
     @property
+    def drives(self) -> bool:
+        """Whether its drives run the law: their work is counted step by step."""
+        return self.acts and self.law.runs == "drive"
+
+    @property
     def torque(self) -> np.ndarray:
         """The held torque."""
         return self.own + self.other
 
     def taken(self, before: np.ndarray, after: np.ndarray, weight: np.ndarray) -> float:
-        """Energy that law and link took from the arm in a step, drives included [J]."""
+        """Energy that law and link took from the arm, of drives in one step [J]."""
         moved = after - before
         out = -(self.torque - weight) @ moved
-        if self.acts and self.law.runs == "drive":
+        if self.drives:
             middle = 0.5 * (before + after) - self.start
             rate = moved / self.run.scenario.dt
             out += (np.array(self.law.Kp) * middle + np.array(self.law.Kd) * rate) @ moved

@@ -71,22 +71,24 @@ class PairRun:
 
     def advance(self) -> None:
         """Makes a control sample: measures, sends, and steps both arms; does nothing once ended."""
+        end = (self.step // self.parts + 1) * self.parts
         with warnings_caught():  # of arms that diverge, which is an outcome
-            for _ in range(self.parts):
-                if not self.ended:
-                    self._step()
+            while self.step < end and not self.ended:
+                self._go_on(end)
 
-    def _step(self) -> None:
-        """Makes a step of both arms, at a sample after the hosts have measured and sent."""
+    def _go_on(self, end: int) -> None:
+        """Makes steps of both arms, to what is due next; at a sample hosts measure and send."""
         self._act(ARRIVE)
         if self.step % self.parts == 0:
             self._sample()
         self._act(ACT)
         self.ended = self._beyond()
         if not self.ended:
-            self.energy += sum(map(self._advanced, self.hosts))
+            due = min(self.events[0][0], end) if self.events else end
+            n = 1 if any(host.drives for host in self.hosts) else due - self.step
+            self.energy += sum(self._advanced(host, n) for host in self.hosts)
             self.ended = self._ended()
-            self.step += 1
+            self.step += n
 
     def to_end(self) -> PairRecord:
         """Runs for the time of the pair, or until something ends it."""
@@ -156,10 +158,10 @@ class PairRun:
                 continue
             self._later(self.pair.delay, ACT, i, "other", pull)
 
-    def _advanced(self, host: Host) -> float:
-        """Makes a step of an arm; the energy that controllers took from it [J]."""
+    def _advanced(self, host: Host, n: int) -> float:
+        """Makes steps of an arm; the energy that controllers took from it [J]."""
         before = host.run.state.q
-        host.run.step(self.forces[host.i], host.torque.tolist())
+        host.run.advance(n, force=self.forces[host.i], torque=host.torque.tolist())
         taken = host.taken(before, host.run.state.q, host.weight)
         host.port.taken += taken
         return taken

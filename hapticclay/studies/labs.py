@@ -352,7 +352,7 @@ def pair_lab(quick: bool, tell: Tell) -> Lab:
         found.append(latest(Kp))
     limits = [pair_limits(pushed_pair(Kp, 0)) for Kp in gains]
     runs, exact = [0.5e3 * ARM_TS * n for n in found], [1e3 * x.delay for x in limits]
-    line = np.geomspace(gains[0], gains[-1], 41)
+    line = np.geomspace(gains[0], gains[-1], 11 if quick else 41)
     rule = [1e3 * delay_rule(float(Kp)) for Kp in line]
     all_exact = [1e3 * pair_limits(pushed_pair(float(Kp), 0)).delay for Kp in line]
     late = Chart(

@@ -505,7 +505,7 @@ def test_absolutely_stable_pairs_are_stable_in_any_hand():
 
 
 def test_hands_of_a_box():
-    pair = replace(one(), link=hc.Link(delay=0.16))
+    pair = replace(one(Ts=4e-3), link=hc.Link(delay=0.16))
     hands = hc.theory.Box((0.2, 4.0), (0.5, 10.0), (0.0, 40.0))
     contacts = hc.theory.Box((0.0, 3.0), (0.0, 20.0), (0.0, 1000.0))
     found = hc.theory.pair_hands(pair, hands, contacts, samples=4)
