@@ -29,7 +29,15 @@ BANNER_STYLE = (
 
 
 class LivePage:
-    """A page of what a player plays, served until `close`; `url` has the token that it may need."""
+    """A page of what a player plays, served until `close`; `url` has the token that it may need.
+
+    `session` is what is played, `run` the button that pauses it, `hold` the tick by which the hand
+    pulls the handle to a point.
+    """
+
+    session: Any
+    run: Any
+    hold: Any
 
     def __init__(self, play: Any, host: str, port: int):
         """Begins to serve an empty page."""
@@ -80,6 +88,19 @@ class LivePage:
     def _refresh(self, now: float) -> None:
         """Shows the present state."""
         raise NotImplementedError
+
+    def _hold(self) -> None:
+        """Pulls to the point that is shown, or lets go, as the tick says."""
+        raise NotImplementedError
+
+    def _dragged(self, _: Any) -> None:
+        self.hold.value = True  # acts like a tick by hand, the first time
+        self._locked(self._hold)
+
+    def _toggle(self, _: Any) -> None:
+        with self.player.lock:
+            self.session.paused = not self.session.paused
+            self.run.label = "Start" if self.session.paused else "Pause"
 
     def _locked(self, act: Callable[[], None]) -> None:
         with self.player.lock:

@@ -167,15 +167,6 @@ class Page(LivePage):
         (x, y, _), origin = self.target.position, self.session.scenario.origin
         self.session.pull((x - origin[0], y - origin[1]) if self.hold.value else None)
 
-    def _dragged(self, _: Any) -> None:
-        self.hold.value = True  # acts like a tick by hand, the first time
-        self._locked(self._hold)
-
-    def _toggle(self, _: Any) -> None:
-        with self.player.lock:
-            self.session.paused = not self.session.paused
-            self.run.label = "Start" if self.session.paused else "Pause"
-
     def _reset(self, _: Any) -> None:
         with self.player.lock:
             self.session.restart()

@@ -209,15 +209,6 @@ class PairPage(LivePage):
         axes = axes_of(self.session.pair.leader)
         self.session.pull(away[axes] if self.hold.value else None)
 
-    def _dragged(self, _: Any) -> None:
-        self.hold.value = True  # acts like a tick by hand, the first time
-        self._locked(self._hold)
-
-    def _toggle(self, _: Any) -> None:
-        with self.player.lock:
-            self.session.paused = not self.session.paused
-            self.run.label = "Start" if self.session.paused else "Pause"
-
     def _reset(self, _: Any) -> None:
         with self.player.lock:
             self.session.restart()
