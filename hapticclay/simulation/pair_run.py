@@ -26,6 +26,7 @@ from .pair_record import PairRecord
 from .stepwise import Simulation
 
 WHOLE = 1e-6  # of an engine step that a delay may be off
+FASTEST = 1e3  # [rad/s], of slides [m/s]: of no arm, and a chain so fast cannot be closed
 ARRIVE, ACT = 0, 1  # order of events at the same step
 
 
@@ -177,6 +178,8 @@ class PairRun:
         for name, host in zip(("leader", "follower"), self.hosts, strict=True):
             if host.run.outcome is not None:
                 return f"{name} {host.run.outcome}"
+            if not np.abs(host.run.state.qd).max() <= FASTEST:
+                return f"{name} diverged: a joint beyond {FASTEST:g} rad/s or m/s"
         return ""
 
 

@@ -130,3 +130,11 @@ def test_a_pair_that_diverges_ends_and_says_so():
     pair = hc.Pair(device, device, hc.JointPD((4000.0,), (1.0,)), hc.Link(delay=0.05))
     found = hc.simulate(replace(pair, t_max=6.0))
     assert found.grows and "diverged" in found.ended and found.t[-1] < 6.0
+
+
+def test_a_closed_chain_that_diverges_ends_before_it_cannot_be_closed(capfd):
+    arm = hc.MjcfArm("haptic_3", friction=[0.0] * 3)
+    law = hc.JointPD((3e3,) * 3, (0.1,) * 3)
+    found = hc.simulate(hc.Pair(arm, arm, law, hc.Link(delay=0.02), Ts=2e-3, t_max=1.0))
+    assert found.grows and found.ended and found.t[-1] < 1.0
+    assert capfd.readouterr().err == ""
