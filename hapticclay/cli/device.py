@@ -8,7 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
@@ -32,7 +32,7 @@ LONGEST = 1e9  # [s] longest session
 EVERY = 10  # of the control samples of a pair by the wall clock are kept: every so many
 PERIOD = 0.005  # [s] of a message, by default
 RATE = 1000.0  # [Hz] of the control of an arm from a file, by default
-OF_ARM = "site", "joints", "pose", "armature", "damping", "friction", "gravity"  # its options
+OF_ARM = tuple(x.name for x in fields(ArmOptions))  # its options
 LINES = {5: 2, 7: 3}  # axes of a line from point to point, by its number of words with the speed
 
 
@@ -271,8 +271,9 @@ def trajectory_of(words: tuple[str, ...]) -> Trajectory | None:
         x = []
     if len(x) in (2, 3):
         return Trajectory.to(tuple(x))
-    begin, end, speed = tuple(x[:axes]), tuple(x[axes:-1]), sum(x[-1:])
+    begin, end = tuple(x[:axes]), tuple(x[axes:-1])
     if axes and begin != end:
+        speed = x[-1]
         number("hand speed", speed, 1e-6, FASTEST, unit="m/s")
         return Trajectory((0.0, math.dist(begin, end) / speed), (begin, end))
     bound = "must be x y, or x0 y0 x1 y1 and a speed above 0, with z for three axes; or a CSV file"

@@ -135,7 +135,7 @@ class PairSession:
     def _observe(self) -> None:
         t, leader, follower, *_, hand, contact, _, ports = self.run.newest
         starts = [host.start for host in self.run.hosts]
-        asked = self.pair.link.scale[0] * self.pair.mapping @ (leader - starts[0])
+        asked = self.pair.follows @ (leader - starts[0])
         off = float(np.abs(follower - starts[1] - asked).max())
         pressed, touched = (float(np.linalg.norm(x)) for x in (hand, contact))
         self.frames.append(PairFrame(t, off, pressed, touched, (ports[0], ports[1])))

@@ -15,7 +15,7 @@ from ..arms.mjcf_arm import MjcfArm
 from ..columns.log import columns_of
 from ..errors import Bound, ParameterError
 from ..model.constants import TS
-from ..model.operator import NO_HAND, Operator
+from ..model.operator import Operator
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
 from ..simulation.stepwise import Simulation
@@ -190,21 +190,31 @@ def device_scenario(scenario: Scenario, period: float | None, clay: bool) -> tup
         **changes,
     )
     sample = float(out.Ts or out.dt)
-    samples = 1 if period is None else round(period / sample)
-    if period is not None and abs(samples * sample - period) > 1e-9 * period:
+    return out, samples_of(period, sample)
+
+
+def samples_of(period: float | None, sample: float) -> int:
+    """Control samples of a period, one if none is given.
+
+    Raises:
+        ParameterError: it is no whole multiple of the sample.
+    """
+    if period is None:
+        return 1
+    samples = round(period / sample)
+    if abs(samples * sample - period) > 1e-9 * period:
         bound = f"must be a whole multiple of the control sample, {sample:g} s"
         raise ParameterError("period", period, bound)
-    return out, samples
+    return samples
 
 
 def held_scenario(arm: MjcfArm, Ts: float, hand: Operator | None = None) -> Scenario:
     """An arm from a file under no law but that of programs, held by a hand at its pose."""
-    none = (0.0,) * len(arm.names)
     return Scenario(
         name=arm.name or "arm",
         arm=arm,
         operator=hand or HOLD,
-        controller=JointPD(none, none),
+        controller=_no_gains(len(arm.names)),
         control="sampled",
         Ts=Ts,
         dt=Ts / math.ceil(Ts / LONGEST_STEP - 1e-9),
@@ -213,10 +223,11 @@ def held_scenario(arm: MjcfArm, Ts: float, hand: Operator | None = None) -> Scen
 
 def limp(scenario: Scenario) -> JointPD | None:
     """The law of an arm that no program drives: joints without gains, for one from a file."""
-    if scenario.is_closed_form:
-        return None
-    none = (0.0,) * len(scenario.joints)
-    return JointPD(none, none)
+    return None if scenario.is_closed_form else _no_gains(len(scenario.joints))
+
+
+def _no_gains(n: int) -> JointPD:
+    return JointPD((0.0,) * n, (0.0,) * n)
 
 
 def _follower(hand: Trajectory, scenario: Scenario) -> Any:
@@ -228,7 +239,7 @@ def _follower(hand: Trajectory, scenario: Scenario) -> Any:
     if axes > len(scenario.axes):
         bound = f"must have {' and '.join(scenario.axes)} each, along which the handle moves"
         raise ParameterError("hand.points", hand.points, bound)
-    hands = [scenario.operators[min(i, 1)] or NO_HAND for i in range(axes)]
+    hands = scenario.hands[:axes]
 
     def force(t: float) -> Numbers:
         place, rate = hand.at(t)

@@ -11,7 +11,6 @@ import numpy as np
 from ..arms.joint_law import compensated
 from ..errors import ParameterError, number
 from ..formulas.arm import handle_velocity, jacobian, joint_torques
-from ..model.operator import NO_HAND
 from ..model.sampled_controller import Controller
 from ..scene.scenario import Scenario
 from .commands import ANGLE, POSITION, RATE, VELOCITY, Numbers, Pair, is_bounded, shortening
@@ -182,8 +181,8 @@ class MechanismMotors(DrivenArm):
         self._mechanism, self._rows = arm.mechanism, ["xyz".index(axis) for axis in arm.axes]
         self._origin = arm.handle()[self._rows]
         self._holds = compensated(arm, None) and arm.mechanism.weighs
-        hand = scenario.operators[0] or NO_HAND
-        self._weight = hand.mass * np.array(arm.mechanism.model.opt.gravity)[self._rows]
+        masses = np.array([hand.mass for hand in scenario.hands])
+        self._weight = masses * np.array(arm.mechanism.model.opt.gravity)[self._rows]
         return self.see(0.0, tuple(arm.q.tolist()), (0.0,) * len(arm.names))[0]
 
     def see(self, t: float, q: Numbers, qd: Numbers) -> tuple[Sensed, Any]:

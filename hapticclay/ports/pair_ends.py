@@ -10,18 +10,19 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from ..arguments import checked
-from ..errors import Bound, ParameterError, integer
+from ..errors import Bound, integer
+from ..scene.link import ENDS
 from ..scene.pair import Pair
 from ..scene.scenario import Scenario
 from ..simulation.pair_record import PairRecord
 from ..simulation.pair_run import PairRun
 from .commands import Numbers
+from .device import samples_of
 from .driven_arm import LIMP, Device, Drive, Sensed, force_at
 from .server import Clock, DeviceServer
 from .service import Service
 from .sessions import PLAIN, Inverse3
 
-ENDS = ("leader", "follower")
 LONGEST = 1e4  # [s] longest session
 End = Literal["leader", "follower"]
 
@@ -36,10 +37,7 @@ class PairPlant:
         """Takes the time between two messages with the clock "tick" [s]; None for a sample."""
         self.run = PairRun(replace(pair, muscle=None, t_max=LONGEST), every=every)
         self.largest_force = largest_force
-        self.samples = 1 if period is None else round(period / pair.Ts)
-        if period is not None and abs(self.samples * pair.Ts - period) > 1e-9 * period:
-            bound = f"must be a whole multiple of the control sample, {pair.Ts:g} s"
-            raise ParameterError("period", period, bound)
+        self.samples = samples_of(period, pair.Ts)
         self.asked = [LIMP, LIMP]
         self.sensed = [self._seen(i) for i in range(2)]
 

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from ..arguments import part
 from ..errors import Bound, ParameterError
 
+ENDS = ("leader", "follower")
 WAYS = ("there", "back")  # leader to follower, follower to leader
 KINDS = ("position-position", "position-force", "four-channel", "waves")
 RESERVE = 0.01  # [J]
@@ -46,7 +47,7 @@ class Link:
         tuple[float, float], Bound(0.0, 1e6, above=True, names=("motion", "force"))
     ] = (1.0, 1.0)
     rates: bool = True
-    local_force: Annotated[tuple[float, float], Bound(0.0, 1e6, names=("leader", "follower"))] = (
+    local_force: Annotated[tuple[float, float], Bound(0.0, 1e6, names=ENDS)] = (
         0.0,
         0.0,
     )

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arguments import checked, part
 from ..arms.joint_law import JointPD, checked_law
-from ..arms.mechanism import Linear
+from ..arms.mechanism import STILL, Linear
 from ..arms.mjcf_arm import MjcfArm
 from ..errors import Bound, ParameterError
 from ..model import arm as closed_form
@@ -22,13 +22,12 @@ from ..model.shapes import Pulse
 from ..model.signals import Signal
 from . import pair_files
 from .contact import Contact, Load, load_of
-from .link import Link
+from .link import ENDS, Link
 from .pair_hardware import check_hardware
 from .virtual_wall import Device
 
 NOMINAL = (0.5 * math.pi, -0.5 * math.pi)  # [rad] elbow square, link 2 along x
 UNKNOWN_ROTOR = "rotor inertia (armature): part of the mass or inertia that is given"
-STILL = 1e-9  # [m] least motion of the handle per joint rate
 TOUCH = Pulse((1.0, 0.0), 0.0, 0.05)  # [N] for 50 ms
 
 
@@ -154,6 +153,11 @@ class Pair:
             out[i, abs(j) - 1] = math.copysign(1.0, j)
         return out
 
+    @property
+    def follows(self) -> np.ndarray:
+        """Motion of the follower's joints that the link asks for per the leader's, (n, n)."""
+        return self.link.scale[0] * self.mapping
+
     @classmethod
     @checked
     def load(cls, file: str | os.PathLike[str]) -> Pair:
@@ -185,7 +189,7 @@ def _check_touched(pair: Pair, i: int) -> None:
     if touched.axis is None or not has_handle(arm):
         return
     if not np.abs(linear_arm(arm).jacobian["xyz".index(touched.axis)]).max() > STILL:
-        bound = f"must be one along which the {('leader', 'follower')[i]}'s handle can move"
+        bound = f"must be one along which the {ENDS[i]}'s handle can move"
         raise ParameterError("contact.axis", touched.axis, bound)
 
 
@@ -194,7 +198,17 @@ def touched_load(pair: Pair, i: int) -> Load:
     arm, touched = pair.arms[i], pair.touched[i]
     if not isinstance(touched, Clay):
         return load_of(touched, "xy")
-    return load_of(touched, arm.axes[:2] if isinstance(arm, MjcfArm) else "xy")
+    return load_of(touched, axes_of(arm)[:2])
+
+
+def axes_of(arm: Any) -> str:
+    """Axes of the world along which forces act on the handle of an arm of a pair, in order."""
+    return arm.axes if isinstance(arm, MjcfArm) else "xy"
+
+
+def joint_unit(names: tuple[str, ...]) -> str:
+    """Unit of joint positions, "m" for a device of one axis, which may be rotary."""
+    return "m" if names == ("x",) else "rad"
 
 
 def joint_names(arm: Any) -> tuple[str, ...]:

@@ -15,9 +15,9 @@ from ..errors import ParameterError
 from ..fields import make_part, nodes_of
 from ..model.arm import Arm
 from .files import beside, naming_file, read_settings
+from .link import ENDS
 from .virtual_wall import Device
 
-ARMS = ("leader", "follower")
 LAWS = ("law", "follower_law")
 OF_ARM = (
     "file",
@@ -42,10 +42,10 @@ def read_pair(path: str | os.PathLike[str], kind: type) -> Any:
     data = {name: x for name, x in read_settings(path, "pair").items() if name != "name"}
     folder = Path(path).parent
     with naming_file(path, "pair"):
-        for name in (*ARMS, *LAWS):
+        for name in (*ENDS, *LAWS):
             if name in data and not isinstance(data[name], Mapping):
                 raise ParameterError(name, data[name], "must be a table")
-        made = {name: _arm(data.pop(name), name, folder) for name in ARMS if name in data}
+        made = {name: _arm(data.pop(name), name, folder) for name in ENDS if name in data}
         made |= {name: _law(data.pop(name), name, folder) for name in LAWS if name in data}
         if "leader" in made:
             made.setdefault("follower", made["leader"])

@@ -8,6 +8,7 @@ from ..arms.mjcf_arm import MjcfArm
 from ..errors import ParameterError
 from ..model.arm import Arm
 from ..model.hardware import Hardware
+from .link import ENDS
 
 FELT = ("position-force", "four-channel")  # kinds of link that send a measured force
 OF_FORCE = ("adc_bits", "force_noise", "force_filter")
@@ -29,8 +30,7 @@ def check_hardware(pair: Any, i: int) -> None:
         return
     for name, (is_wrong, bound) in _refusals(pair, i, given).items():
         if is_wrong:
-            field = ("leader_hardware", "follower_hardware")[i]
-            raise ParameterError(f"pair.{field}.{name}", getattr(given, name), bound)
+            raise ParameterError(f"pair.{ENDS[i]}_hardware.{name}", getattr(given, name), bound)
 
 
 def _refusals(pair: Any, i: int, given: Hardware) -> dict[str, tuple[bool, str]]:

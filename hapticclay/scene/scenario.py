@@ -24,7 +24,7 @@ from ..model.compensator import PRINTED, Compensator
 from ..model.constants import AXES, GAIN, ORIGIN, PATH_LENGTH, TORQUE_LIMIT, TS, each_axis
 from ..model.controller import SERVO, Servo
 from ..model.hardware import Hardware
-from ..model.operator import Operator, mobility_with
+from ..model.operator import NO_HAND, Operator, mobility_with
 from ..model.sampled_controller import Controller
 from ..model.signals import Signal
 from ..model.support import check_scene
@@ -304,6 +304,11 @@ class Scenario:
     def driven(self) -> bool:
         """Whether the muscle force or the command varies."""
         return any(x is not None and x.varies for x in (self.muscle, self.command))
+
+    @property
+    def hands(self) -> list[Operator]:
+        """The operator along each axis of the handle; that of y acts along z, too."""
+        return [self.operators[min(i, 1)] or NO_HAND for i in range(len(self.axes))]
 
     @property
     def steady_force(self) -> tuple[float, ...]:

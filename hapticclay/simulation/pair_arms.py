@@ -17,7 +17,8 @@ from ..model.clay import Clay
 from ..model.hardware import Hardware
 from ..model.operator import NO_HAND, Operator
 from ..scene.contact import Contact
-from ..scene.pair import NOMINAL, Pair, linear_arm
+from ..scene.link import ENDS
+from ..scene.pair import NOMINAL, Pair, axes_of, linear_arm
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import Device
 
@@ -102,7 +103,7 @@ def run_scene(pair: Pair, i: int, arm: MjcfArm | Arm, **more: Any) -> Scenario:
     arm, clay, operator = _carried(pair, i, arm)
     if clay is not None and clay.yields and _has_friction(arm):
         bound = "must be 0 where clay yields, in runs"
-        raise ParameterError(f"{('leader', 'follower')[i]}.friction", arm.friction, bound)  # type: ignore[union-attr]
+        raise ParameterError(f"{ENDS[i]}.friction", arm.friction, bound)  # type: ignore[union-attr]
     if isinstance(arm, MjcfArm):
         none = (0.0,) * pair.n
         more["controller"] = JointPD(none, none, gravity=False)
@@ -113,7 +114,7 @@ def run_scene(pair: Pair, i: int, arm: MjcfArm | Arm, **more: Any) -> Scenario:
     if hardware and hardware.dac_range and isinstance(arm, Arm):
         more["torque_limit"] = hardware.dac_range
     return Scenario(
-        name=("leader", "follower")[i],
+        name=ENDS[i],
         arm=arm,
         clay=clay,
         control="sampled",
@@ -132,7 +133,7 @@ def least_parts(pair: Pair) -> int:
         ParameterError: clay is too stiff for the most there may be.
     """
     parts = 1
-    for i, name in enumerate(("leader_clay", "follower_clay")):
+    for i, name in enumerate(ENDS):
         touched = pair.touched[i]
         if isinstance(touched, Contact):
             touched = touched.wall if touched.unilateral else None
@@ -145,7 +146,7 @@ def least_parts(pair: Pair) -> int:
         if share > MOST_PARTS:
             most = MOST_PARTS / (pair.Ts * mobility)
             bound = f"must be damped by at most {most:.4g} N.s/m at this rate, in runs"
-            raise ParameterError(f"pair.{name}", touched.largest, bound)
+            raise ParameterError(f"pair.{name}_clay", touched.largest, bound)
         parts = max(parts, math.ceil(share))
     return parts
 
@@ -159,18 +160,13 @@ def _carried(pair: Pair, i: int, arm: Any) -> tuple[Any, Clay | None, Any]:
     hand, touched = pair.operators[i], pair.touched[i]
     if not isinstance(touched, Contact):
         return arm, touched, hand
-    at = 0 if touched.axis is None else _axes(arm).index(touched.axis)
-    if at > 1 or (at == 1 and len(_axes(arm)) > 2 and not touched.unilateral):
+    at = 0 if touched.axis is None else axes_of(arm).index(touched.axis)
+    if at > 1 or (at == 1 and len(axes_of(arm)) > 2 and not touched.unilateral):
         arm, at = _facing(arm, touched.axis, i), 0
     if not touched.unilateral:
         return arm, None, _moved_along(hand, touched, at)
     wall = touched.wall
     return arm, wall if at == 0 else Clay(wall.y, replace(wall.x, along="y")), hand
-
-
-def _axes(arm: Any) -> str:
-    """Axes of the world along which forces of a run act, in their order."""
-    return arm.axes if isinstance(arm, MjcfArm) else "xy"
 
 
 def _facing(arm: MjcfArm, axis: Any, i: int) -> MjcfArm:

@@ -21,6 +21,7 @@ class Host:
     def __init__(self, pair: Pair, i: int, control: Control, run: Simulation):
         self.pair, self.i, self.control, self.run = pair, i, control, run
         self.law = pair.laws[i]
+        self.Kp, self.Kd = np.array(self.law.Kp), np.array(self.law.Kd)
         self.start = run.state.q.copy()
         self.own, self.other = np.zeros(pair.n), np.zeros(pair.n)
         self.arrived = np.zeros(len(control.message))  # waves; others pull as they arrive
@@ -77,7 +78,7 @@ class Host:
         """The joint law where the host runs it, and the friction that it feeds forward."""
         out = np.zeros(len(q))
         if self.acts and self.law.runs == "host":
-            out -= np.array(self.law.Kp) * q + np.array(self.law.Kd) * v
+            out -= self.Kp * q + self.Kd * v
         if self.law.friction is not None:
             Fc, k, Fv = np.array(self.law.friction).T
             out += Fc * np.tanh(k * v) + Fv * v
@@ -100,5 +101,5 @@ class Host:
         if self.drives:
             middle = 0.5 * (before + after) - self.start
             rate = moved / self.run.scenario.dt
-            out += (np.array(self.law.Kp) * middle + np.array(self.law.Kd) * rate) @ moved
+            out += (self.Kp * middle + self.Kd * rate) @ moved
         return float(out)

@@ -9,6 +9,7 @@ import numpy as np
 from ..arms.mjcf_arm import MjcfArm
 from ..model import arm as closed_form
 from ..model.arm import Arm
+from ..scene.pair import axes_of
 from ..scene.scenario import Scenario
 
 
@@ -23,10 +24,8 @@ class Places:
     def __init__(self, scenario: Scenario, own: Any, held: bool):
         self.arm: Any = scenario.arm
         self.axes = ["xyz".index(c) for c in scenario.axes]
-        plane = own.axes if isinstance(own, MjcfArm) else "xy"
-        self.shown = [self.axes.index("xyz".index(c)) for c in plane]
-        hands = [scenario.operators[min(i, 1)] for i in range(len(self.axes))]
-        self._masses = np.array([hand.mass if hand else 0.0 for hand in hands])
+        self.shown = [self.axes.index("xyz".index(c)) for c in axes_of(own)]
+        self._masses = np.array([hand.mass for hand in scenario.hands])
         self._weighs = held and isinstance(self.arm, MjcfArm) and self.arm.mechanism.weighs
 
     def jacobian(self, q: np.ndarray) -> np.ndarray:

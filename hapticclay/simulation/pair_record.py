@@ -11,7 +11,8 @@ import numpy as np
 
 from ..arguments import named
 from ..results import Result, Tables
-from ..scene.pair import Pair
+from ..scene.link import ENDS
+from ..scene.pair import Pair, joint_unit
 
 RELATIVE = 1e-9  # growth of an amplitude that is none
 
@@ -62,7 +63,7 @@ class PairRecord(Result):
     @property
     def unit(self) -> str:
         """Unit of the joints' positions, "m" for a device of one axis, which may be rotary."""
-        return "m" if self.names == ("x",) else "rad"
+        return joint_unit(self.names)
 
     @property
     def motion(self) -> np.ndarray:
@@ -121,7 +122,7 @@ class PairRecord(Result):
             "energy [J]": [float(self.energy[-1])],
         }
         samples: dict[str, Any] = {"t [s]": self.t, "energy [J]": self.energy}
-        for i, name in enumerate(("leader", "follower")):
+        for i, name in enumerate(ENDS):
             samples[f"energy at {name} [J]"] = self.port_energy[:, i]
         samples["hand [N]"] = np.linalg.norm(self.hand, axis=1)
         samples["contact [N]"] = np.linalg.norm(self.contact, axis=1)

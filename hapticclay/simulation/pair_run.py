@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import ParameterError
 from ..physics import warnings_caught
 from ..scene import pair as pairs
+from ..scene.link import ENDS
 from ..scene.pair import Pair
 from ..theory.architectures import ARCHITECTURES
 from . import stepwise
@@ -101,8 +102,7 @@ class PairRun:
         """What has happened so far."""
         columns = [np.array(x) for x in zip(*self.rows, strict=True)]
         names = pairs.joint_names(self.pair.leader)
-        follows = self.pair.link.scale[0] * self.pair.mapping
-        fields: Any = self.pair.link.kind, names, *columns, self.ended, follows, self.pair
+        fields: Any = self.pair.link.kind, names, *columns, self.ended, self.pair.follows, self.pair
         return PairRecord(*fields)
 
     def _sample(self) -> None:
@@ -169,13 +169,13 @@ class PairRun:
 
     def _beyond(self) -> str:
         """Which host asks for more torque than any motor has, "" for none."""
-        for name, host in zip(("leader", "follower"), self.hosts, strict=True):
+        for name, host in zip(ENDS, self.hosts, strict=True):
             if not np.abs(host.torque).max() <= stepwise.MOST:
                 return f"{name} diverged: torques beyond {stepwise.MOST:g} N.m"
         return ""
 
     def _ended(self) -> str:
-        for name, host in zip(("leader", "follower"), self.hosts, strict=True):
+        for name, host in zip(ENDS, self.hosts, strict=True):
             if host.run.outcome is not None:
                 return f"{name} {host.run.outcome}"
             if not np.abs(host.run.state.qd).max() <= FASTEST:

@@ -14,6 +14,7 @@ from ..arms.mjcf_arm import MjcfArm
 from ..model.operator import NO_HAND
 from ..scene import contact, pair_hardware
 from ..scene import pair as pairs
+from ..scene.link import ENDS
 from ..scene.pair import Pair
 from .architectures import ARCHITECTURES
 from .client_loop import held_arm
@@ -92,11 +93,11 @@ class Build:
     def assumed(self) -> tuple[str, ...]:
         """What the verdict rests on, a sentence each."""
         pair, out = self.pair, []
-        for name, arm in zip(("leader", "follower"), pair.arms, strict=True):
+        for name, arm in zip(ENDS, pair.arms, strict=True):
             out += [f"{name}: {note}" for note in pairs.notes_of(arm)]
         if pair.leader is pair.follower:
             out = [f"both arms: {note}" for note in pairs.notes_of(pair.leader)]
-        for i, name in enumerate(("leader", "follower")):
+        for i, name in enumerate(ENDS):
             words = contact.left_out(pair.touched[i]), pair_hardware.left_out(pair, i)
             out += [f"{name}: {x}" for x in words if x]
         if pair.link.jitter or pair.link.loss:

@@ -16,9 +16,11 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from ..arguments import checked, named
+from ..arms.mechanism import STILL
 from ..errors import Bound, ParameterError
 from ..results import Result, Tables
 from ..scene import pair as pairs
+from ..scene.link import ENDS
 from ..scene.pair import Pair
 from .pair_build import Build
 
@@ -195,11 +197,11 @@ def _felt(Y: np.ndarray, contact: np.ndarray) -> np.ndarray:
 def _along(pair: Pair, axis: str) -> tuple[np.ndarray, np.ndarray]:
     """Joint torques per force on each handle along an axis."""
     out = []
-    for name, arm in zip(("leader", "follower"), pair.arms, strict=True):
+    for name, arm in zip(ENDS, pair.arms, strict=True):
         if not pairs.has_handle(arm):
             arm.check_handle()
         row = pairs.linear_arm(arm).jacobian["xyz".index(axis)]
-        if not np.abs(row).max() > pairs.STILL:
+        if not np.abs(row).max() > STILL:
             bound = f"must be one along which the handle of the {name} can move"
             raise ParameterError("axis", axis, bound)
         out.append(row)

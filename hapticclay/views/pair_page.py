@@ -12,16 +12,16 @@ from ..arms.mechanism import Sticks
 from ..errors import ParameterError
 from ..kernel.engine import mujoco
 from ..live.pair_session import PairSession
-from ..scene.pair import joint_names
+from ..scene.link import ENDS
+from ..scene.pair import joint_names, joint_unit
 from ..scene.virtual_wall import Device
 from ..theory.pair_verdict import PairLimits
-from .arm_sticks import axes_of, in_space, sticks_of
+from .arm_sticks import COLORS, force_axes, in_space, sticks_of
 from .live_page import PLOT_TIME, LivePage, banner_html
 from .palette import BLACK, BLUE, CLAY_DEEP, PART_COLORS, VERMILION, rgb_bytes
 from .sticks import JOINT, KNOB, LINK, SHAFT, look
 from .touched import AROUND, CLEAR, body_of
 
-NAMES, COLORS = ("leader", "follower"), (BLUE, VERMILION)
 SPAN = 0.15  # [m] of a rail to either side
 GAP = 0.4  # between both arms, as a share of their size
 LONGEST, LEAST_FORCE = 0.35, 5.0  # longest arrow, as a share of the size, and the least force of it
@@ -50,9 +50,7 @@ class PairPage(LivePage):
         self._controls(viser.uplot)
 
     def _sticks(self, i: int, q: Any) -> Sticks:
-        found = sticks_of(self.session.pair.arms[i], q, SPAN)
-        shift = self._shift[i]
-        return Sticks(found.segments + shift, found.joints + shift, found.handle + shift)
+        return sticks_of(self.session.pair.arms[i], q, SPAN, self._shift[i])
 
     def _beside(self, places: Sequence[np.ndarray]) -> np.ndarray:
         """Where the follower stands: to the right in the first view; a rail, in front."""
@@ -77,7 +75,7 @@ class PairPage(LivePage):
         self._table((*middle[:2], floor), 6.0 * wide, 6.0 * wide, 0.1)
         self._parts = [self._arm(i, x) for i, x in enumerate(figures)]
         self._arrows = []
-        for i, name in enumerate(NAMES):
+        for i, name in enumerate(ENDS):
             form: Any = dict(shaft_radius=SHAFT * size, head_radius=2.2 * SHAFT * size)
             form |= dict(head_length=5.0 * SHAFT * size, visible=False)
             color = rgb_bytes(COLORS[i])
@@ -97,7 +95,7 @@ class PairPage(LivePage):
         if body is None:
             return None
         form: Any = dict(opacity=CLEAR, cast_shadow=False, position=body.place)
-        name, color = f"/{NAMES[i]}/touched", rgb_bytes(CLAY_DEEP)
+        name, color = f"/{ENDS[i]}/touched", rgb_bytes(CLAY_DEEP)
         if body.half is None:
             add.add_icosphere(name, AROUND * self._size, color, **form)
             return None
@@ -108,11 +106,11 @@ class PairPage(LivePage):
     def _axes(self) -> list[int]:
         """Axes of the world along which the hand pulls."""
         leader = self.session.pair.leader
-        return [0] if isinstance(leader, Device) else axes_of(leader)
+        return [0] if isinstance(leader, Device) else force_axes(leader)
 
     def _arm(self, i: int, figure: Sticks) -> dict[str, list[Any]]:
         """Adds links, joints and handle."""
-        add, name, size = self.server.scene, NAMES[i], self._size
+        add, name, size = self.server.scene, ENDS[i], self._size
         links, joints = [], []
         for k, (begin, end) in enumerate(figure.segments):
             color = rgb_bytes(COLORS[i] if k % 2 else PART_COLORS["dark"])
@@ -190,7 +188,7 @@ class PairPage(LivePage):
 
     @property
     def _unit(self) -> str:
-        return "m" if joint_names(self.session.pair.leader) == ("x",) else "rad"
+        return joint_unit(joint_names(self.session.pair.leader))
 
     def _change(self) -> None:
         """Restarts with what the sliders say; a delay that cannot run is taken back."""
@@ -206,7 +204,7 @@ class PairPage(LivePage):
 
     def _hold(self) -> None:
         away = np.asarray(self.target.position) - self._start
-        axes = axes_of(self.session.pair.leader)
+        axes = force_axes(self.session.pair.leader)
         self.session.pull(away[axes] if self.hold.value else None)
 
     def _reset(self, _: Any) -> None:

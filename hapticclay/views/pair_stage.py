@@ -9,16 +9,16 @@ import numpy as np
 from ..arms.mechanism import Sticks
 from ..errors import ParameterError
 from ..kernel.engine import mujoco
+from ..scene.link import ENDS
 from ..scene.pair import Pair
 from ..scene.virtual_wall import Device
 from ..simulation.pair_record import PairRecord
-from .arm_sticks import in_space, sticks_of
-from .palette import BLUE, CLAY_DEEP, VERMILION
+from .arm_sticks import COLORS, in_space, sticks_of
+from .palette import CLAY_DEEP
 from .sticks import SHAFT, VIEWS, arrow, box, capsule, draw_sticks, fit, look, room, sphere
 from .touched import AROUND, CLEAR, body_of
 
 POSES = 40  # of a run, from which the cameras see all
-NAMES, COLORS = ("leader", "follower"), (BLUE, VERMILION)
 GAP = 0.3  # between both arms, as a share of their size
 LONGEST = 0.35  # arrow, of the size
 LEAST = 0.02  # of the longest arrow: shorter ones are not drawn
@@ -112,12 +112,10 @@ class PairStage:
     def _sticks(self, i: int, q: Any) -> Sticks:
         place = self._start[i] + self._magnify * (np.asarray(q) - self._start[i])
         try:
-            found = sticks_of(self._pair.arms[i], place, self._span)
+            return sticks_of(self._pair.arms[i], place, self._span, self._shift[i])
         except ParameterError:
             bound = "must be smaller: its chains cannot be closed in the motion so magnified"
             raise ParameterError("magnify", self._magnify, bound) from None
-        shift = self._shift[i]
-        return Sticks(found.segments + shift, found.joints + shift, found.handle + shift)
 
     def pose(self, q: Any, forces: Any) -> None:
         """Poses both arms under their forces [N]."""
@@ -144,7 +142,7 @@ class PairStage:
         """Writes which arm it is, at its foot."""
         geom = sphere(scene, self._shown[i].joints[0], 1e-4 * self._size, COLORS[i], 0.0)
         if geom is not None:
-            geom.label = NAMES[i]
+            geom.label = ENDS[i]
 
     def _draw_touched(self, scene: mujoco.MjvScene) -> None:
         """Walls and clay, objects that move with a handle, and their springs."""

@@ -6,10 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arms.mjcf_arm import MjcfArm
 from ..model.clay import Clay
 from ..scene.contact import Contact
-from ..scene.pair import Pair
+from ..scene.pair import Pair, axes_of
 from .sticks import KNOB
 
 AROUND = 0.09  # radius of clay around a handle, as a share of the size
@@ -75,5 +74,5 @@ def _border(touched: Contact | Clay) -> float | None:
 
 def _along(arm: Any, axis: str | None, border: float) -> np.ndarray:
     """The direction in which it lies."""
-    name = axis or (arm.axes[0] if isinstance(arm, MjcfArm) else "x")
+    name = axis or axes_of(arm)[0]
     return np.where(np.arange(3) == "xyz".index(name), -1.0 if border < 0.0 else 1.0, 0.0)
