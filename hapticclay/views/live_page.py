@@ -32,12 +32,13 @@ class LivePage:
     """A page of what a player plays, served until `close`; `url` has the token that it may need.
 
     `session` is what is played, `run` the button that pauses it, `hold` the tick by which the hand
-    pulls the handle to a point.
+    pulls the handle to a point, `target` the arrows at that point.
     """
 
     session: Any
     run: Any
     hold: Any
+    target: Any
 
     def __init__(self, play: Any, host: str, port: int):
         """Begins to serve an empty page."""
@@ -96,6 +97,12 @@ class LivePage:
     def _dragged(self, _: Any) -> None:
         self.hold.value = True  # acts like a tick by hand, the first time
         self._locked(self._hold)
+
+    def _follow(self, handle: Any) -> None:
+        """Moves the arrows with the handle, unless a drag has begun since it was there."""
+        with self.player.lock:
+            if self.session.point is None:
+                self.target.position = tuple(handle)
 
     def _toggle(self, _: Any) -> None:
         with self.player.lock:

@@ -180,7 +180,7 @@ class Page(LivePage):
         with self.player.lock:
             frames = session.frames
             new, self._shown = frames[self._shown :], len(frames)
-            frame, point, q = frames[-1], session.point, session.angles
+            frame, q = frames[-1], session.angles
             plots_due = now - self._plot_time > PLOT_TIME
             plotted = frames[:: max(1, len(frames) // PLOT_POINTS)] if plots_due else []
             verdict = self._banner() if plots_due else ""
@@ -193,9 +193,8 @@ class Page(LivePage):
                 body.position, body.wxyz = place.xpos, place.xquat
             if self._arrow:
                 self._point_arrow(frame)
-            if point is None:
-                x, y = np.add(frame.p, session.scenario.origin).tolist()
-                self.target.position = (x, y, 0.052)
+            x, y = np.add(frame.p, session.scenario.origin).tolist()
+            self._follow((x, y, 0.052))
             changed = self.stage.stale or self._clay_time == -math.inf
             if self._clay and changed and now - self._clay_time > CLAY_TIME:
                 self.stage.stale, self._clay_time = False, now

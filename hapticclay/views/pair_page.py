@@ -218,7 +218,7 @@ class PairPage(LivePage):
         session = self.session
         with self.player.lock:
             newest = session.run.newest
-            point, plots_due = session.point, now - self._plot_time > PLOT_TIME
+            plots_due = now - self._plot_time > PLOT_TIME
             frames = list(session.frames) if plots_due else []
         starts = [host.start for host in session.run.hosts]
         _, leader, follower, *_, hand, contact, _, _ = newest or (0.0, *starts, *[np.zeros(2)] * 6)
@@ -233,8 +233,8 @@ class PairPage(LivePage):
                 self._point(i, shown.handle, forces[i])
                 if self._touched[i] is not None:
                     self._touched[i].position = shown.handle
-                if i == 0 and point is None:
-                    self.target.position = shown.handle
+                if i == 0:
+                    self._follow(shown.handle)
         if frames:
             self._plot_time = now
             self._show(frames)

@@ -81,15 +81,36 @@ def test_sliders_restart_the_pair_with_a_later_link(file):
     assert troubles == []
 
 
+def drag(page, away):
+    """What viser does while a person drags the arrows."""
+    page._dragged(None)
+    page.target.position = tuple(page._start + away)
+    page._dragged(None)
+
+
 def test_the_hand_pulls_where_the_arrows_are(file):
     with shown(hc.Pair.load(file)) as page:
-        page.hold.value = True
-        page.target.position = tuple(page._start + np.array([0.05, 0.0, 0.0]))
-        page._dragged(None)
+        drag(page, [0.05, 0.0, 0.0])
         assert until(lambda: page.session.run.newest and page.session.run.newest[1][0] > 0.02)
         assert until(lambda: "delay left" in page.status.content)
         page._reset(None)
         assert page.session.point is None and not page.hold.value
+
+
+def test_a_drag_that_begins_while_the_page_is_drawn_is_kept(file):
+    with shown(hc.Pair.load(file)) as page:
+        draw, drawn = page._pose, threading.Event()
+
+        def drag_first(i, figure):
+            if not drawn.is_set():
+                drag(page, [0.05, 0.0, 0.0])
+                drawn.set()
+            draw(i, figure)
+
+        page._pose = drag_first
+        assert drawn.wait(90.0)
+        assert until(lambda: page.session.run.newest and page.session.run.newest[1][0] > 0.02)
+        assert page.target.position[0] == pytest.approx(page._start[0] + 0.05)
 
 
 @pytest.mark.parametrize("name", ["planar_2r", "five_bar", "leader_7"])
@@ -108,9 +129,7 @@ def test_a_wall_stands_and_an_object_moves_with_the_handle(file):
     pair = replace(hc.Pair.load(file), follower_clay=wall, leader_clay=hc.Contact(mass=0.2))
     with shown(pair) as page:
         assert page._touched[0] is not None and page._touched[1] is None
-        page.hold.value = True
-        page.target.position = tuple(page._start + np.array([0.05, 0.0, 0.0]))
-        page._dragged(None)
+        drag(page, [0.05, 0.0, 0.0])
         assert until(lambda: page._touched[0].position[0] > 0.02)
 
 
