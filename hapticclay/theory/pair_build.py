@@ -18,7 +18,7 @@ from ..scene.link import ENDS
 from ..scene.pair import Pair
 from .architectures import ARCHITECTURES
 from .client_loop import held_arm
-from .joint_gains import IGNORED, joint_loop
+from .joint_gains import IGNORED, SMALL, joint_loop
 from .joint_loop import JointLoop
 from .linear_loop import whole_samples
 from .pair_end import End, Load
@@ -104,7 +104,7 @@ class Build:
             out.append("jitter and loss: as the constant delay that they come to")
         if pair.link.passivity:
             out.append("passivity controllers: left out, they are not linear; runs have them")
-        return (*out, IGNORED)
+        return (*out, f"{SMALL}s", IGNORED)
 
 
 def _scaled(pair: Pair, gain: float) -> Pair:
