@@ -17,7 +17,7 @@ from ..errors import Bound, ParameterError
 from ..model.operator import NO_HAND, Operator
 from ..results import Result, Tables
 from . import joint_changes
-from .client_loop import Delay, Sample, held_arm
+from .client_loop import Delay, Sample, with_hand
 from .held_words import hand_words
 from .joint_changes import Edge, slopes
 from .joint_families import Circle, Family, Limit
@@ -137,7 +137,7 @@ def wall_limit(
             out of its bounds.
     """
     arm.check_handle()
-    linear = held_arm(arm.linear(), operator or NO_HAND)
+    linear = with_hand(arm.linear(), operator or NO_HAND)
     along = linear.jacobian[AXES.index(axis)]
     if not np.abs(along).max() > STILL:
         raise ParameterError("axis", axis, "must be one along which the handle can move")
