@@ -151,7 +151,7 @@ def wall_lab(quick: bool, tell: Tell) -> Lab:
         (
             "K Ts is nearly the same for all rates. What is it, and why?",
             "How does the limit change with the mass? Try it, then find the mass in the formula.",
-            "Stable without a hand, and passive, so stable in every passive hand: why so close here?",
+            "Stable without a hand, and passive: why are the two limits so close here?",
         ),
         f"K Ts = {min(product):.4g} to {max(product):.4g} N.s/m, b is {DAMPER:g}",
         {

@@ -50,8 +50,8 @@ class PairLimits(Result):
         frequency: of the motion that turns unstable first, or is unstable now [Hz].
         joint: joint that moves most in it.
         mode: that motion in words.
-        gain: largest factor of all Kp of both arms, from the present ones on, found by doubling; inf
-            for more than 64; 0 if the pair is unstable.
+        gain: largest factor of all Kp of both arms, from the present ones on, found by doubling;
+            inf for more than 64; 0 if the pair is unstable.
         slope: largest slope of a friction fed forward at one joint of both arms, Fc k + Fv, with
             none at the others [N.m.s/rad], shape (n,).
         law_slope: slopes of the leader's law [N.m.s/rad], shape (n,).
