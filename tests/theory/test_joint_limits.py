@@ -126,6 +126,18 @@ def test_the_engine_flips_at_the_limit(joint):
     assert verdicts == [False, True]
 
 
+@pytest.mark.parametrize("method", ["EULER", "IMPLICIT", "IMPLICITFAST", "DISCRETE"])
+def test_steps_that_move_by_the_rates_at_their_end_are_off_alike(method):
+    """One step a sample: 37 % too high, whatever a step takes implicitly."""
+    arm, Ts = leader(), arm_integrators.TS
+    scale = hc.theory.joint_limits(arm, LEADER_LAW, Ts, Ts).scale
+    verdicts = [
+        arm_integrators.grows(arm, share * scale * np.array(LEADER_KP), f"mjINT_{method}", 1, True)
+        for share in (1.36, 1.39)
+    ]
+    assert verdicts == [False, True]
+
+
 def test_published_gains_of_a_leader():
     """Limits to the digits to which an independent program found them."""
     found = hc.theory.joint_limits(leader(), LEADER_LAW, "2 ms", "2 ms")
