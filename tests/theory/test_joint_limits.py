@@ -272,6 +272,23 @@ def test_a_drive_hardly_limits_its_gains():
     assert found.stable and (found.Kp[:, 1] > 5.0 * host.Kp[:, 1]).all()
 
 
+@pytest.mark.parametrize("Kd", [0.0, 0.1, 1e4, 1e8])
+def test_a_drive_of_an_arm_without_weight_holds_nothing_and_is_stable(Kd):
+    """No torque of the host, so no delay matters; a slow drive decays by exp(-Kp Ts/Kd)."""
+    law = hc.JointPD((5.0, 5.0), (Kd, Kd), runs="drive")
+    found = hc.theory.joint_limits(hc.MjcfArm("planar_2r"), law, 1e-3, 1e-3)
+    assert found.stable and found.delay_left == found.scale == math.inf
+    assert "any factor" in found.headline() and "unstable" not in found.text()
+    if Kd > 1e3:
+        assert found.radius == pytest.approx(math.exp(-5.0 * 1e-3 / Kd), abs=1e-10)
+
+
+def test_a_drive_beyond_all_numbers_is_refused():
+    law = hc.JointPD((5.0, 5.0), (1e9, 1e9), runs="drive")
+    with pytest.raises(hc.ParameterError, match="damping = 1e9|damping = 1000000000"):
+        hc.theory.joint_limits(hc.MjcfArm("planar_2r"), law, 1e-3)
+
+
 def test_friction_fed_forward_has_a_largest_slope():
     """A slope above the limit makes the loop unstable, one below does not."""
     plain = hc.theory.joint_limits(leader(), LEADER_LAW, 1e-3, 1e-3)
