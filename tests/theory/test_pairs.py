@@ -550,6 +550,24 @@ def test_no_pair_is_without_an_answer(start):
         assert found.text() and found.tables()
 
 
+@pytest.mark.parametrize("kind", KINDS[:3])
+@pytest.mark.parametrize("runs", ["host", "drive"])
+def test_a_pair_without_gains_rests_anywhere_at_any_delay(kind, runs):
+    """Nothing is left but rest, twice for each arm, whose motion nothing ends."""
+    device, law = hc.Device(0.1, 0.0), hc.JointPD((0.0,), (0.0,), runs=runs)
+    pair = hc.Pair(device, device, law, hc.Link(kind, (4e-3, 0.0)), Ts=2e-3)
+    found = hc.theory.pair_limits(pair)
+    assert found.stable and found.radius == 0.0 and found.delay == math.inf
+    assert "rest alone" in found.headline()
+
+
+def test_gains_at_their_bound_are_judged():
+    """Factors of 2 and more lie beyond what may be given, and are tried all the same."""
+    device, law = hc.Device(0.1, 1.0), hc.JointPD((1e9,), (1e9,), runs="drive")
+    found = hc.theory.pair_limits(hc.Pair(device, device, law, hc.Link("position-force")))
+    assert found.stable and found.gain == math.inf
+
+
 def test_a_pair_from_a_file(tmp_path):
     (tmp_path / "gains.toml").write_text(f"Kp = {list(KP)}\nKd = {list(KD)}\n")
     (tmp_path / "pair.toml").write_text(
