@@ -138,7 +138,7 @@ def transparency_plot(found: PairTransparency) -> Figure:
     for ax in (felt, follows):
         ax.legend(fontsize=points(8))
     set_title(felt, f"{found.kind}, along {found.axis}")
-    set_title(safe, "any passive hand and object: above 1", panel=True)
+    set_title(safe, "absolutely stable: above 1", panel=True)
     return figure
 
 
