@@ -181,11 +181,13 @@ class Delays:
 
         With many samples eigenvalues lie near |z| = |eigenvalue of H|^(1/N), dense along the
         circle: where the phase of z^N fits. The largest, and those on the real axis, are refined by
-        z = (eigenvalue of H)^(1/N).
+        z = (eigenvalue of H)^(1/N). Where nothing goes around, as of a force measured in free
+        motion, they are those of both ends.
         """
         starts = sorted(self._starts(samples), key=lambda x: -abs(x[1]))[:TOPS]
         found = [_refined(self.loop, *start, samples) for start in starts]
         found += self._on_axis(samples)
+        found = found or self.loop.open_poles().tolist()
         return max((z for z in found if abs(z - 1.0) > AT_REST), key=abs, default=0j)
 
     def _starts(self, samples: float) -> list[tuple[complex, complex, int]]:
@@ -195,7 +197,8 @@ class Delays:
         for branch in values.T:
             turns = (samples * self.angles - np.unwrap(np.angle(branch))) / (2.0 * math.pi)
             for i, (a, b) in enumerate(itertools.pairwise(turns.tolist())):
-                for k in range(math.ceil(a), math.floor(b) + 1):
+                some = abs(branch[i]) > joint_crossings.NO_SIZE
+                for k in range(math.ceil(a), math.floor(b) + 1) if some else ():
                     theta = float(np.interp(k, (a, b), self.angles[i : i + 2]))
                     out.append((cmath.exp(1j * theta), complex(branch[i]), k))
         return out
@@ -221,12 +224,10 @@ def _refined(loop: PairLoop, z: complex, x: complex, turns: int, samples: float)
     for _ in range(REFINED):
         values = np.linalg.eigvals(loop.around(np.array([-1j * cmath.log(z)])))[0]
         x = complex(values[np.argmin(np.abs(values - x))])
-        argument = cmath.phase(x)
+        argument, size = cmath.phase(x), math.log(abs(x))
         extra = round((samples * cmath.phase(z) - argument) / (2.0 * math.pi)) if turns else 0
-        before, z = (
-            z,
-            cmath.exp((math.log(abs(x)) + 1j * (argument + 2.0 * math.pi * extra)) / samples),
-        )
+        turned = argument + 2.0 * math.pi * extra
+        before, z = z, cmath.exp((size + 1j * turned) / samples)
         if abs(z - before) <= 1e-14:
             break
     return z

@@ -369,6 +369,17 @@ def test_a_long_delay_is_judged_without_states(monkeypatch):
         assert (counted.radius < 1.0) is counted.stable
 
 
+def test_a_force_that_is_never_met_goes_around_at_no_delay():
+    """A free follower: the leader decays by its damper alone, at 2000 samples as at none."""
+    device = hc.Device(0.5, 1.0)
+    pair = hc.Pair(device, device, hc.JointPD((400.0,), (20.0,)), hc.Link("position-force", 1.0))
+    found = hc.theory.pair_limits(pair)
+    assert found.stable and found.delay == math.inf
+    assert found.radius == pytest.approx(math.exp(-pair.Ts * 1.0 / 0.5), abs=1e-12)
+    soon = hc.theory.pair_limits(replace(pair, link=hc.Link("position-force", 1e-3)))
+    assert soon.radius == pytest.approx(found.radius, abs=1e-12)
+
+
 # ---- rest, and friction that is fed forward ------------------------------------------------------
 
 
