@@ -97,6 +97,8 @@ class StabilityCommand:
             inertia_shaping=self.inertia_shaping,
         )
         found = loop_verdicts(loop, self.delay, flow)
+        hand = "the paper's hand Th" if self.operator else "no hand"
+        print(f"{self.axis} axis, K = {loop.K:g} 1/kg, clay of b = {loop.b:g} N.s/m, {hand}:")
         print(found.text())
         asked = {"axis": self.axis, "b": loop.b, "K": loop.K, "operator": loop.operator,
                  "Ts": self.Ts, "compensator": loop.compensator, "servo": loop.servo,
@@ -148,7 +150,11 @@ def clay_of(words: Sequence[str], b: float | None = None) -> Flow:
     if "=" not in text:
         if b is not None:
             raise ParameterError("b", b, f"must not be given beside {text!r}, which has its own")
-        return material(text)
+        try:
+            return material(text)
+        except ParameterError as error:
+            bound = f"{error.bound} (or numbers with their names, as Fy=5 b=30)"
+            raise ParameterError(error.field, error.value, bound) from None
     found = {} if b is None else {"b": b}
     for word in text.split():
         name, equals, value = word.partition("=")

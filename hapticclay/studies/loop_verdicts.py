@@ -179,11 +179,15 @@ def loop_verdicts(loop: PushedLoop, delay: float = 0.0, flow: Flow | None = None
     found = loop_passivity.passivity(linear)
     answers.append(_answer("passive: stable with every hand", found, "least Re Z [N.s/m]"))
     for late in (0.0, delay) if delay else (0.0,):
-        question = f"... {1e3 * late:g} ms late" if late else "held clay passive with this hand"
+        question = f"... {1e3 * late:g} ms late" if late else f"held clay passive {_hand(loop)}"
         found = loop_passivity.clay_passivity(loop.b, loop.Ts or TS, loop.hand.damper, delay=late)
         answers.append(_answer(question, found, "N.s/m to spare"))
     answers.append(_transparency(linear))
     return LoopVerdicts(tuple(answers), flow and yielding_clay(linear, flow))
+
+
+def _hand(loop: PushedLoop) -> str:
+    return "with this hand" if loop.operator else "without a hand"
 
 
 def _answer(question: str, v: Any, what: str, factor: float = 1.0) -> Answer:
@@ -193,7 +197,7 @@ def _answer(question: str, v: Any, what: str, factor: float = 1.0) -> Answer:
 def _limits(loop: PushedLoop, linear: Loop, delay: float) -> list[Answer]:
     """Largest stable K, at once and late, in continuous time and sampled."""
     Ts, late = loop.Ts or TS, f"... {1e3 * delay:g} ms late"
-    timings = {"stable with this hand": {}, f"... sampled every {1e3 * Ts:g} ms": {"Ts": Ts}}
+    timings = {f"stable {_hand(loop)}": {}, f"... sampled every {1e3 * Ts:g} ms": {"Ts": Ts}}
     if delay:
         timings |= {late: {"delay": delay}, f"{late}, sampled": {"Ts": Ts, "delay": delay}}
     out = []
