@@ -134,8 +134,9 @@ def checked(made: F) -> F:
         nodes = argument_nodes(inner)
         ordered = zip(itertools.chain(names, itertools.cycle(rest)), args, strict=False)
         taken = [nodes[name].check(name, x) if name in nodes else x for name, x in ordered]
-        for name in given.keys() & nodes.keys():
-            given[name] = nodes[name].check(name, given[name])
+        for name in given:
+            if name in nodes:
+                given[name] = nodes[name].check(name, given[name])
         return inner(*taken, *args[len(taken) :], **given)
 
     if isinstance(made, type):

@@ -294,11 +294,18 @@ def of_plain(data: Any) -> Any:
     if "float" in data:
         return float(data["float"])
     if "real" in data:
-        return of_plain(data["real"]) + 1j * of_plain(data["imaginary"])
+        return _complex(of_plain(data["real"]), of_plain(data["imaginary"]))
     values, kind = list(map(of_plain, data["values"])), np.dtype(data["array"])
     if kind.kind not in "biufcU" or kind.itemsize > LONGEST_ITEM:
         raise ValueError(f"arrays of {one_line(kind)} are not read")
     return np.array(values, kind).reshape(data["shape"])
+
+
+def _complex(real: np.ndarray, imaginary: np.ndarray) -> np.ndarray:
+    """Both parts in one array: a sum with 1j makes NaN of infinity and loses signs of zeros."""
+    out = np.empty(real.shape, np.result_type(real, np.complex64))
+    out.real, out.imag = real, imaginary
+    return out
 
 
 def _made(name: str, fields: Mapping[str, Any]) -> Any:

@@ -97,8 +97,6 @@ class StabilityCommand:
             inertia_shaping=self.inertia_shaping,
         )
         found = loop_verdicts(loop, self.delay, flow)
-        hand = "the paper's hand Th" if self.operator else "no hand"
-        print(f"{self.axis} axis, K = {loop.K:g} 1/kg, clay of b = {loop.b:g} N.s/m, {hand}:")
         print(found.text())
         asked = {"axis": self.axis, "b": loop.b, "K": loop.K, "operator": loop.operator,
                  "Ts": self.Ts, "compensator": loop.compensator, "servo": loop.servo,

@@ -129,7 +129,6 @@ def record(
         if importlib.util.find_spec("h5py") is None:
             raise ImportError
     kept = target.with_name(f".{target.name}.part")
-    kept = target.with_name(f".{target.name}.part")
     plan = Recording(id, noise, seed, max(episodes, store.last_part(kept) + 1), engine)
     count = 0
 

@@ -153,6 +153,7 @@ class DevicePartner(Partner):
         super().__init__(hand.client.limits.Ts)
         self.hand = hand
         self._handle: Any = None  # position and velocity of the simulated handle; None at rest
+        self._run: Any = None  # of the newest slice
 
     def exchange(self) -> None:
         """Sends the force of the coupling, and reads the device."""
@@ -163,7 +164,13 @@ class DevicePartner(Partner):
             self.hand.exchange(*handle)
 
     def before_slice(self, play: Session) -> None:
-        """Pulls the handle to the device's position; releases it while that is unknown."""
+        """Pulls the handle to the device's position; releases it while that is unknown.
+
+        A run begins where the device is, and its forces rise from zero: after a restart, too.
+        """
+        if play.run is not self._run:
+            self._run = play.run
+            self.hand.begin_at(play.handle()[0])
         hand, held = self.hand, self.hand.held
         play.pull(hand.place if held else None)
         B = hand.coupling.B

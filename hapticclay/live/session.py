@@ -137,16 +137,15 @@ class Session:
         gain: tuple[float, float] | None = None,
         b: Annotated[float | None, Bound(0.0, 1e6)] = None,
     ) -> None:
-        """Changes the gain or the damping."""
-        scenario = self.scenario
+        """Changes the gain or the damping; where a number is out of its bounds, nothing."""
+        scenario, damping = self.scenario, self.damping if b is None else b
         if gain is not None:
             scenario = replace(scenario, gain=gain)
         if b is not None:
-            self.damping = b
             clay = self.given.clay
-            scenario = replace(scenario, clay=clay and clay.scaled(self.damping))
-        self.scenario = scenario
+            scenario = replace(scenario, clay=clay and clay.scaled(damping))
         self.run.change(scenario)
+        self.scenario, self.damping = scenario, damping
 
     def advance(self, seconds: float) -> np.ndarray:
         """Advances by a slice of simulated time, unless paused."""

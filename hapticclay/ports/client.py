@@ -113,6 +113,7 @@ class DeviceClient:
         with suppress(*self._broken):
             if not self.lost:
                 self._send(NOTHING)
+        with suppress(*self._broken):
             self._socket.close()
         self._inbox.join(CLOSING)
         self.lost = self.lost or "closed"

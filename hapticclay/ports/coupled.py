@@ -112,11 +112,15 @@ class DeviceHand:
         self._offset = 0.0, 0.0
         self.place, self.rate, self.held, self.t = start, (0.0, 0.0), False, 0.0
         if sample := client.exchange():
-            x, y = to_plane(sample.position, self.plane)
-            self._offset = start[0] - x, start[1] - y
             self.held = True
             self._take(sample)
-        client.restart_ramp()
+        self.begin_at(start)
+
+    def begin_at(self, p: Pair) -> None:
+        """Takes the present position of the device for a place; forces rise from zero."""
+        (x, y), (dx, dy) = self.place, self._offset
+        self._offset, self.place = (dx + p[0] - x, dy + p[1] - y), p
+        self.client.restart_ramp()
 
     def _settle(self) -> float:
         """Median of the time between two answers [s]."""

@@ -27,7 +27,8 @@ class Subscriptions:
     # simulated time of the newest state sent [s], by topic
     sent: dict[str, float] = field(default_factory=dict)
     level: str = "error"  # least severe of the status messages that the client wants
-    buttons: frozenset[str] | None = None  # those in the last message; None before it
+    # those pressed in the last message, by topic of buttons
+    buttons: dict[str, frozenset[str]] = field(default_factory=dict)
 
     def add(self, operation: Operation, kind: str) -> None:
         self.topics[operation.topic] = kind
@@ -50,7 +51,7 @@ class Subscriptions:
             left.clear()
         left.pop(operation.id, None)
         if not left:
-            for table in (self.topics, self.throttles, self.sent):
+            for table in (self.topics, self.throttles, self.sent, self.buttons):
                 table.pop(operation.topic, None)
 
 
@@ -84,15 +85,15 @@ class RosbridgeProtocol:
         cursor, joints, pressed = service.cursor(), service.joints, service.pressed
         epoch = self._epoch if service.clock == "wall" else 0.0
         for topic, kind in kept.topics.items():
-            if kind == "phantom/button":
-                if kept.buttons == pressed:
-                    continue
-                kept.buttons = pressed
+            if kind == "phantom/button" and kept.buttons.get(topic) == pressed:
+                continue
             before = kept.sent.get(topic)
             wait = min(kept.throttles[topic].values())
             if before is not None and 0.0 <= t - before < max(wait, 1e-9):
                 continue
             kept.sent[topic] = t
+            if kind == "phantom/button":
+                kept.buttons[topic] = pressed
             msg = rosbridge.ros_message(kind, cursor, joints, pressed, epoch + t)
             out.append(rosbridge.publish_text(topic, msg))
         return out

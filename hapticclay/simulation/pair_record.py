@@ -15,6 +15,7 @@ from ..scene.link import ENDS
 from ..scene.pair import Pair, joint_unit
 
 RELATIVE = 1e-9  # growth of an amplitude that is none
+FEWEST = 5  # samples in whose four quarters there is a rate each
 
 
 @named
@@ -73,12 +74,22 @@ class PairRecord(Result):
 
     @property
     def grows(self) -> bool:
-        """Whether rates in the last quarter are larger than in the one before, or it ended."""
-        if self.ended:
-            return True
+        """Whether rates in the last quarter are larger than in the one before, or it ended.
+
+        False for a record of fewer than five samples, which shows no trend.
+        """
+        if self.ended or len(self.t) < FEWEST:
+            return bool(self.ended)
         both = np.diff(np.hstack([self.leader, self.follower]), axis=0)
         third, last = np.array_split(np.abs(both).max(axis=1), 4)[2:]
         return bool(last.max() > (1.0 + RELATIVE) * third.max())
+
+    @property
+    def trend(self) -> str:
+        """Whether its rates grow or fall at its end, in words."""
+        if len(self.t) < FEWEST:
+            return "too short for a trend"
+        return f"rates {'grow' if self.grows else 'fall'} in its last quarter"
 
     @property
     def off(self) -> np.ndarray:
@@ -106,10 +117,9 @@ class PairRecord(Result):
     def headline(self) -> str:
         """The run in one line."""
         how = f"ended at {self.t[-1]:.4g} s: {self.ended}" if self.ended else "to its end"
-        grows = f"rates {'grow' if self.grows else 'fall'} in its last quarter"
         off = f"follower off by {1e3 * self.error:.3g} m{self.unit} rms"
         return (
-            f"{self.kind}, {how}; {grows}; {off}; "
+            f"{self.kind}, {how}; {self.trend}; {off}; "
             f"controllers and link took {self.energy[-1]:.3g} J, at least {self.energy.min():.3g} J"
         )
 

@@ -239,7 +239,8 @@ class Record:
         low, high = np.maximum(np.arange(n) - span, 0), np.minimum(np.arange(n) + span + 1, n)
         return count[high] == count[low]
 
-    def stretches(self, axis: str | None = None) -> list[np.ndarray]:
+    @checked
+    def stretches(self, axis: Literal["x", "y"] | None = None) -> list[np.ndarray]:
         """Indices of the samples, split wherever the handle entered different clay.
 
         Args:
@@ -258,7 +259,8 @@ class Record:
             change = np.flatnonzero(np.diff(b)) + 1
         return np.split(np.arange(len(self.t)), change)
 
-    def regions(self, axis: str | None = None) -> list[dict[str, Any]]:
+    @checked
+    def regions(self, axis: Literal["x", "y"] | None = None) -> list[dict[str, Any]]:
         """Means over each of the `stretches`, in order of time.
 
         Each axis has fe/v against b over the stretch (mean and deviation). At steady speed it also

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked
-from ..errors import Bound, ParameterError, array_of, integer, number
+from ..errors import Bound, ParameterError, array_of, integer, is_series, number
 from ..kernel.engine import warnings_caught
 from ..model.operator import Operator
 from ..scene.scenario import Scenario
@@ -164,7 +164,7 @@ class SimulationBatch:
         one = operator is None or isinstance(operator, Operator | tuple)
         operators = _each("operator", operator, n, not one)
         gains = None if gain is None else self._gains(gain, n)
-        factors = _each("b", b, n, np.ndim(b) == 1)
+        factors = _each("b", b, n, is_series(b))
         with Alone(self) as all_:
             for k, hand, factor in zip(which, operators, factors, strict=True):
                 changes: dict[str, Any] = {}
@@ -240,8 +240,8 @@ class SimulationBatch:
     # ---- arguments
 
     def _mask(self, field: str, value: Any) -> np.ndarray:
-        mask, n = np.asarray(value), len(self)
-        if mask.dtype != bool or mask.shape != (n,):
+        mask, n = _array_or_none(value), len(self)
+        if mask is None or mask.dtype != bool or mask.shape != (n,):
             raise ParameterError(field, value, f"must be True or False for each run, shape ({n},)")
         return mask
 
@@ -250,7 +250,9 @@ class SimulationBatch:
         n = len(self)
         if value is None:
             return list(range(n))
-        given = np.asarray(value)
+        given = _array_or_none(value)
+        if given is None:
+            raise ParameterError(field, value, "must be the index of a run, indices, or a mask")
         if given.dtype == bool and given.ndim:
             return np.flatnonzero(self._mask(field, value)).tolist()
         return [integer(field, x, 0, n - 1) for x in np.atleast_1d(given).tolist()]
@@ -273,11 +275,18 @@ class SimulationBatch:
         return force
 
 
+def _array_or_none(value: Any) -> np.ndarray | None:
+    """The array of a value; None for rows of unequal length, of which there is none."""
+    try:
+        return np.asarray(value)
+    except ValueError:
+        return None
+
+
 def _each(field: str, value: Any, n: int, several: bool) -> Sequence[Any]:
     """One value per run: those given, or one for all."""
     if not several:
         return [value] * n
-    values = list(value)
-    if len(values) != n:
+    if not is_series(value) or len(values := list(value)) != n:
         raise ParameterError(field, value, f"must be one, or one for each of {n} runs")
     return values

@@ -281,11 +281,15 @@ class Simulation:
             make_steps(run, n)
             self._wall += time.perf_counter() - begin
 
+    @checked
     def reset(self, scenario: Scenario | None = None) -> None:
         """Restarts the run.
 
         Args:
             scenario: what to run; None for the same.
+
+        Raises:
+            ParameterError: scenario is of another type, or refused as by `simulate`.
         """
         with Alone(self):
             self._begin(scenario or self._given)
@@ -295,6 +299,7 @@ class Simulation:
         with Alone(self) as run:
             return run.snapshot()
 
+    @checked
     def restore(self, snapshot: Snapshot) -> None:
         """Returns to a snapshot, with the record as it was.
 

@@ -27,6 +27,7 @@ SLOWEST = 1.0  # [s] largest control sample that is looked for
 PERIODS = 120  # control samples tried, evenly in their logarithm
 BEYOND = 1e-6  # share beyond a limit at which its motion is looked at
 ROUNDS = 30  # of the search for a delay
+SMALL = "small motions about the pose"
 IGNORED = "joint friction, encoder counts, torque limits, backlash and elastic links: left out"
 
 
@@ -139,8 +140,14 @@ class JointLimits(Result):
             if math.isinf(self.scale)
             else f"{self.scale:.4g} times ({self.buzz:.3g} Hz)"
         )
-        left = "any" if math.isinf(self.delay_left) else f"{1e3 * self.delay_left:.3g} ms"
-        return f"stable at {at}: all Kp up to {more}, delay left {left}, {self.joint} first"
+        return f"stable at {at}: all Kp up to {more}, delay left {self._left}, {self.joint} first"
+
+    @property
+    def _left(self) -> str:
+        """Delay that may be added, in words."""
+        if math.isinf(self.delay_left):
+            return f"more than {LATEST:g} s"
+        return f"{1e3 * self.delay_left:.3g} ms"
 
     def _way_back(self) -> str:
         if math.isnan(self.scale):
@@ -166,11 +173,10 @@ class JointLimits(Result):
         if math.isinf(self.scale):
             return "nothing: no factor of Kp buzzes"
         if self.delay:
-            left = "any" if math.isinf(self.delay_left) else f"{1e3 * self.delay_left:.3g} ms"
             shorter = min(self.delay, 1e-3)
             gain = -shorter * self.scale_per_delay
             less = f"{1e3 * shorter:.3g} ms less raises the factor of all Kp by {gain:.3g}"
-            return f"delay ({left} left): {less}"
+            return f"delay ({self._left} left): {less}"
         return f"rate ({1.0 / self.Ts:.4g} Hz, at least {self.slowest_rate:.4g} Hz needed)"
 
     def tables(self) -> Tables:
@@ -435,7 +441,8 @@ class Study:
 
     def assumed(self) -> tuple[str, ...]:
         """What the verdict rests on, a sentence each."""
-        return (*self.arm.notes, gravity_words(self.compensated), IGNORED)
+        about = f"{SMALL}, no hand at the handle"
+        return (*self.arm.notes, gravity_words(self.compensated), about, IGNORED)
 
 
 # ---- present motion, delay and rate --------------------------------------------------------------

@@ -17,8 +17,8 @@ from ..scene import pair as pairs
 from ..scene.link import ENDS
 from ..scene.pair import Pair
 from .architectures import ARCHITECTURES
-from .client_loop import held_arm
-from .joint_gains import IGNORED, joint_loop
+from .client_loop import with_hand
+from .joint_gains import IGNORED, SMALL, joint_loop
 from .joint_loop import JointLoop
 from .linear_loop import whole_samples
 from .pair_end import End, Load
@@ -104,7 +104,7 @@ class Build:
             out.append("jitter and loss: as the constant delay that they come to")
         if pair.link.passivity:
             out.append("passivity controllers: left out, they are not linear; runs have them")
-        return (*out, IGNORED)
+        return (*out, f"{SMALL}s", IGNORED)
 
 
 def _scaled(pair: Pair, gain: float) -> Pair:
@@ -128,7 +128,7 @@ def _carried(pair: Pair, i: int) -> tuple[Linear, Load]:
     J, hand = linear.jacobian, hand or NO_HAND
     square = J.T @ J
     met = [J.T @ x @ J for x in pairs.touched_load(pair, i)]
-    held = held_arm(linear, hand)
+    held = with_hand(linear, hand)
     load = Load(
         hand.mass * square + met[0], hand.damper * square + met[1], hand.spring * square + met[2]
     )

@@ -15,12 +15,13 @@ from ..arguments import checked, named
 from ..results import Result, Tables
 from ..scene.pair import Pair
 from . import joint_crossings, roots
+from .held_words import pair_words
 from .joint_families import NEAR
 from .joint_loop import MOST_STATES, grid
 from .pair_build import Build
 from .pair_delays import SLOWEST, Delays
 from .pair_loop import PairLoop
-from .pair_onset import Onset, onset
+from .pair_onset import LATEST, Onset, onset
 
 LARGE = 500  # states of a map whose eigenvalues are not worth their time
 HIGHEST = 64.0  # factor of all Kp up to which gains are tried
@@ -49,8 +50,8 @@ class PairLimits(Result):
         frequency: of the motion that turns unstable first, or is unstable now [Hz].
         joint: joint that moves most in it.
         mode: that motion in words.
-        gain: largest factor of all Kp of both arms, from the present ones on; inf for more than 64;
-            0 if the pair is unstable.
+        gain: largest factor of all Kp of both arms, from the present ones on, found by doubling;
+            inf for more than 64; 0 if the pair is unstable.
         slope: largest slope of a friction fed forward at one joint of both arms, Fc k + Fv, with
             none at the others [N.m.s/rad], shape (n,).
         law_slope: slopes of the leader's law [N.m.s/rad], shape (n,).
@@ -97,7 +98,7 @@ class PairLimits(Result):
 
     def _delay_words(self) -> str:
         if math.isinf(self.delay):
-            return "any delay of the link"
+            return f"any delay of the link up to {LATEST:g} s"
         if self.delay == 0.0:
             return "no delay of the link is stable"
         return f"one-way delay up to {1e3 * self.delay:.3g} ms"
@@ -117,7 +118,7 @@ class PairLimits(Result):
         cause, late = max(self.budget.items(), key=lambda x: x[1])
         lateness = f"{cause} ({1e3 * late:.3g} ms each way"
         if self.stable and math.isinf(self.delay):
-            return "nothing: no delay of the link is too long"
+            return f"nothing: no delay of the link up to {LATEST:g} s is too long"
         if self.stable:
             return f"{lateness}; {1e3 * self.delay_left:.3g} ms are left)"
         if self.delay > 0.0:
@@ -186,7 +187,7 @@ def pair_limits(pair: Pair) -> PairLimits:
         fraction,
         study.budget(),
         pair.Ts,
-        study.build.assumed(),
+        (pair_words(pair), *study.build.assumed()),
     )
 
 

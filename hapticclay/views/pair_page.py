@@ -11,11 +11,10 @@ import numpy as np
 from ..arms.mechanism import Sticks
 from ..errors import ParameterError
 from ..kernel.engine import mujoco
-from ..live.pair_session import PairSession
+from ..live.pair_session import PairFrame, PairSession, Theory
 from ..scene.link import ENDS
 from ..scene.pair import joint_names, joint_unit
 from ..scene.virtual_wall import Device
-from ..theory.pair_verdict import PairLimits
 from .arm_sticks import COLORS, force_axes, in_space, sticks_of
 from .live_page import PLOT_TIME, LivePage, banner_html
 from .palette import BLACK, BLUE, CLAY_DEEP, PART_COLORS, VERMILION, rgb_bytes
@@ -191,11 +190,16 @@ class PairPage(LivePage):
         return joint_unit(joint_names(self.session.pair.leader))
 
     def _change(self) -> None:
-        """Restarts with what the sliders say; a delay that cannot run is taken back."""
+        """Restarts with what the sliders say; what cannot run is taken back.
+
+        A delay that was not moved stays as the file has it: exact, and by way.
+        """
+        session, delay = self.session, 1e-3 * self.delay.value
+        moved = not math.isclose(delay, session.delay, rel_tol=1e-9)
         try:
-            self.session.change(delay=1e-3 * self.delay.value, gain=self.gain.value)
+            session.change(delay=delay if moved else None, gain=self.gain.value)
         except ParameterError:
-            self.delay.value = 1e3 * self.session.delay
+            self.delay.value, self.gain.value = 1e3 * session.delay, session.gain
         self._restarted()
 
     def _restarted(self) -> None:
@@ -216,14 +220,15 @@ class PairPage(LivePage):
 
     def _refresh(self, now: float) -> None:
         session = self.session
-        with self.player.lock:
-            newest = session.run.newest
-            plots_due = now - self._plot_time > PLOT_TIME
-            frames = list(session.frames) if plots_due else []
-        starts = [host.start for host in session.run.hosts]
-        _, leader, follower, *_, hand, contact, _, _ = newest or (0.0, *starts, *[np.zeros(2)] * 6)
-        forces = [in_space(a, f) for a, f in zip(session.pair.arms, (hand, contact), strict=True)]
-        self._most = max(self._most, *(float(np.linalg.norm(f)) for f in forces))
+        with self.player.lock:  # a reset in between would be undone by what was before it
+            starts = [host.start for host in session.run.hosts]
+            nothing = (0.0, *starts, *[np.zeros(2)] * 6)
+            _, leader, follower, *_, hand, contact, _, _ = session.run.newest or nothing
+            pairs = zip(session.pair.arms, (hand, contact), strict=True)
+            forces = [in_space(arm, f) for arm, f in pairs]
+            self._most = max(self._most, *(float(np.linalg.norm(f)) for f in forces))
+            frames = list(session.frames) if now - self._plot_time > PLOT_TIME else []
+            words = self._words(frames[-1]) if frames else ("", "")
         with self.server.atomic():
             for i, q in enumerate((leader, follower)):
                 if not np.isfinite(q).all():
@@ -238,34 +243,38 @@ class PairPage(LivePage):
         if frames:
             self._plot_time = now
             self._show(frames)
+            self.verdict.content, self.status.content = words
 
-    def _show(self, frames: Sequence[Any]) -> None:
+    def _show(self, frames: Sequence[PairFrame]) -> None:
         t, off, hand, contact, energy = (np.array(x) for x in zip(*frames, strict=True))
         ports = 1e3 * energy.T
         self._off.data = t, 1e3 * off
         self._forces.data = t, hand, contact
         self._energy.data = t, *ports, ports.sum(axis=0)
-        verdict = self.session.verdict()
-        text = f"{verdict.text}: press Reset to start again" if self.session.ended else verdict.text
-        self.verdict.content = banner_html(text, verdict.unstable)
-        self.status.content = "  \n".join(self._lines(float(off[-1]), ports[:, -1]))
 
-    def _lines(self, off: float, ports: np.ndarray) -> list[str]:
+    def _words(self, newest: PairFrame) -> tuple[str, str]:
+        """The banner of the verdict, and the lines below it."""
+        session, verdict = self.session, self.session.verdict()
+        text = f"{verdict.text}: press Reset to start again" if session.ended else verdict.text
+        return banner_html(text, verdict.unstable), "  \n".join(self._lines(newest))
+
+    def _lines(self, newest: PairFrame) -> list[str]:
         session, clock = self.session, self.session.clock
         state = "paused" if session.paused else "ended" if session.ended else "running"
         slow = ", machine too slow" if clock.slow else ""
         return [
             f"**{state}** {session.t:.1f} s, {clock.factor:.2f} x real time{slow}",
-            _left(session.theory.found),
-            f"follower off by {1e3 * off:.3g} m{self._unit}",
-            f"controllers and link took {ports.sum():.3g} mJ",
+            _left(session.theory),
+            f"follower off by {1e3 * newest.off:.3g} m{self._unit}",
+            f"controllers and link took {1e3 * sum(newest.energy):.3g} mJ",
         ]
 
 
-def _left(found: PairLimits | None) -> str:
+def _left(theory: Theory) -> str:
     """How much delay there is left."""
+    found = theory.found
     if found is None:
-        return "delay left: being computed"
+        return f"delay left: {'not known' if theory.error else 'being computed'}"
     return f"delay left: {1e3 * found.delay_left:.3g} ms one way"
 
 

@@ -37,9 +37,7 @@ def run_plot(found: PairRecord) -> Figure:
     label_axes(energy, "time [s]", "energy taken [mJ]")
     for ax in (motion, force, energy):
         ax.legend(fontsize=points(8), ncols=2 if ax is energy else 1)
-    set_title(
-        motion, found.kind, found.ended or f"rates {'grow' if found.grows else 'fall'} at the end"
-    )
+    set_title(motion, found.kind, found.ended or found.trend)
     figure.align_ylabels()
     return figure
 

@@ -141,10 +141,12 @@ class Window:
             scale = KEY_FACTOR if key in (UP, RIGHT) else 1.0 / KEY_FACTOR
             if key == ord("R"):
                 play.recording = not play.recording
-            elif key in (UP, DOWN):
-                play.change(gain=(x * scale, y * scale))
-            elif key in (LEFT, RIGHT):
-                play.change(b=play.damping * scale)
+            elif key in (UP, DOWN, LEFT, RIGHT):
+                with contextlib.suppress(ParameterError):  # at its bound a number stays as it is
+                    if key in (UP, DOWN):
+                        play.change(gain=(x * scale, y * scale))
+                    else:
+                        play.change(b=play.damping * scale)
             elif key in EXPERIMENT_KEYS:
                 play.start(SCENARIOS[EXPERIMENT_KEYS[key]]())
                 self.other = True

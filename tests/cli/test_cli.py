@@ -707,3 +707,19 @@ def test_a_part_of_a_command_keeps_its_defaults_beside_what_is_given():
     small = parser.read(["materials", "--tool-width", "2cm"]).command().tool
     assert (small.width, small.depth) == (0.02, 0.005)
     assert parser.read(["view", "--tool-depth", "5mm"]).command().tool == small
+
+
+@pytest.mark.parametrize(
+    "args, held, hand",
+    [
+        ((), "stable with this hand", "a hand of 0.25 kg, 2 N.s/m, 6 N/m"),
+        (("--no-operator",), "stable without a hand", "no hand"),
+    ],
+)
+def test_verdicts_say_which_loop_and_hand_they_are_of(args, held, hand, tmp_path, capsys):
+    _, out, _ = run(capsys, "stability", "--axis", "y", *args, "--out", str(tmp_path))
+    lines = out.splitlines()
+    assert any(line.startswith(held) for line in lines)
+    assert any(line.startswith("passive: stable with every passive hand") for line in lines)
+    assert f"y axis, K = 0.5 1/kg, clay of 90 N.s/m, {hand}" in lines
+    assert json.loads((tmp_path / "stability.json").read_text())["assumed"]

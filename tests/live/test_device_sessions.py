@@ -201,6 +201,21 @@ def test_a_paused_session_gives_the_device_no_force(device_hand):
     assert after[-1] > 0.0
 
 
+def test_a_restart_begins_where_the_device_is_and_forces_rise_from_nothing(device_hand):
+    """The device is 3 cm on by then, where 300 N/m would pull with 9 N at once."""
+    hand, server = device_hand
+    session = DeviceSession(FREE, hand)
+    slices(session, 60)
+    assert hand.place[0] > 0.03
+    session.restart()
+    before = len(server.exchanges[0])
+    slices(session, 12)
+    after = np.abs(server.exchanges[0].asked[before + 1 :, 0])  # the first is of the old run
+    assert np.all(after <= 0.05 * np.arange(1, 12) * 10.0 + 1e-12) and after[0] < 0.1
+    place = [row.position[0] for row in hand.client.log.rows[before:]]
+    assert hand.place[0] == pytest.approx(place[-1] - place[0], abs=1e-12)
+
+
 def test_a_lost_device_lets_go(device_hand):
     hand, server = device_hand
     session = DeviceSession(FREE, hand)

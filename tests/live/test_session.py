@@ -18,6 +18,7 @@ from hapticclay.live.run import session_scenario
 from hapticclay.live.session import Session
 from hapticclay.live.verdict import live_verdict
 from hapticclay.views.stage import Stage
+from hapticclay.views.window import Window
 
 
 def drag(session, seconds, way=lambda t: (0.05 * t, 0.0)):
@@ -97,6 +98,19 @@ def test_gain_and_damping_change_while_it_runs():
     assert set(np.unique(record.extra["gain"][:, 0])) == {1.0, 2.0}
     moving = np.abs(record.v[:, 0]) > 1e-3
     np.testing.assert_allclose(record.ratio(record.fe)[moving, 0], record.b[moving, 0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("key, name", [(265, "gain"), (262, "damping"), (264, "gain")])
+def test_a_key_held_down_stops_at_the_bound_of_its_number(key, name):
+    """1.25^100 is far beyond any bound; the window and its record go on."""
+    window = Window(Session(hc.constant_cut()))
+    for _ in range(100):
+        window.look([key], None)
+    last = getattr(window.play, name)
+    window.look([key], None)
+    assert (getattr(window.play, name) == last) is (key != 264)
+    window.play.advance(0.02)
+    assert window.play.t > 0.0 and not window.play.ended
 
 
 def test_letting_go_leaves_the_handle_to_itself():

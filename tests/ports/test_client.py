@@ -2,6 +2,7 @@
 
 import json
 import math
+import sys
 import threading
 from contextlib import contextmanager
 
@@ -22,6 +23,7 @@ from hapticclay.ports.client_log import ClientLog, Exchanged
 from hapticclay.ports.coupled import SETTLING, DeviceHand
 from hapticclay.ports.inverse import Cursor, Frame, frame_text
 from hapticclay.ports.limits import ForceLimiter, allowed
+from hapticclay.ports.rows import Rows
 from hapticclay.ports.service import REST
 from tests.ports.conftest import SCENE
 
@@ -488,3 +490,28 @@ def test_columns_are_even():
     with pytest.raises(ParameterError, match="two exchanges"):
         ClientLog().columns()
     assert math.isnan(ClientLog().timing().rate)
+
+
+def test_rows_can_be_read_while_they_are_added():
+    """Row k holds k alone; 60,000 rows fill 14 chunks and run over the oldest."""
+    rows, failed = Rows(3, most=20_000), []
+
+    def read():
+        while rows.count < 60_000:
+            table = rows.table()
+            if len(table) and np.any(np.diff(table[:, 0]) != 1.0):
+                failed.append(table)
+            if np.any(table != table[:, :1]):
+                failed.append(table)
+
+    thread = threading.Thread(target=read)
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        thread.start()
+        for k in range(60_000):
+            rows.add((k, k, k))
+        thread.join()
+    finally:
+        sys.setswitchinterval(before)
+    assert not failed and rows.table()[-1, 0] == 59_999 and len(rows.table()) == 20_000

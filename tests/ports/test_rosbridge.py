@@ -345,3 +345,27 @@ def test_a_silent_client_lets_the_arm_go():
             threading.Event().wait(0.001)
         assert server.service.device.force == (0.0, 0.0)
         client.socket.close()
+
+
+PRESSES = ButtonScript((0.0, 0.012, 0.1), (frozenset(), frozenset({"a"}), frozenset()))
+
+
+def test_a_press_reaches_each_subscriber_of_buttons_however_throttled():
+    """The button goes down at 12 ms; the second topic is served each 50 ms at most."""
+    shown = Inverse3(protocol="rosbridge", buttons=PRESSES)
+    with serve(SCENE, period=PERIOD, inverse3=shown) as server:
+        client = RosClient(server.url)
+        client.subscribe("/phantom/button", "omni_msgs/OmniButtonEvent")
+        client.subscribe("/left/phantom/button", "omni_msgs/OmniButtonEvent", throttle=50)
+        for _ in range(30):  # 150 ms
+            client.wrench()
+        seen = {"/phantom/button": [], "/left/phantom/button": []}
+        while True:
+            try:
+                found = json.loads(client.socket.recv(timeout=0.2))
+            except TimeoutError:
+                break
+            if found["op"] == "publish":
+                seen[found["topic"]].append(found["msg"]["grey_button"])
+        client.socket.close()
+    assert list(seen.values()) == [[0, 1, 0], [0, 1, 0]]

@@ -138,3 +138,13 @@ def test_a_closed_chain_that_diverges_ends_before_it_cannot_be_closed(capfd):
     found = hc.simulate(hc.Pair(arm, arm, law, hc.Link(delay=0.02), Ts=2e-3, t_max=1.0))
     assert found.grows and found.ended and found.t[-1] < 1.0
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("samples", [1, 2, 3, 4, 5])
+def test_a_short_record_says_that_it_shows_no_trend(samples):
+    """Five samples have four rates, one for each quarter; they rise under a constant force."""
+    pair = one(muscle=hc.Step((2.0, 0.0), 0.0))
+    found = hc.simulate(replace(pair, t_max=samples * pair.Ts))
+    assert len(found.t) == samples and found.grows is (samples == 5)
+    assert ("too short" in found.headline()) is (samples < 5)
+    assert found.text() and found.summary() and found.plot()

@@ -142,6 +142,13 @@ def test_a_closed_run_keeps_its_record_while_its_engine_runs_another():
         (lambda: hc.Simulation(CUT).step(force=(1.0,)), "force"),
         (lambda: hc.Simulation(CUT).step(force=(np.nan, 0.0)), "force[x]"),
         (lambda: hc.Simulation(CUT).step(torque=(1.0, 0.0)), "control"),
+        (lambda: hc.Simulation(CUT).reset("cut"), "scenario"),
+        (lambda: hc.Simulation(CUT).restore(CUT), "snapshot"),
+        (lambda: hc.SimulationBatch([CUT] * 2).reset(scenario=3), "scenario"),
+        (lambda: hc.SimulationBatch([CUT] * 2).reset([[0, 1], [1]]), "runs"),
+        (lambda: hc.SimulationBatch([CUT] * 2).advance(mask=[[True], [True, False]]), "mask"),
+        (lambda: hc.SimulationBatch([CUT] * 2).set(operator=3), "operator"),
+        (lambda: hc.SimulationBatch([CUT] * 2).set(b=[[1.0], [1.0, 2.0]]), "b[0]"),
     ],
 )
 def test_bad_steps_are_refused_by_name(do, field):

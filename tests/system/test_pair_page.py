@@ -97,6 +97,17 @@ def test_the_hand_pulls_where_the_arrows_are(file):
         assert page.session.point is None and not page.hold.value
 
 
+def test_a_change_of_gains_leaves_uneven_delays_as_the_file_has_them(file):
+    """1.3 ms in milliseconds and back is no longer 1.3 ms, which would count as moved."""
+    pair = replace(hc.Pair.load(file), link=hc.Link(delay=(1.3e-3, 0.5e-3)), Ts=1e-3)
+    with shown(pair) as page:
+        page.gain.value = 1.5
+        assert until(lambda: page.session.gain == 1.5)
+        assert page.session.pair.link.delays == (1.3e-3, 0.5e-3)
+        page.delay.value = 2.0
+        assert until(lambda: page.session.pair.link.delays == (2e-3, 2e-3))
+
+
 def test_a_drag_that_begins_while_the_page_is_drawn_is_kept(file):
     with shown(hc.Pair.load(file)) as page:
         draw, drawn = page._pose, threading.Event()
