@@ -385,8 +385,8 @@ def pair_lab(quick: bool, tell: Tell) -> Lab:
             "(b + 2 Kd)/Kp - Ts from it, and say why low gains carry less than the rule says.",
             "Which of limit and frequency changes with the mass? What changes if all of the delay "
             "is on the way back?",
-            "Wave variables carry any delay. What does the hand pay for it in free motion, and "
-            "what at a wall?",
+            "Wave variables carry any constant delay. What does the hand pay for it in free "
+            "motion, and what at a wall?",
         ),
         f"from Kp = {gains[0]:g} to {Kp:g} N/m: {runs[0]:g} to {runs[-1]:g} ms one way by runs, "
         f"{exact[0]:.4g} to {exact[-1]:.4g} ms exact; they swing at "
