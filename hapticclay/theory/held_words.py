@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from ..scene.contact import Contact
     from ..scene.pair import Pair
 
+FREE = "free motion"
+
 
 def hand_words(operator: Operator | None) -> str:
     """A hand in words."""
@@ -25,7 +27,7 @@ def pair_words(pair: Pair) -> str:
     if all(x is None for x in (*pair.operators, *pair.touched)):
         felt = pair.link.kind in ("position-force", "four-channel")
         more = ", so forces that are sent close no loop" if felt else ""
-        return f"free motion: no hand, and nothing is touched{more}"
+        return f"{FREE}: no hand, and nothing is touched{more}"
     return "; ".join(
         f"{name}: {hand_words(hand)}, {_touched_words(touched)}"
         for name, hand, touched in zip(ENDS, pair.operators, pair.touched, strict=True)

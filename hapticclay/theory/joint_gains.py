@@ -20,7 +20,7 @@ from .client_loop import Delay, Sample
 from .joint_changes import Edge, Number, slopes
 from .joint_crossings import Crossing
 from .joint_families import Circle, Family, Limit
-from .joint_loop import JointLoop, grid, timing_words
+from .joint_loop import JointLoop, grid, is_stable, timing_words
 
 LATEST = 2.0  # [s] largest added delay that is looked for
 SLOWEST = 1.0  # [s] largest control sample that is looked for
@@ -28,7 +28,7 @@ PERIODS = 120  # control samples tried, evenly in their logarithm
 BEYOND = 1e-6  # share beyond a limit at which its motion is looked at
 ROUNDS = 30  # of the search for a delay
 SMALL = "small motions about the pose"
-IGNORED = "joint friction, encoder counts, torque limits, backlash and elastic links: left out"
+IGNORED = "joint friction, counts, converters, torque limits, backlash, elastic links: left out"
 
 
 @named
@@ -124,8 +124,8 @@ class JointLimits(Result):
 
     @property
     def stable(self) -> bool:
-        """Whether the present gains are stable."""
-        return self.radius < 1.0
+        """Whether the present gains are stable, to rounding."""
+        return bool(is_stable(self.radius))
 
     def headline(self) -> str:
         """The verdict in one line."""
@@ -441,8 +441,9 @@ class Study:
 
     def assumed(self) -> tuple[str, ...]:
         """What the verdict rests on, a sentence each."""
-        about = f"{SMALL}, no hand at the handle"
-        return (*self.arm.notes, gravity_words(self.compensated), about, IGNORED)
+        held = f"{SMALL}, no hand at the handle"
+        law = f"law: {self.law.words}"
+        return (*self.arm.notes, gravity_words(self.compensated), law, held, IGNORED)
 
 
 # ---- present motion, delay and rate --------------------------------------------------------------
@@ -493,7 +494,7 @@ def samples_left(loop: JointLoop, before: float = 0.0) -> Crossing:
         loop: the loop.
         before: how far a crossing may lie before the present delay [samples].
     """
-    theta, x = joint_crossings.zeros(loop.opened, grid(loop), lambda values: np.log(np.abs(values)))
+    theta, x = joint_crossings.zeros(loop.opened, grid(loop), joint_crossings.log_size)
     late = np.angle(x)[:, None] / theta[:, None] + np.arange(-1, 3) * 2.0 * math.pi / theta[:, None]
     late = np.where(late >= -before, late, math.inf)
     if not len(theta):

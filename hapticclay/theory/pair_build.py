@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -97,6 +98,7 @@ class Build:
             out += [f"{name}: {note}" for note in pairs.notes_of(arm)]
         if pair.leader is pair.follower:
             out = [f"both arms: {note}" for note in pairs.notes_of(pair.leader)]
+        out += self._law_words()
         for i, name in enumerate(ENDS):
             words = contact.left_out(pair.touched[i]), pair_hardware.left_out(pair, i)
             out += [f"{name}: {x}" for x in words if x]
@@ -106,12 +108,22 @@ class Build:
             out.append("passivity controllers: left out, they are not linear; runs have them")
         return (*out, f"{SMALL}s", IGNORED)
 
+    def _law_words(self) -> list[str]:
+        leader, follower = self.pair.laws
+        if not self.architecture.leader_law:
+            return [f"law of the follower: {follower.words}; the leader's gains take no part"]
+        if leader is follower:
+            return [f"both laws: {leader.words}"]
+        return [f"law of the leader: {leader.words}", f"law of the follower: {follower.words}"]
+
 
 def _scaled(pair: Pair, gain: float) -> Pair:
     """The pair with a factor on Kp of both laws."""
 
     def stiffer(law: JointPD) -> JointPD:
-        return replace(law, Kp=tuple(gain * x for x in law.Kp))
+        made = copy.copy(law)  # a factor that is tried may be beyond the bound of what is given
+        object.__setattr__(made, "Kp", tuple(gain * x for x in law.Kp))
+        return made
 
     laws = [stiffer(law) for law in pair.laws]
     return replace(pair, law=laws[0], follower_law=laws[1])

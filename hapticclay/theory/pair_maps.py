@@ -95,7 +95,7 @@ def pair_map(
         pair: two arms, their laws and the link between them.
         gains: number of factors.
         delays: number of delays, from none on.
-        longest: largest one-way delay [s], at most 2; None for twice the pair's limit.
+        longest: largest one-way delay [s], at most 2; None for twice the median of the limits.
 
     Raises:
         ParameterError: as `pair_limits`.

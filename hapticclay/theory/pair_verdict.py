@@ -28,7 +28,8 @@ HIGHEST = 64.0  # factor of all Kp up to which gains are tried
 EXACT = 1e-4  # relative width within which that factor is found
 COARSE = 1e-2  # the same for a map that is LARGE
 STEADY = 1e-6  # [Hz] of a motion that does not oscillate
-OPPOSED, COMMON = "arms opposed", "common motion"
+OPPOSED, COMMON, NONE = "arms opposed", "common motion", "rest alone"
+GONE = 1e-3  # size of an eigenvalue whose motion is over at the next sample
 
 
 @named
@@ -50,8 +51,8 @@ class PairLimits(Result):
         frequency: of the motion that turns unstable first, or is unstable now [Hz].
         joint: joint that moves most in it.
         mode: that motion in words.
-        gain: largest factor of all Kp of both arms, from the present ones on; inf for more than 64;
-            0 if the pair is unstable.
+        gain: largest factor of all Kp of both arms, from the present ones on, found by doubling;
+            inf for more than 64; 0 if the pair is unstable.
         slope: largest slope of a friction fed forward at one joint of both arms, Fc k + Fv, with
             none at the others [N.m.s/rad], shape (n,).
         law_slope: slopes of the leader's law [N.m.s/rad], shape (n,).
@@ -260,6 +261,8 @@ class Study:
             _, loop, z = self.onset
         else:
             loop, z = self.loop, self.worst
+        if abs(z) < GONE:  # as without gains
+            return z, self.build.names[0], NONE
         leader, follower = loop.shape(z)
         n, T = self.pair.n, self.pair.mapping
         energy = [

@@ -685,7 +685,7 @@ def test_the_names_of_all_fields_are_listed(capsys):
     # once, or once for each class that a part may have
     assert len(told) == len(set(told)) and len(names) > 60
     out = run(capsys, "fields", "arm", "constant")[1]
-    assert "b = 90  [N.s/m]  0 to 1000000000" in out and "arm.I2" in out
+    assert "b = 90  [N.s/m]  0 to 1e+09" in out and "arm.I2" in out
     assert "servo.x" not in out
     for words in (["run", "--help"], ["run", "constant", "--help"]):
         assert "--set" in run(capsys, *words)[1]

@@ -1,0 +1,115 @@
+"""What a newcomer types wrong: one line that says what would be right."""
+
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import hapticclay as hc
+from hapticclay.cli import app
+from hapticclay.errors import MissingPackage, needing
+from hapticclay.views import film
+
+FILES = {
+    "empty.toml": "",
+    "wall.toml": 'schema = "hapticclay-wall-2"\nK = 800\n[device]\nmass = 0.1\n',
+    "cut.toml": 'schema = "hapticclay-scenario-2"\nname = "cut"\n',
+    "limits.json": '{"schema": "hapticclay-limits-1"}',
+}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with files of several kinds, and the present one."""
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / "session").mkdir()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "line, said",
+    [
+        ("", "hapticclay --help says what each is for"),
+        ("lab", "lab needs source: one of wall, zwidth, delay, jnd, pair"),
+        ("lab walls", "did you mean 'wall'?"),
+        ("replay constant", "must be given: --recording FILE"),
+        ("fit out/gone --axis x", "source = 'out/gone': must be a readable file"),
+        ("stability --clay Fy", "(or numbers with their names, as Fy=5 b=30)"),
+        ("info session", "must be a saved record (record.npz is not in this folder)"),
+        ("device report session", "a session that a program took part in (no exchanges.csv there)"),
+        ("device report gone", "must be the folder of a session"),
+        ("run constant --out cut.toml", "must be a writable folder (it is a file)"),
+        ("run limits.json", "must be a scenario; its schema is 'hapticclay-limits-1'"),
+        ("run wall.toml", "must be a scenario; its schema is 'hapticclay-wall-2'"),
+        ("zwidth cut.toml", "must be a wall; its schema is 'hapticclay-scenario-2'"),
+        ("pair cut.toml", "must be a pair; its schema is 'hapticclay-scenario-2'"),
+    ],
+)
+def test_a_mistake_is_refused_with_what_would_be_right(folder, capsys, line, said):
+    assert app.main(line.split()) == 2
+    err = capsys.readouterr().err
+    assert said in err and err.count("\n") == 1
+
+
+@pytest.mark.parametrize("command", ["view", "video"])
+def test_help_says_that_the_scene_may_be_left_out(capsys, command):
+    assert app.main([command, "--help"]) == 0
+    out = capsys.readouterr().out
+    assert f"hapticclay {command} [EXPERIMENT|FILE|RECORD]" in out
+    assert "[default: constant]" in out.replace("│", "") and "[required]" not in out
+
+
+def test_an_entry_of_a_field_shows_the_field(capsys):
+    """As --set and sweeps name it."""
+    assert app.main(["fields", "gain.x", "clay.x.values.1"]) == 0
+    out = capsys.readouterr().out
+    assert "\nclay.x.values = " in out and out.startswith("gain = 1,0.5")
+    assert app.main(["fields", "gain.z"]) == 2
+
+
+def test_a_missing_package_is_named_with_what_installs_it():
+    with pytest.raises(hc.ParameterError) as error, needing("a page", "no_such_package", "web"):
+        import no_such_package  # noqa: F401
+    said = "a page needs no_such_package, which must be installed: pip install 'hapticclay[web]'"
+    assert str(error.value) == said and isinstance(error.value, MissingPackage)
+    assert str(pickle.loads(pickle.dumps(error.value))) == said
+
+
+def test_a_film_without_a_name_is_of_a_kind_that_can_be_written(monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.setattr(film.importlib.util, "find_spec", lambda name: None)
+    assert film.usual_file(Path("out")) == Path("out/film.webp")
+    film.ready(film.usual_file(Path("out")))
+
+
+def test_a_scenario_of_an_arm_runs_from_any_folder(tmp_path, monkeypatch):
+    """The path of the arm, relative to the present folder, is written relative to the file."""
+    arms = Path(hc.__file__).parents[1] / "mjcf" / "arms"
+    (tmp_path / "arms").mkdir()
+    (tmp_path / "arms" / "mine.xml").write_text((arms / "planar_2r.xml").read_text())
+    monkeypatch.chdir(tmp_path)
+    law = hc.JointPD((1.0, 1.0), (0.1, 0.1))
+    scenario = hc.Scenario(arm=hc.MjcfArm("arms/mine.xml"), controller=law, Ts=1e-3)
+    file = scenario.save("out/run/mine.toml")
+    assert hc.Scenario.load(file).arm.file == "arms/mine.xml"
+    monkeypatch.chdir("out")
+    assert hc.Scenario.load("run/mine.toml").arm.names == ("shoulder", "elbow")
+    monkeypatch.chdir("/")
+    assert hc.Scenario.load(tmp_path / file).arm.names == ("shoulder", "elbow")
+
+
+def test_a_session_without_a_program_says_that_there_is_no_report(tmp_path):
+    words = ["device", "serve", "--port", "0", "--duration", "0.3", "--no-plots"]
+    done = subprocess.run(
+        [sys.executable, "-m", "hapticclay", *words, "--out", str(tmp_path / "o")],
+        capture_output=True,
+        text=True,
+        env=dict(os.environ, OPENBLAS_NUM_THREADS="1"),
+    )
+    assert done.returncode == 0 and "no program connected" in done.stdout
+    assert "energy" not in done.stdout  # of an arm at rest
