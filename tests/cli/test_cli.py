@@ -11,7 +11,6 @@ import sys
 import termios
 
 import pytest
-from matplotlib.figure import Figure
 
 import hapticclay as hc
 from hapticclay.cli import app, parser
@@ -19,11 +18,7 @@ from hapticclay.display import cell_text
 from hapticclay.simulation import record, simulate
 from hapticclay.views import run_figures
 
-
-@pytest.fixture(autouse=True)
-def no_layout(monkeypatch):
-    """Figures are written as they are."""
-    monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)
+pytestmark = pytest.mark.usefixtures("no_layout")
 
 
 def run(capsys, *args):
