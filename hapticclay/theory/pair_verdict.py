@@ -28,7 +28,8 @@ HIGHEST = 64.0  # factor of all Kp up to which gains are tried
 EXACT = 1e-4  # relative width within which that factor is found
 COARSE = 1e-2  # the same for a map that is LARGE
 STEADY = 1e-6  # [Hz] of a motion that does not oscillate
-OPPOSED, COMMON = "arms opposed", "common motion"
+OPPOSED, COMMON, NONE = "arms opposed", "common motion", "rest alone"
+GONE = 1e-3  # size of an eigenvalue whose motion is over at the next sample
 
 
 @named
@@ -260,6 +261,8 @@ class Study:
             _, loop, z = self.onset
         else:
             loop, z = self.loop, self.worst
+        if abs(z) < GONE:  # as without gains
+            return z, self.build.names[0], NONE
         leader, follower = loop.shape(z)
         n, T = self.pair.n, self.pair.mapping
         energy = [

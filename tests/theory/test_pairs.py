@@ -369,6 +369,17 @@ def test_a_long_delay_is_judged_without_states(monkeypatch):
         assert (counted.radius < 1.0) is counted.stable
 
 
+def test_a_force_that_is_never_met_goes_around_at_no_delay():
+    """A free follower: the leader decays by its damper alone, at 2000 samples as at none."""
+    device = hc.Device(0.5, 1.0)
+    pair = hc.Pair(device, device, hc.JointPD((400.0,), (20.0,)), hc.Link("position-force", 1.0))
+    found = hc.theory.pair_limits(pair)
+    assert found.stable and found.delay == math.inf
+    assert found.radius == pytest.approx(math.exp(-pair.Ts * 1.0 / 0.5), abs=1e-12)
+    soon = hc.theory.pair_limits(replace(pair, link=hc.Link("position-force", 1e-3)))
+    assert soon.radius == pytest.approx(found.radius, abs=1e-12)
+
+
 # ---- rest, and friction that is fed forward ------------------------------------------------------
 
 
@@ -584,6 +595,24 @@ def test_no_pair_is_without_an_answer(start):
         numbers = [found.radius, found.delay, found.frequency, found.gain, found.friction_fraction]
         assert not np.isnan([*numbers, *found.slope]).any()
         assert found.text() and found.tables()
+
+
+@pytest.mark.parametrize("kind", KINDS[:3])
+@pytest.mark.parametrize("runs", ["host", "drive"])
+def test_a_pair_without_gains_rests_anywhere_at_any_delay(kind, runs):
+    """Nothing is left but rest, twice for each arm, whose motion nothing ends."""
+    device, law = hc.Device(0.1, 0.0), hc.JointPD((0.0,), (0.0,), runs=runs)
+    pair = hc.Pair(device, device, law, hc.Link(kind, (4e-3, 0.0)), Ts=2e-3)
+    found = hc.theory.pair_limits(pair)
+    assert found.stable and found.radius == 0.0 and found.delay == math.inf
+    assert "rest alone" in found.headline()
+
+
+def test_gains_at_their_bound_are_judged():
+    """Factors of 2 and more lie beyond what may be given, and are tried all the same."""
+    device, law = hc.Device(0.1, 1.0), hc.JointPD((1e9,), (1e9,), runs="drive")
+    found = hc.theory.pair_limits(hc.Pair(device, device, law, hc.Link("position-force")))
+    assert found.stable and found.gain == math.inf
 
 
 def test_a_pair_from_a_file(tmp_path):
