@@ -78,6 +78,24 @@ def test_an_entry_of_a_field_shows_the_field(capsys):
     assert app.main(["fields", "gain.z"]) == 2
 
 
+def test_a_help_page_in_a_closed_pipe_ends_like_other_output():
+    """As of `hapticclay run --help | head`."""
+    read, write = os.pipe()
+    os.close(read)
+    with os.fdopen(write, "w") as closed:
+        done = subprocess.run(
+            [sys.executable, "-m", "hapticclay", "run", "--help"],
+            stdout=closed,
+            stderr=subprocess.PIPE,
+        )
+    assert (done.returncode, done.stderr) == (141, b"")
+
+
+def test_an_angle_has_a_sign_of_degrees():
+    arm = hc.MjcfArm("planar_2r", pose=("30°", "-40 °"))
+    assert list(arm.pose.values()) == pytest.approx([0.5235987756, -0.6981317008])
+
+
 def test_a_missing_package_is_named_with_what_installs_it():
     with pytest.raises(hc.ParameterError) as error, needing("a page", "no_such_package", "web"):
         import no_such_package  # noqa: F401
