@@ -29,7 +29,7 @@ PERIODS = 120  # control samples tried, evenly in their logarithm
 BEYOND = 1e-6  # share beyond a limit at which its motion is looked at
 ROUNDS = 30  # of the search for a delay
 SMALL = "small motions about the pose"
-IGNORED = "joint friction, encoder counts, torque limits, backlash and elastic links: left out"
+IGNORED = "joint friction, counts, converters, torque limits, backlash, elastic links: left out"
 
 
 @named
@@ -442,8 +442,9 @@ class Study:
 
     def assumed(self) -> tuple[str, ...]:
         """What the verdict rests on, a sentence each."""
-        about = f"{SMALL}, no hand at the handle"
-        return (*self.arm.notes, gravity_words(self.compensated), about, IGNORED)
+        held = f"{SMALL}, no hand at the handle"
+        law = f"law: {self.law.words}"
+        return (*self.arm.notes, gravity_words(self.compensated), law, held, IGNORED)
 
 
 # ---- present motion, delay and rate --------------------------------------------------------------

@@ -28,6 +28,7 @@ AXES = ("x", "y", "z")
 LINE = 40  # dampings of the line of limits
 MOST_B = 2.2  # of mass/(Ts + delay): no wall is stable at more damping
 Axis = Literal["x", "y", "z"]
+RATES = {"exact": "exact rates", "difference": "rates by difference"}
 
 
 @named
@@ -175,7 +176,7 @@ def wall_limit(
             *arm.notes,
             gravity_words(feeds),
             f"{SMALL}, the wall never left; {hand_words(operator)} at the handle",
-            "the motors render the wall alone: no gains of the joints act",
+            f"the motors render the wall alone, from {RATES[velocity]}: no gains of the joints act",
             IGNORED,
         ),
     )

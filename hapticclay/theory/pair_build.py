@@ -98,6 +98,7 @@ class Build:
             out += [f"{name}: {note}" for note in pairs.notes_of(arm)]
         if pair.leader is pair.follower:
             out = [f"both arms: {note}" for note in pairs.notes_of(pair.leader)]
+        out += self._law_words()
         for i, name in enumerate(ENDS):
             words = contact.left_out(pair.touched[i]), pair_hardware.left_out(pair, i)
             out += [f"{name}: {x}" for x in words if x]
@@ -106,6 +107,14 @@ class Build:
         if pair.link.passivity:
             out.append("passivity controllers: left out, they are not linear; runs have them")
         return (*out, f"{SMALL}s", IGNORED)
+
+    def _law_words(self) -> list[str]:
+        leader, follower = self.pair.laws
+        if not self.architecture.leader_law:
+            return [f"law of the follower: {follower.words}; the leader's gains take no part"]
+        if leader is follower:
+            return [f"both laws: {leader.words}"]
+        return [f"law of the leader: {leader.words}", f"law of the follower: {follower.words}"]
 
 
 def _scaled(pair: Pair, gain: float) -> Pair:

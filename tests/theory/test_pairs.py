@@ -545,6 +545,10 @@ def test_a_verdict_says_what_holds_and_touches_the_arms():
     held = hc.theory.pair_limits(one(kind="position-force", **HELD))
     assert "leader: a hand of 2 kg, 2 N.s/m, 10 N/m" in held.assumed[0]
     assert "follower: no hand, at an object of 3 kg, 1 N.s/m, 50 N/m" in held.assumed[0]
+    late = hc.JointPD((400.0,), (50.0,), velocity="filter", cutoff=300.0)
+    words = hc.theory.pair_limits(one(law=late)).assumed
+    assert "both laws: PD of 1 joints in the host, rates filtered at 300.0 rad/s" in words
+    assert any("the leader's gains take no part" in x for x in free.assumed)
     compared = hc.theory.compare_links(one())
     assert any("close no loop" in x for x in compared.remarks())
     waves = hc.theory.pair_limits(one(kind="waves"))
