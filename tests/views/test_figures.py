@@ -182,7 +182,7 @@ def z_region(name, wall, rest=False, box=False):
         Limit("Colgate, Schenkel 1997", "sufficient", B, passive),
         Limit("Hulin et al. 2006", "rule", B, tuple(2.0 * (b + x) / Ts for x in B)),
         Limit("Abbott, Okamura 2005", "sufficient", (0.0,), (2.0 * b / Ts,)),
-        Limit("any hand of the box", "exact", B, tuple(exact)),
+        Limit("worst hand tried of the box", "exact", B, tuple(exact)),
     ]
     verdict = BY_REST if rest else BY_GROWTH
     numbers = (verdict, B, tuple(K), tuple(exact), 200.0, tuple(limits))
