@@ -103,11 +103,14 @@ def _jumps(x: np.ndarray, count: float) -> np.ndarray:
 
 def _local_deviation(off: np.ndarray) -> np.ndarray:
     """Deviation of normal noise at each value, from the median over the blocks around it."""
-    blocks = np.array_split(off, max(len(off) // BLOCK, 1))
-    each = np.array([robust_deviation(block) for block in blocks])
+    count = max(len(off) // BLOCK, 1)
+    size, longer = divmod(len(off), count)  # that many blocks have a sample more
+    at = longer * (size + 1)
+    blocks = off[:at].reshape(longer, size + 1), off[at:].reshape(count - longer, size)
+    each = NORMAL * np.concatenate([np.median(np.abs(x), axis=1) for x in blocks])
     wide = np.concatenate((each[:1], each, each[-1:]))
     each = np.max([wide[:-2], each, wide[2:]], axis=0)
-    return np.repeat(each, [len(block) for block in blocks])
+    return np.repeat(each, size + (np.arange(count) < longer))
 
 
 def _gaps(x: np.ndarray, at: np.ndarray) -> list[tuple[int, int]]:

@@ -86,18 +86,28 @@ class Handle:
         return float(1.0 / (self.normal @ np.linalg.inv(self.inertia) @ self.normal))
 
 
-def held_arm(linear: Linear, operator: Operator) -> Linear:
+def with_hand(linear: Linear, hand: Operator | Sequence[Operator]) -> Linear:
     """The arm with a hand at its handle: mass, damper and spring along x, y and z.
 
-    Gravity acts on the mass, too: it is held as the arm's own weight is.
+    Gravity, along z where the masses differ, acts on them, too: they are held as the arm's own
+    weight is.
     """
-    square = linear.jacobian.T @ linear.jacobian
+    hands = [hand] * 3 if isinstance(hand, Operator) else hand
+    J = linear.jacobian
+    mass, damper, spring = (J.T @ (x[:, None] * J) for x in np.array([astuple(h) for h in hands]).T)
+    weight = hands[-1].mass * linear.weight_stiffness
     return linear._replace(
-        inertia=linear.inertia + operator.mass * square,
-        damping=linear.damping + operator.damper * square,
-        stiffness=linear.stiffness + operator.spring * square,
-        gravity_stiffness=linear.gravity_stiffness + operator.mass * linear.weight_stiffness,
+        inertia=linear.inertia + mass,
+        damping=linear.damping + damper,
+        stiffness=linear.stiffness + spring,
+        gravity_stiffness=linear.gravity_stiffness + weight,
     )
+
+
+def with_hands_of(scenario: Scenario) -> Linear:
+    """A scenario's arm from a file, at its pose, with the hand of each axis at its handle."""
+    hands = dict(zip(scenario.axes, scenario.hands, strict=True))
+    return with_hand(scenario.file_arm.linear(), [hands.get(axis, NO_HAND) for axis in "xyz"])
 
 
 @dataclass(frozen=True)
@@ -127,7 +137,7 @@ class JointHandle:
     def of(cls, scenario: Scenario, normal: tuple[float, ...]) -> JointHandle:
         """The handle of a scenario's arm from a file, at its pose."""
         arm = scenario.file_arm
-        linear = held_arm(arm.linear(), scenario.operators[0] or NO_HAND)
+        linear = with_hands_of(scenario)
         stiffness = linear.stiffness
         if not compensated(arm, None):
             stiffness = stiffness + linear.gravity_stiffness

@@ -16,7 +16,7 @@ from ..errors import Bound, ParameterError
 from ..results import Result, Tables
 from .client_loop import Delay, Sample
 from .joint_gains import Study, first_joint
-from .joint_loop import timing_words
+from .joint_loop import is_stable, timing_words
 
 TRIES = 100  # poses drawn for each one wanted, where a chain cannot be closed at most
 
@@ -56,7 +56,7 @@ class OverPoses(Result):
     @property
     def worst(self) -> int:
         """Number of the pose with the least factor; with the largest radius if one is unstable."""
-        unstable = self.radius >= 1.0
+        unstable = ~is_stable(self.radius)
         return int(self.radius.argmax() if unstable.any() else np.nanargmin(self.scale))
 
     @property
@@ -72,7 +72,7 @@ class OverPoses(Result):
     def headline(self) -> str:
         """The verdict in one line."""
         at = f"{len(self.q)} poses at {timing_words(self.Ts, self.delay)}"
-        unstable = int(np.sum(self.radius >= 1.0))
+        unstable = int(np.sum(~is_stable(self.radius)))
         if unstable:
             return f"{at}: unstable at {unstable}; worst radius {self.radius.max():.4g}"
         name, share = max(self.shares.items(), key=lambda x: x[1])

@@ -18,16 +18,18 @@ from ..errors import Bound, ParameterError
 from ..model.operator import NO_HAND, Operator
 from ..results import Result, Tables
 from . import joint_changes
-from .client_loop import Delay, Sample, held_arm
+from .client_loop import Delay, Sample, with_hand
+from .held_words import hand_words
 from .joint_changes import Edge, slopes
 from .joint_families import Circle, Family, Limit
-from .joint_gains import IGNORED, gravity_words, joint_loop
+from .joint_gains import IGNORED, SMALL, gravity_words, joint_loop
 from .joint_loop import JointLoop, even_grid, resonant_grid, timing_words
 
 AXES = ("x", "y", "z")
 LINE = 40  # dampings of the line of limits
 MOST_B = 2.2  # of mass/(Ts + delay): no wall is stable at more damping
 Axis = Literal["x", "y", "z"]
+RATES = {"exact": "exact rates", "difference": "rates by difference"}
 
 
 @named
@@ -137,7 +139,7 @@ def wall_limit(
             out of its bounds.
     """
     arm.check_handle()
-    linear = held_arm(arm.linear(), operator or NO_HAND)
+    linear = with_hand(arm.linear(), operator or NO_HAND)
     along = linear.jacobian[AXES.index(axis)]
     if not np.abs(along).max() > STILL:
         raise ParameterError("axis", axis, "must be one along which the handle can move")
@@ -172,7 +174,13 @@ def wall_limit(
         by_delay,
         line_B,
         np.nan_to_num(line_K, nan=0.0, posinf=math.inf),
-        (*arm.notes, gravity_words(feeds), IGNORED),
+        (
+            *arm.notes,
+            gravity_words(feeds),
+            f"{SMALL}, the wall never left; {hand_words(operator)} at the handle",
+            f"the motors render the wall alone, from {RATES[velocity]}: no gains of the joints act",
+            IGNORED,
+        ),
     )
 
 

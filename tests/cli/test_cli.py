@@ -682,7 +682,7 @@ def test_the_names_of_all_fields_are_listed(capsys):
     # once, or once for each class that a part may have
     assert len(told) == len(set(told)) and len(names) > 60
     out = run(capsys, "fields", "arm", "constant")[1]
-    assert "b = 90  [N.s/m]  0 to 1000000000" in out and "arm.I2" in out
+    assert "b = 90  [N.s/m]  0 to 1e+09" in out and "arm.I2" in out
     assert "servo.x" not in out
     for words in (["run", "--help"], ["run", "constant", "--help"]):
         assert "--set" in run(capsys, *words)[1]
@@ -712,3 +712,19 @@ def test_a_part_of_a_command_keeps_its_defaults_beside_what_is_given():
     small = parser.read(["materials", "--tool-width", "2cm"]).command().tool
     assert (small.width, small.depth) == (0.02, 0.005)
     assert parser.read(["view", "--tool-depth", "5mm"]).command().tool == small
+
+
+@pytest.mark.parametrize(
+    "args, held, hand",
+    [
+        ((), "stable with this hand", "a hand of 0.25 kg, 2 N.s/m, 6 N/m"),
+        (("--no-operator",), "stable without a hand", "no hand"),
+    ],
+)
+def test_verdicts_say_which_loop_and_hand_they_are_of(args, held, hand, tmp_path, capsys):
+    _, out, _ = run(capsys, "stability", "--axis", "y", *args, "--out", str(tmp_path))
+    lines = out.splitlines()
+    assert any(line.startswith(held) for line in lines)
+    assert any(line.startswith("passive: stable with every passive hand") for line in lines)
+    assert f"y axis, K = 0.5 1/kg, clay of 90 N.s/m, {hand}" in lines
+    assert json.loads((tmp_path / "stability.json").read_text())["assumed"]

@@ -1,5 +1,6 @@
 """Logs of a leader and its follower: exact steps of an axis, gains found again, files read."""
 
+import functools
 import json
 import math
 import os
@@ -56,25 +57,25 @@ def test_an_axis_that_friction_holds_stays():
     assert Axis(1.0, 0.1, 0.5, 0.1).step(0.3, 0.0, 0.55, 1.0) == (0.3, 0.0)
 
 
+@functools.cache
 def synthetic(*, force_scale=None, late=0, link=0, T=5e-4, n=8000, k=0.0, noise=3e-4, seed=0):
     """A log of a known pair: fine steps of Euler, filter and delays by hand."""
     rng, t = np.random.default_rng(seed), T * np.arange(n)
     waves = [(0.09, 0.7, 0.0), (0.05, 1.9, 1.0), (0.02, 4.3, 2.0), (0.006, 9.0, 0.5)]
     leader = sum(a * np.sin(2.0 * np.pi * f * t + p) for a, f, p in waves)
-    p = 0.6 if not late else 0.0
-    q, v, x, torques = leader[0], 0.0, 0.0, [0.0] * (late + 1)
+    p, led = 0.6 if not late else 0.0, leader.tolist()
+    q, v, x, torques = led[0], 0.0, 0.0, [0.0] * (late + 1)
     follower, u_f, force = np.zeros(n), np.zeros(n), np.zeros(n)
+    b, J, h, dry = TRUE["b"], TRUE["J"], T / 20, TRUE["friction"] * T / 20 / TRUE["J"]
     for i in range(n):
         follower[i], force[i] = q, k * q
-        before, x = x, p * x + (1.0 - p) * (leader[max(i - link, 0)] - q)
+        before, x = x, p * x + (1.0 - p) * (led[max(i - link, 0)] - q)
         torques.append(TRUE["P"] * x + TRUE["D"] * (x - before) / T)
-        u_f[i] = torques[-1 - late]
+        u_f[i] = pushed = torques[-1 - late]
         for _ in range(20):
-            drive = u_f[i] - TRUE["offset"] - k * q
-            dry = TRUE["friction"] * T / 20 / TRUE["J"]
-            free = v + T / 20 * (drive - TRUE["b"] * v) / TRUE["J"]
+            free = v + h * (pushed - TRUE["offset"] - k * q - b * v) / J
             v = math.copysign(max(abs(free) - dry, 0.0), free)
-            q += T / 20 * v
+            q += h * v
     u_l = -u_f if force_scale is None else -force_scale * force
     u_l, u_f = (u + rng.normal(0.0, noise, n) for u in (u_l, u_f))
     return hc.studies.PairLog(t, leader, follower, u_f, u_l, force, "made")

@@ -133,6 +133,18 @@ def test_the_engine_flips_at_the_limit(joint):
     assert verdicts == [False, True]
 
 
+@pytest.mark.parametrize("method", ["EULER", "IMPLICIT", "IMPLICITFAST", "DISCRETE"])
+def test_steps_that_move_by_the_rates_at_their_end_are_off_alike(method):
+    """One step a sample: 37 % too high, whatever a step takes implicitly."""
+    arm, Ts = leader(), arm_integrators.TS
+    scale = hc.theory.joint_limits(arm, LEADER_LAW, Ts, Ts).scale
+    verdicts = [
+        arm_integrators.grows(arm, share * scale * np.array(LEADER_KP), f"mjINT_{method}", 1, True)
+        for share in (1.36, 1.39)
+    ]
+    assert verdicts == [False, True]
+
+
 def test_published_gains_of_a_leader():
     """Limits to the digits to which an independent program found them."""
     found = limits_at()
@@ -266,6 +278,23 @@ def test_a_drive_hardly_limits_its_gains():
     found = hc.theory.joint_limits(leader(), law, 2e-3, 2e-3)
     host = limits_at()
     assert found.stable and (found.Kp[:, 1] > 5.0 * host.Kp[:, 1]).all()
+
+
+@pytest.mark.parametrize("Kd", [0.0, 0.1, 1e4, 1e8])
+def test_a_drive_of_an_arm_without_weight_holds_nothing_and_is_stable(Kd):
+    """No torque of the host, so no delay matters; a slow drive decays by exp(-Kp Ts/Kd)."""
+    law = hc.JointPD((5.0, 5.0), (Kd, Kd), runs="drive")
+    found = hc.theory.joint_limits(hc.MjcfArm("planar_2r"), law, 1e-3, 1e-3)
+    assert found.stable and found.delay_left == found.scale == math.inf
+    assert "any factor" in found.headline() and "unstable" not in found.text()
+    if Kd > 1e3:
+        assert found.radius == pytest.approx(math.exp(-5.0 * 1e-3 / Kd), abs=1e-10)
+
+
+def test_a_drive_beyond_all_numbers_is_refused():
+    law = hc.JointPD((5.0, 5.0), (1e9, 1e9), runs="drive")
+    with pytest.raises(hc.ParameterError, match="damping = 1e9|damping = 1000000000"):
+        hc.theory.joint_limits(hc.MjcfArm("planar_2r"), law, 1e-3)
 
 
 def test_friction_fed_forward_has_a_largest_slope():

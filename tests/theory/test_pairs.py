@@ -372,6 +372,17 @@ def test_a_long_delay_is_judged_without_states(monkeypatch):
         assert (counted.radius < 1.0) is counted.stable
 
 
+def test_a_force_that_is_never_met_goes_around_at_no_delay():
+    """A free follower: the leader decays by its damper alone, at 2000 samples as at none."""
+    device = hc.Device(0.5, 1.0)
+    pair = hc.Pair(device, device, hc.JointPD((400.0,), (20.0,)), hc.Link("position-force", 1.0))
+    found = hc.theory.pair_limits(pair)
+    assert found.stable and found.delay == math.inf
+    assert found.radius == pytest.approx(math.exp(-pair.Ts * 1.0 / 0.5), abs=1e-12)
+    soon = hc.theory.pair_limits(replace(pair, link=hc.Link("position-force", 1e-3)))
+    assert soon.radius == pytest.approx(found.radius, abs=1e-12)
+
+
 # ---- rest, and friction that is fed forward ------------------------------------------------------
 
 
@@ -511,6 +522,46 @@ def test_absolutely_stable_pairs_are_stable_in_any_hand():
     assert fails
 
 
+def test_forces_both_ways_leave_a_wall_rigid_but_for_the_delay():
+    """(z + C + C e)/(1 - e), e = exp(-2 s T), at 100 kHz: f_h reaches the wall and comes back."""
+    pair = replace(one(kind="four-channel", Ts=1e-5), link=hc.Link("four-channel", delay=4e-3))
+    found = hc.theory.pair_transparency(pair, frequency=(5.0, 0.1))
+    s = 2j * math.pi * found.frequency
+    z, C, late = 6.0 * s + 0.1, 400.0 / s + 50.0, np.exp(-2.0 * s * 4e-3)
+    np.testing.assert_allclose(found.rigid, (z + C + C * late) / (1.0 - late), rtol=5e-3)  # hold
+    assert found.stiffness == pytest.approx(abs(s[0] * found.rigid[0]), rel=1e-12)
+    assert found.stiffness > 400.0 * 100.0  # Kp sees 2/(2 omega T) = 400 of it at 0.1 Hz
+    assert f"{found.stiffness:.4g} N/m at 0.1 Hz" in found.headline()
+
+
+def test_what_resonates_near_the_nyquist_frequency_is_beside_the_criterion():
+    """Kd above b, seen once a sample: stiff springs at both handles, passive, are unstable."""
+    device, law = hc.Device(0.2, 7.0), hc.JointPD((40.0,), (24.0,))
+    pair = hc.Pair(device, device, law, hc.Link("position-position"), Ts=1e-3)
+    found = hc.theory.pair_transparency(pair)
+    assert found.absolutely_stable and "absolutely stable" in found.headline()
+    assert any("Nyquist frequency of 500 Hz" in x for x in found.assumed)
+    spring = hc.Operator(0.0, 0.0, 0.2 * (0.97 * math.pi / 1e-3) ** 2)
+    held = replace(pair, leader_operator=spring, follower_operator=spring)
+    assert not Build(held).loop().stable()
+
+
+def test_a_verdict_says_what_holds_and_touches_the_arms():
+    free = hc.theory.pair_limits(one(kind="position-force"))
+    assert free.assumed[0].startswith("free motion: no hand") and "close no loop" in free.assumed[0]
+    held = hc.theory.pair_limits(one(kind="position-force", **HELD))
+    assert "leader: a hand of 2 kg, 2 N.s/m, 10 N/m" in held.assumed[0]
+    assert "follower: no hand, at an object of 3 kg, 1 N.s/m, 50 N/m" in held.assumed[0]
+    late = hc.JointPD((400.0,), (50.0,), velocity="filter", cutoff=300.0)
+    words = hc.theory.pair_limits(one(law=late)).assumed
+    assert "both laws: PD of 1 joints in the host, rates filtered at 300.0 rad/s" in words
+    assert any("the leader's gains take no part" in x for x in free.assumed)
+    compared = hc.theory.compare_links(one())
+    assert any("close no loop" in x for x in compared.remarks())
+    waves = hc.theory.pair_limits(one(kind="waves"))
+    assert "any delay of the link up to 2 s" in waves.headline()
+
+
 def test_hands_of_a_box():
     pair = replace(one(Ts=4e-3), link=hc.Link(delay=0.16))
     hands = hc.theory.Box((0.2, 4.0), (0.5, 10.0), (20.0, 20.0))
@@ -555,6 +606,24 @@ def test_no_pair_is_without_an_answer(start):
         numbers = [found.radius, found.delay, found.frequency, found.gain, found.friction_fraction]
         assert not np.isnan([*numbers, *found.slope]).any()
         assert found.text() and found.tables()
+
+
+@pytest.mark.parametrize("kind", KINDS[:3])
+@pytest.mark.parametrize("runs", ["host", "drive"])
+def test_a_pair_without_gains_rests_anywhere_at_any_delay(kind, runs):
+    """Nothing is left but rest, twice for each arm, whose motion nothing ends."""
+    device, law = hc.Device(0.1, 0.0), hc.JointPD((0.0,), (0.0,), runs=runs)
+    pair = hc.Pair(device, device, law, hc.Link(kind, (4e-3, 0.0)), Ts=2e-3)
+    found = hc.theory.pair_limits(pair)
+    assert found.stable and found.radius == 0.0 and found.delay == math.inf
+    assert "rest alone" in found.headline()
+
+
+def test_gains_at_their_bound_are_judged():
+    """Factors of 2 and more lie beyond what may be given, and are tried all the same."""
+    device, law = hc.Device(0.1, 1.0), hc.JointPD((1e9,), (1e9,), runs="drive")
+    found = hc.theory.pair_limits(hc.Pair(device, device, law, hc.Link("position-force")))
+    assert found.stable and found.gain == math.inf
 
 
 def test_a_pair_from_a_file(tmp_path):
