@@ -17,6 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..arms import joint_law
+from ..display import time_words
 from ..errors import ParameterError
 from . import linear_loop
 
@@ -231,7 +232,7 @@ def is_stable(radius: Any) -> Any:
 
 def timing_words(Ts: float, delay: float) -> str:
     """Rate and delay, as headlines say them."""
-    return f"{1.0 / Ts:.4g} Hz, {1e3 * delay:.3g} ms late"
+    return f"{1.0 / Ts:.4g} Hz, {time_words(delay)} late"
 
 
 def grid(loop: Any) -> np.ndarray:
