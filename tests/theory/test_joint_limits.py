@@ -5,6 +5,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -341,6 +342,26 @@ def test_over_poses():
     np.testing.assert_allclose(found.p[4], arm.handle(found.q[4]), atol=1e-12)
     again = hc.theory.over_poses(arm, LEADER_LAW, 2e-3, 2e-3, poses=6, seed=3)
     assert (again.scale == found.scale).all()
+
+
+def test_over_poses_of_a_slide():
+    """A slide is in metres, and has no turn to be drawn from: without a range it stays."""
+    spec = mujoco.MjSpec.from_string(
+        "<mujoco><worldbody><body><joint name='lift' type='slide' axis='0 0 1'/>"
+        "<geom size='0.1' mass='2'/><body pos='0.2 0 0'><joint name='turn' axis='0 0 1'/>"
+        "<geom size='0.05' pos='0.2 0 0' mass='1'/>"
+        "<body pos='0.3 0 0'><joint name='reach' type='slide' axis='1 0 0' range='-0.1 0.2'/>"
+        "<geom size='0.03' mass='0.3'/><site name='hand'/></body></body></body>"
+        "</worldbody></mujoco>"
+    )
+    arm = hc.MjcfArm(spec, site="hand", pose={"lift": 0.25})
+    law = hc.JointPD([400.0, 20.0, 50.0], [20.0, 1.0, 2.0])
+    found = hc.theory.over_poses(arm, law, 1e-3, poses=40)
+    lift, turn, reach = found.q.T
+    assert (lift == 0.25).all()
+    assert np.ptp(turn) > 0.8 * 2.0 * np.pi
+    assert reach.min() >= -0.1 and reach.max() <= 0.2 and np.ptp(reach) > 0.2
+    assert {"lift [m]", "turn [rad]", "reach [m]"} < set(found.tables()["poses"])
 
 
 GAINS = {
