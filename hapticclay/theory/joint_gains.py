@@ -14,6 +14,7 @@ from ..arguments import checked, named
 from ..arms.joint_law import JointPD, checked_law, compensated
 from ..arms.mechanism import Linear
 from ..arms.mjcf_arm import MjcfArm
+from ..display import time_words
 from ..results import Result, Tables
 from . import joint_changes, joint_crossings, roots
 from .client_loop import Delay, Sample
@@ -147,7 +148,7 @@ class JointLimits(Result):
         """Delay that may be added, in words."""
         if math.isinf(self.delay_left):
             return f"more than {LATEST:g} s"
-        return f"{1e3 * self.delay_left:.3g} ms"
+        return time_words(self.delay_left)
 
     def _way_back(self) -> str:
         if math.isnan(self.scale):

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
+from ..display import time_words
 from ..results import Result, Tables
 from ..scene.pair import Pair
 from . import joint_crossings, roots
@@ -93,7 +94,7 @@ class PairLimits(Result):
 
     def headline(self) -> str:
         """The verdict in one line."""
-        at = f"{self.kind}, {1.0 / self.Ts:.4g} Hz, link {1e3 * self.present:.3g} ms"
+        at = f"{self.kind}, {1.0 / self.Ts:.4g} Hz, link {time_words(self.present)}"
         verdict = "stable" if self.stable else f"unstable (radius {self.radius:.6g})"
         return f"{verdict} at {at}: {self._delay_words()}; {self.mode}"
 
@@ -102,7 +103,7 @@ class PairLimits(Result):
             return f"any delay of the link up to {LATEST:g} s"
         if self.delay == 0.0:
             return "no delay of the link is stable"
-        return f"one-way delay up to {1e3 * self.delay:.3g} ms"
+        return f"one-way delay up to {time_words(self.delay)}"
 
     def remarks(self) -> Sequence[str]:
         """What to change first, and what the verdict rests on."""
@@ -117,13 +118,13 @@ class PairLimits(Result):
                 "less: an undamped common motion, which Kp and Kd cannot touch"
             )
         cause, late = max(self.budget.items(), key=lambda x: x[1])
-        lateness = f"{cause} ({1e3 * late:.3g} ms each way"
+        lateness = f"{cause} ({time_words(late)} each way"
         if self.stable and math.isinf(self.delay):
             return f"nothing: no delay of the link up to {LATEST:g} s is too long"
         if self.stable:
-            return f"{lateness}; {1e3 * self.delay_left:.3g} ms are left)"
+            return f"{lateness}; {time_words(self.delay_left)} are left)"
         if self.delay > 0.0:
-            return f"{lateness}; the link may have {1e3 * self.delay:.3g} ms)"
+            return f"{lateness}; the link may have {time_words(self.delay)})"
         return f"gains and rate: unstable without any delay of the link; {lateness})"
 
     def tables(self) -> Tables:

@@ -2,6 +2,7 @@
 
 import os
 import pickle
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +19,8 @@ FILES = {
     "wall.toml": 'schema = "hapticclay-wall-2"\nK = 800\n[device]\nmass = 0.1\n',
     "cut.toml": 'schema = "hapticclay-scenario-2"\nname = "cut"\n',
     "limits.json": '{"schema": "hapticclay-limits-1"}',
+    "push.csv": "time,position,force\n" + "".join(f"{2 * k},{k},1\n" for k in range(200)),
+    "turn.csv": "Time (ms);Pos (deg)\n" + "".join(f"{2 * k};{k}\n" for k in range(200)),
 }
 
 
@@ -37,6 +40,9 @@ def folder(tmp_path, monkeypatch):
         ("", "hapticclay --help says what each is for"),
         ("lab", "lab needs source: one of wall, zwidth, delay, jnd, pair"),
         ("lab walls", "did you mean 'wall'?"),
+        ("identify push.csv", "; give --columns t=time input=cmd output=pos"),
+        ("identify turn.csv", "'Pos (deg)': is input and output: give each its own; give --col"),
+        ("replay constant --recording push.csv", "must have a motion or a force: name its columns"),
         ("replay constant", "must be given: --recording FILE"),
         ("fit out/gone --axis x", "source = 'out/gone': must be a readable file"),
         ("stability --clay Fy", "(or numbers with their names, as Fy=5 b=30)"),
@@ -70,6 +76,24 @@ def test_an_entry_of_a_field_shows_the_field(capsys):
     out = capsys.readouterr().out
     assert "\nclay.x.values = " in out and out.startswith("gain = 1,0.5")
     assert app.main(["fields", "gain.z"]) == 2
+
+
+def test_a_help_page_in_a_closed_pipe_ends_like_other_output():
+    """As of `hapticclay run --help | head`."""
+    read, write = os.pipe()
+    os.close(read)
+    with os.fdopen(write, "w") as closed:
+        done = subprocess.run(
+            [sys.executable, "-m", "hapticclay", "run", "--help"],
+            stdout=closed,
+            stderr=subprocess.PIPE,
+        )
+    assert (done.returncode, done.stderr) == (141, b"")
+
+
+def test_an_angle_has_a_sign_of_degrees():
+    arm = hc.MjcfArm("planar_2r", pose=("30°", "-40 °"))
+    assert list(arm.pose.values()) == pytest.approx([0.5235987756, -0.6981317008])
 
 
 def test_a_missing_package_is_named_with_what_installs_it():
@@ -113,3 +137,29 @@ def test_a_session_without_a_program_says_that_there_is_no_report(tmp_path):
     )
     assert done.returncode == 0 and "no program connected" in done.stdout
     assert "energy" not in done.stdout  # of an arm at rest
+
+
+def test_sources_beside_an_installed_package_are_said_to_be_sources(tmp_path):
+    """As in the folder of a clone after `pip install .`: what is installed is not taken there."""
+    root = Path(hc.__file__).parents[1]
+    for place in ("clone", "site"):
+        (tmp_path / place).mkdir()
+        shutil.copytree(
+            root / "hapticclay",
+            tmp_path / place / "hapticclay",
+            ignore=shutil.ignore_patterns("native", "__pycache__"),
+        )
+        (tmp_path / place / "mjcf").symlink_to(root / "mjcf")
+    (tmp_path / "clone" / "setup.py").touch()
+    info = tmp_path / "site" / "hapticclay-9.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: hapticclay\nVersion: 9\n")
+    code = "from hapticclay.simulation.engines import made_by; print(made_by())"
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path / "clone",
+        env=dict(os.environ, PYTHONPATH=str(tmp_path / "site")),
+    )
+    assert "these are the sources: run outside" in done.stdout, done
