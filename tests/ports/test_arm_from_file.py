@@ -328,7 +328,7 @@ LIGHT, HEAVY = hc.Operator(0.25, 3.0, 40.0), hc.Operator(2.0, 12.0, 300.0)
 def test_the_limit_is_that_of_the_wall_and_of_runs(axis, hand):
     """Of the theory of walls, which finds limits on the circle and not by eigenvalues."""
     scene = pen(FLOATING, hand=hand)
-    _, exchanges = wall_of(scene, 100.0, axis)
+    _, exchanges = wall_of(scene, 100.0, axis, 150)
     report = loop_report(exchanges, scene)
     assert report.K == pytest.approx(100.0, rel=1e-6)
     assert np.abs(report.normal)["xyz".index(axis)] == pytest.approx(1.0, abs=1e-9)
@@ -339,8 +339,8 @@ def test_the_limit_is_that_of_the_wall_and_of_runs(axis, hand):
         wall = hc.theory.wall_limit(scene.arm, axis, 0.0, hand, PERIOD, report.delay)
         assert report.limit == pytest.approx(wall.K, rel=1e-5)
     for share, grows in ((0.95, False), (1.05, True)):
-        x, _ = wall_of(scene, share * report.limit, axis, 1200)
-        early, late = np.abs(x[200:500]).max(), np.abs(x[900:]).max()
+        x, _ = wall_of(scene, share * report.limit, axis, 500)
+        early, late = np.abs(x[50:150]).max(), np.abs(x[400:]).max()
         assert bool(late > early) is grows, (share, early, late)
 
 
