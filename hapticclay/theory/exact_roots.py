@@ -4,6 +4,9 @@ Floats are rational numbers. With coefficients of type `Fraction`, sums, product
 roots on each side of the axis have no rounding: a pole or zero on the axis, or 1e-12 beside it,
 counts as what it is. Only the coefficients that were given are rounded. A root that a change of
 their last digits moves onto the axis lies on it `within_rounding`.
+
+A `Polynomial` of rational numbers is slow. Searches take out the common denominator and go on with
+`Integers`.
 """
 
 from __future__ import annotations
@@ -21,6 +24,8 @@ ROUNDING = 2.0**-46  # 64 last digits: products of order 8 of rounded factors
 BITS = 160  # of a real root
 NEAR = 1e-4  # of their size: closer real roots are separated by their common parabola
 
+Integers = list[int]  # coefficients of a polynomial, lowest power first
+
 
 def exact(p: Polynomial) -> Polynomial:
     """The polynomial with rational coefficients."""
@@ -34,22 +39,64 @@ def rational(c: Iterable[Any]) -> Polynomial:
 
 def value(p: Polynomial, x: Fraction) -> Fraction:
     """p(x) in exact arithmetic, which `Polynomial` leaves where it maps its domain."""
-    common = math.lcm(*(c.denominator for c in p.coef))
-    out, power = 0, 1  # of integers: one division at the end
-    for c in p.coef[::-1]:
-        out = out * x.numerator + c.numerator * (common // c.denominator) * power
-        power *= x.denominator
-    return Fraction(out * x.denominator, common * power)
-
-
-def derivative(p: Polynomial) -> Polynomial:
-    """p' in exact arithmetic."""
-    return rational([i * c for i, c in enumerate(p.coef)][1:])
+    c, common = over_denominator(p)
+    return at(c, x) / common
 
 
 def approximate(p: Polynomial) -> Polynomial:
     """The polynomial with coefficients of type float."""
     return Polynomial(p.coef.astype(float))
+
+
+# ---- polynomials with integer coefficients -------------------------------------------------------
+
+
+def over_denominator(p: Polynomial) -> tuple[Integers, int]:
+    """Coefficients over their common denominator, without zeros of the highest powers."""
+    c = [Fraction(x).as_integer_ratio() for x in p.coef.tolist()]
+    while c and not c[-1][0]:
+        c.pop()
+    common = math.lcm(*(x[1] for x in c))
+    return [x[0] * (common // x[1]) for x in c], common
+
+
+def at(c: Sequence[int], x: Fraction) -> Fraction:
+    """Value at x."""
+    out, power = 0, 1  # one division at the end
+    for i in reversed(c):
+        out = out * x.numerator + i * power
+        power *= x.denominator
+    return Fraction(out * x.denominator, power)
+
+
+def product(a: Sequence[int], b: Sequence[int]) -> Integers:
+    """a b."""
+    out = [0] * (len(a) + len(b) - 1) if a and b else []
+    for i, x in enumerate(a):
+        for j, y in enumerate(b, i):
+            out[j] += x * y
+    return out
+
+
+def combined(m: int, a: Sequence[int], n: int, b: Sequence[int]) -> Integers:
+    """m a + n b."""
+    return [m * x + n * y for x, y in itertools.zip_longest(a, b, fillvalue=0)]
+
+
+def lowest(c: Sequence[int]) -> int:
+    """The lowest power whose coefficient is not zero; 0 if there is none."""
+    return next((i for i, x in enumerate(c) if x), 0)
+
+
+def derivative(c: Sequence[int]) -> Integers:
+    """The derivative."""
+    return [i * x for i, x in enumerate(c)][1:]
+
+
+def alternating(c: Sequence[int]) -> tuple[Integers, Integers]:
+    """The value at j omega is even + j omega odd, both polynomials in omega^2."""
+    even, odd = ([x if i % 2 == 0 else -x for i, x in enumerate(c[j::2])] for j in (0, 1))
+    return even, odd
 
 
 # ---- sides of the axis ---------------------------------------------------------------------------
@@ -62,8 +109,12 @@ def roots_right(p: Polynomial) -> tuple[int, int]:
     each on its right. Sturm's chain counts the turns (Gantmacher, The Theory of Matrices, 1959, ch.
     15).
     """
-    c = _integers(p)
-    c = c[next(i for i, x in enumerate(c) if x) :]
+    return sides(over_denominator(p)[0])
+
+
+def sides(c: Sequence[int]) -> tuple[int, int]:
+    """As `roots_right`, of a polynomial with these coefficients."""
+    c = _without_zeros(c)
     n = len(c) - 1
     parts = [[0] * (n + 1), [0] * (n + 1)]  # p(j omega) = parts[0] + j parts[1]
     for i, x in enumerate(c):
@@ -72,20 +123,13 @@ def roots_right(p: Polynomial) -> tuple[int, int]:
     left_excess = _real_index(chain) if n % 2 else -_real_index(chain)
     on, common = 0, chain[-1]
     while len(common) > 1:  # roots in pairs s, -s: the real ones of the chain lie on the axis
-        shared = _sturm_chain(common, _derivative(common))
+        shared = _sturm_chain(common, derivative(common))
         on += _real_index(shared)
         common = shared[-1]
     return (n - on - left_excess) // 2, on
 
 
-def _integers(p: Polynomial) -> list[int]:
-    """Coefficients, lowest power first, over a common denominator and without common factors."""
-    c = [Fraction(x) for x in p.coef.tolist()]
-    common = math.lcm(*(x.denominator for x in c))
-    return _primitive([x.numerator * (common // x.denominator) for x in c])
-
-
-def _primitive(c: Sequence[int]) -> list[int]:
+def _primitive(c: Sequence[int]) -> Integers:
     """Coefficients without common factors and without zeros of the highest powers."""
     n = len(c)
     while n and not c[n - 1]:
@@ -94,11 +138,7 @@ def _primitive(c: Sequence[int]) -> list[int]:
     return [x // divisor for x in c[:n]]
 
 
-def _derivative(c: Sequence[int]) -> list[int]:
-    return [i * x for i, x in enumerate(c)][1:]
-
-
-def _sturm_chain(f: Sequence[int], g: Sequence[int]) -> list[list[int]]:
+def _sturm_chain(f: Sequence[int], g: Sequence[int]) -> list[Integers]:
     """f, g and the remainders with their signs changed; the last is their common divisor."""
     chain, following = [_primitive(f)], _primitive(g)
     while following:
@@ -133,23 +173,23 @@ def axis_parts(p: Polynomial) -> tuple[Polynomial, Polynomial]:
     return rational(even), rational(odd)
 
 
-def within_rounding(p: Polynomial, x: Fraction) -> bool:
-    """Whether a change of its coefficients in their last digits makes p zero at omega^2 = x."""
-    even, odd = axis_parts(p)
-    sizes = (rational(map(abs, part.coef)) for part in (even, odd))
-    least, most = (value(e, x) ** 2 + x * value(o, x) ** 2 for e, o in ((even, odd), sizes))
+def within_rounding(c: Sequence[int], x: Fraction) -> bool:
+    """Whether a change of coefficients in their last digits makes c zero at omega^2 = x."""
+    even, odd = alternating(c)
+    sizes = ([abs(i) for i in part] for part in (even, odd))
+    least, most = (at(e, x) ** 2 + x * at(o, x) ** 2 for e, o in ((even, odd), sizes))
     return least <= Fraction(ROUNDING) ** 2 * most
 
 
 def axis_roots(p: Polynomial) -> list[tuple[Fraction, int]]:
     """Pairs of roots of p on the imaginary axis within rounding: omega^2, and their side of it."""
-    even, odd = axis_parts(p)
-    slope_even, slope_odd = axis_parts(derivative(exact(p)))
+    c, _ = over_denominator(p)
+    (even, odd), (slope_even, slope_odd) = alternating(c), alternating(derivative(c))
     found: list[tuple[Fraction, int]] = []
-    for x in sorted([*positive_roots(even), *positive_roots(odd)]):
-        if within_rounding(p, x) and not (found and x - found[-1][0] <= Fraction(NEAR) * x):
-            beside = value(even, x) * value(slope_even, x)  # Re p p'*
-            beside += x * value(odd, x) * value(slope_odd, x)
+    for x in sorted([*positive_zeros(even), *positive_zeros(odd)]):
+        if within_rounding(c, x) and not (found and x - found[-1][0] <= Fraction(NEAR) * x):
+            beside = at(even, x) * at(slope_even, x)  # Re p p'*
+            beside += x * at(odd, x) * at(slope_odd, x)
             found.append((x, (beside < 0) - (beside > 0)))
     return found
 
@@ -179,41 +219,44 @@ def unit_crossings(n: Polynomial, d: Polynomial) -> tuple[np.ndarray, np.ndarray
 
 def positive_roots(p: Polynomial) -> list[Fraction]:
     """Positive real roots of p to `BITS` bits, ascending, each once."""
-    f, found = rational(_trimmed(p)), set()
+    return positive_zeros(over_denominator(p)[0])
+
+
+def positive_zeros(c: Sequence[int]) -> list[Fraction]:
+    """As `positive_roots`, of a polynomial with these coefficients."""
+    f, found = _without_zeros(c), set()
     for group in _groups(_rough_roots(f)):
         found.update(_separated(f, group))
     return sorted(found)
 
 
-def _rough_roots(p: Polynomial) -> list[Fraction]:
+def _without_zeros(c: Sequence[int]) -> Integers:
+    """Coefficients without common factors and without the zeros at both ends."""
+    c = _primitive(c)
+    return c[lowest(c) :]
+
+
+def _rough_roots(c: Sequence[int]) -> list[Fraction]:
     """Real positive roots in floats; imaginary parts up to 1e-6 count as rounding."""
-    y, scale = _scaled_roots(p)
+    y, scale = _scaled_roots(c)
     y = y[(np.abs(y.imag) <= 1e-6 * np.abs(y)) & (y.real > 0.0)].real
     return sorted(Fraction(x) * scale for x in y.tolist())
 
 
-def _scaled_roots(p: Polynomial) -> tuple[np.ndarray, Fraction]:
-    """Roots other than zero in floats, in the unit that balances the first and last coefficient."""
-    c = _trimmed(p)
-    if len(c) < 2:
+def _scaled_roots(c: Sequence[int]) -> tuple[np.ndarray, Fraction]:
+    """Roots in floats, in the unit that balances the first and last coefficient, neither zero."""
+    last = len(c) - 1
+    if last < 1:
         return np.empty(0), Fraction(1)
-    low, high = (x.numerator.bit_length() - x.denominator.bit_length() for x in (c[0], c[-1]))
-    scale = Fraction(2) ** round((low - high) / (len(c) - 1))
-    scaled = [x * scale**i for i, x in enumerate(c)]
+    power = round((c[0].bit_length() - c[-1].bit_length()) / last)
+    scaled = [x << power * (i if power > 0 else i - last) for i, x in enumerate(c)]
     most = max(map(abs, scaled))
-    return np.roots([float(x / most) for x in scaled[::-1]]), scale
-
-
-def _trimmed(p: Polynomial) -> list[Fraction]:
-    """Coefficients without the zeros at both ends."""
-    c = [Fraction(x) for x in p.coef.tolist()]
-    kept = [i for i, x in enumerate(c) if x]
-    return c[kept[0] : kept[-1] + 1] if kept else []
+    return np.roots([x / most for x in scaled[::-1]]), Fraction(2) ** power
 
 
 def approximate_roots(p: Polynomial) -> np.ndarray:
     """Roots other than zero in floats, of coefficients of any size."""
-    z, scale = _scaled_roots(p)
+    z, scale = _scaled_roots(_without_zeros(over_denominator(p)[0]))
     return z * float(scale)
 
 
@@ -222,8 +265,8 @@ def root_sizes(p: Polynomial) -> tuple[float, float]:
 
     Fujiwara's bounds, which no rounding of roots loses.
     """
-    c = _trimmed(p)
-    logs = [math.log(abs(x.numerator)) - math.log(x.denominator) if x else -math.inf for x in c]
+    c = _without_zeros(over_denominator(p)[0])
+    logs = [math.log(abs(x)) if x else -math.inf for x in c]
     last = len(c) - 1
     small = min((logs[0] - x) / i for i, x in enumerate(logs) if i)
     large = max((x - logs[-1]) / (last - i) for i, x in enumerate(logs[:-1]))
@@ -241,15 +284,15 @@ def _groups(x: Sequence[Fraction]) -> list[list[Fraction]]:
     return out
 
 
-def _separated(f: Polynomial, group: Sequence[Fraction]) -> list[Fraction]:
+def _separated(f: Integers, group: Sequence[Fraction]) -> list[Fraction]:
     """The roots of f from approximate ones, which lie close together."""
     if len(group) == 2:
         middle = _shortened((group[0] + group[1]) / 2)
         g = derivative(f)
-        at, slope, bend = (value(p, middle) for p in (f, g, derivative(g)))
+        here, slope, bend = (at(p, middle) for p in (f, g, derivative(g)))
         if not bend:
             return [middle]
-        square = (slope / bend) ** 2 - 2 * at / bend  # of the distance from the parabola's axis
+        square = (slope / bend) ** 2 - 2 * here / bend  # of the distance from the parabola's axis
         if square < 0:  # a pair of complex roots, or a double root but for rounding
             return [middle] if -square <= (Fraction(1e-9) * middle) ** 2 else []
         apart = _square_root(square)
@@ -257,14 +300,14 @@ def _separated(f: Polynomial, group: Sequence[Fraction]) -> list[Fraction]:
     return [_polished(f, x) for x in group] if len(group) < 3 else list(group)
 
 
-def _polished(f: Polynomial, x: Fraction) -> Fraction:
+def _polished(f: Integers, x: Fraction) -> Fraction:
     """The root of f near x, by Newton's method; x where that leaves its neighbourhood."""
     slope, start = derivative(f), x
     for _ in range(8):
-        down = value(slope, x)
+        down = at(slope, x)
         if not down:
             return x
-        step = value(f, x) / down
+        step = at(f, x) / down
         if abs(x - step - start) > Fraction(NEAR) * start:
             return start
         x = _shortened(x - step)
