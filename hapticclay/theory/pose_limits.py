@@ -71,6 +71,7 @@ class PoseLimits:
         self._coupled = not scenario.inertia_shaping or scenario.rotated
         self._loops: dict[tuple[int, float], _CoupledLoop] = {}
         self.known: tuple[Known, Known] = {}, {}
+        self._tables: list[np.ndarray | None] = [None, None]  # of the keys of known
 
     def at(self, i: int, p: tuple[float, float], b: tuple[float, float]) -> float:
         """The gain limit with the handle at a place [1/kg]; inf for none."""
@@ -81,6 +82,7 @@ class PoseLimits:
             p = s.start  # free: the same everywhere
         key = (*b, *p) if self._coupled else (b[i],)
         if key not in known:
+            self._tables[i] = None
             if len(known) >= MOST_KNOWN:
                 del known[next(iter(known))]
             if not self._coupled:
@@ -110,7 +112,9 @@ class PoseLimits:
         if len(self.known[i]) < MOST_KNOWN:
             return self.at(i, p, b)
         here = np.array((*b, *p) if self._coupled else (b[i],))
-        keys = np.array(list(self.known[i]))
+        keys = self._tables[i]
+        if keys is None:
+            keys = self._tables[i] = np.array(list(self.known[i]))
         difference = np.abs(keys - here) / (np.ptp(keys, axis=0) + 1e-300)
         return list(self.known[i].values())[int(difference.sum(axis=1).argmin())]
 
