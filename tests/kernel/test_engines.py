@@ -164,16 +164,16 @@ MORE = {
     "growth": dataclasses.replace(hc.free(t_max=2.0, dt=1e-3), clay=GROWING),
     "layers": dataclasses.replace(hc.free(t_max=1.0, force=(1.0, 0.3), dt=1e-3), clay=LAYERS),
     "at speed": dataclasses.replace(
-        hc.constant_cut(b=1e4, t_max=0.1, torque_limit=(1e5, 1e5)), velocity=(2.0, 0.0)
+        hc.constant_cut(b=1e4, t_max=0.05, torque_limit=(1e5, 1e5)), velocity=(2.0, 0.0)
     ),
     "backwards": hc.constant_cut(start=(0.052, 0.0), force=(-1.0, 0.0), t_max=0.4),
     "along a border": hc.constant_cut(start=(0.1501, 0.0), force=(0.0, 1.0), t_max=0.3),
-    "diverged": hc.constant_cut(gain=(1.0, 1.0)),
+    "diverged": hc.constant_cut(gain=(1.0, 1.5), start=(0.051, 0.0), force=(1.0, 1.0)),
     "thrown out of reach": hc.constant_cut(gain=(1e4, 1e4), torque_limit=(1e6, 1e6)),
     "unstable, goes on": dataclasses.replace(
         hc.constant_cut(gain=(25.0, 0.5), t_max=2.0), stop_when_unstable=False
     ),
-    "stretched": hc.constant_cut(force=(1.0, 50.0)),
+    "stretched": hc.constant_cut(force=(1.0, 50.0), start=(0.0, 0.1), length=0.15),
     "stalled": hc.constant_cut(force=(0.0, 0.0), t_max=1.2, dt=1e-3),
     "one short step": hc.constant_cut(t_max=1e-5),
     "not on the grid": hc.constant_cut(t_max=0.1001),
@@ -186,9 +186,7 @@ STILL = {  # by the accurate method as well
     "off axis, origin": hc.constant_cut(force=(1.0, 0.3), start=(0.04, 0.0), t_max=1.0),
     "stiff: substeps": hc.constant_cut(b=2e4, start=(0.0498, 0.0), t_max=0.05),
     "diverged": hc.constant_cut(gain=(1.0, 2.5), start=(0.051, 0.0), force=(1.0, 0.1)),
-    "stretched": hc.constant_cut(
-        force=(1.0, 50.0), start=(0.0, 0.1), length=0.15, torque_limit=(1e4, 1e4)
-    ),
+    "stretched": dataclasses.replace(MORE["stretched"], torque_limit=(1e4, 1e4)),
     "not on the grid": hc.constant_cut(t_max=0.9007),
     **{name: MORE[name] for name in ("layers", "at speed", "backwards", "one short step")},
 }
