@@ -223,9 +223,9 @@ def sections(data: dict[str, Any]) -> list[str]:
         "is called from a loop in Python, which is part of its run time.",
         "![Error of the gain limit over run time, a line a method](arms.png)",
         common.table(cells, head),
-        "Semi-implicit steps, of MuJoCo, Drake and Pinocchio alike, act on the rates half a step "
-        "late, which damps: a gain that buzzes on the arm is stable in such a run "
-        "([why](../mujoco_stable.md)).",
+        "Semi-implicit steps, of MuJoCo, Drake and Pinocchio alike, move positions by the rates at "
+        "the end of a step: half a step of the hold's lag is missing, and a gain that buzzes on "
+        "the arm is stable in such a run ([why](../mujoco_stable.md)).",
         "## The exact answer",
         "Without runs, processor time:",
         common.table(times, ["question", "time [ms]"]),

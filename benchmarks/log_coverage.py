@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 from tabulate import tabulate
 from tqdm import tqdm
 
@@ -87,13 +88,13 @@ def one(seed: int, log: str) -> dict[str, Any]:
     omega = 2.0 * math.pi * rng.uniform(3.0, 7.0)
     truth = mass, 2.0 * rng.uniform(0.5, 1.0) * omega * mass, mass * omega**2
     times, stamps = LOGS[log](rng)
-    f = rng.choice(np.arange(1, round(20.0 * PERIOD)), LINES, replace=False) / PERIOD
-    s = 2j * math.pi * f
+    k = rng.choice(np.arange(1, round(20.0 * PERIOD)), LINES, replace=False)
+    s = 2j * math.pi * k / PERIOD
     push = np.exp(1j * rng.uniform(0.0, 2.0 * math.pi, LINES))
-    angle = np.outer(times, s.imag)
-    waves = np.cos(angle), np.sin(angle)
     moved = push / (truth[0] * s**2 + truth[1] * s + truth[2])
-    force, place = (waves[0] @ x.real - waves[1] @ x.imag for x in (push, moved))
+    lines = np.zeros((round(20.0 * PERIOD), 2), complex)  # of the powers of one turn a period
+    lines[k] = np.column_stack((push, moved))
+    force, place = polyval(np.exp(2j * math.pi / PERIOD * times), lines).real
     place = place + NOISE * np.std(place) * rng.standard_normal(len(place))
     data = hc.studies.Measurement.resampled(stamps, force, place)
     found = hc.studies.identify_data(data, "S", band=BAND)

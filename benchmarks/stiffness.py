@@ -105,8 +105,17 @@ def conclusions(data: dict[str, Any]) -> list[str]:
         held = itertools.takewhile(lambda r: not r[label]["broken"], rows)
         return common.plain(format(max((r["b"] for r in held), default=0.0), "g"))
 
+    def again(label: str) -> str:
+        """From where on it holds again, after it broke."""
+        held = list(itertools.takewhile(lambda r: not r[label]["broken"], reversed(rows)))
+        if not held or len(held) == len(rows):
+            return ""
+        return f", again from {common.plain(format(held[-1]['b'], 'g'))} on"
+
     others = " and ".join(
-        f"{largest(x)} N.s/m ({x.removeprefix('plain, ')})" for x in labels if x != "default"
+        f"{largest(x)} N.s/m ({x.removeprefix('plain, ')}{again(x)})"
+        for x in labels
+        if x != "default"
     )
     return [
         f"Stiff clay. At a step of {1e3 * data['dt']:g} ms hapticclay's default method holds to "

@@ -33,6 +33,11 @@ def printable(text: object) -> str:
     return "".join(x if x.isprintable() or x == "\n" else " " for x in str(text))
 
 
+def time_words(x: float) -> str:
+    """A time given in seconds, in words of three digits: ms below a second."""
+    return f"{x:.3g} s" if x >= 0.9995 else f"{1e3 * x:.3g} ms"
+
+
 def html_table(title: str, rows: Iterable[tuple[str, str]]) -> str:
     """A table of names and values in HTML, in the colours of the page around it, dark or light."""
     lines = [

@@ -49,6 +49,25 @@ class ParameterError(ValueError):
         return type(self), (self.field, self.value, self.bound), self.__dict__
 
 
+class MissingPackage(ParameterError):
+    """Something needs a package that is not installed.
+
+    Args:
+        what: what needs it, in words.
+        package: its name.
+        extra: the extra of hapticclay that installs it.
+    """
+
+    def __init__(self, what: str, package: str, extra: str):
+        bound = f"must be installed: pip install 'hapticclay[{extra}]'"
+        super().__init__(what, package, bound)
+        self.args = (f"{what} needs {package}, which {bound}",)
+        self.extra = extra
+
+    def __reduce__(self):
+        return type(self), (self.field, self.value, self.extra), self.__dict__
+
+
 class Warning(UserWarning):  # as in `hc.Warning`
     """A scenario has implausible values, such as clay out of reach."""
 
@@ -304,5 +323,4 @@ def needing(what: str, package: str, extra: str = "data") -> Iterator[None]:
     try:
         yield
     except ImportError:
-        bound = f"must be installed: pip install 'hapticclay[{extra}]'"
-        raise ParameterError(what, package, bound) from None
+        raise MissingPackage(what, package, extra) from None

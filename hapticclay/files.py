@@ -69,9 +69,8 @@ def writable(folder: Path) -> None:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise ParameterError(
-            "out", str(folder), f"must be a writable folder ({error.strerror})"
-        ) from None
+        why = "it is a file" if folder.is_file() else error.strerror
+        raise ParameterError("out", str(folder), f"must be a writable folder ({why})") from None
     finally:
         for p in made:
             with contextlib.suppress(OSError):

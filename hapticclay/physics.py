@@ -4,7 +4,9 @@ MuJoCo is imported for any MUJOCO_GL: physics draws nothing, and views report th
 """
 
 import os
+import threading
 from pathlib import Path
+from typing import Any
 
 try:
     import mujoco
@@ -22,16 +24,44 @@ __all__ = ["mjcf_folder", "mujoco", "warnings_caught"]
 
 
 class warnings_caught:
-    """Collects the engine's warnings instead of writing MUJOCO_LOG.TXT, for a `with`."""
+    """Collects the engine's warnings of a thread, for a `with`, in place of MUJOCO_LOG.TXT.
+
+    The engine tells one function of the warnings of all threads. Where several collect, the newest
+    one hands on what is not its own, and the last to end puts back what was there before the first.
+    There is no lock, which would take as long as the rest: two that begin at one instant may drop a
+    warning.
+    """
+
+    __slots__ = ("before", "caught", "over", "thread")
 
     def __enter__(self) -> list[str]:
-        caught: list[str] = []
-        self.before = mujoco.get_mju_user_warning()
-        mujoco.set_mju_user_warning(caught.append)
-        return caught
+        self.caught: list[str] = []
+        self.thread, self.over = threading.get_ident(), False
+        before = mujoco.get_mju_user_warning()
+        self.before = before and _at_work(before)
+        mujoco.set_mju_user_warning(self)
+        return self.caught
+
+    def __call__(self, text: str) -> None:
+        if threading.get_ident() == self.thread:
+            self.caught.append(text)
+        elif type(self.before) is warnings_caught:
+            self.before(text)
 
     def __exit__(self, *error: object) -> None:
-        mujoco.set_mju_user_warning(self.before)
+        self.over = True
+        if mujoco.get_mju_user_warning() is self:
+            before = self.before
+            mujoco.set_mju_user_warning(before and _at_work(before))
+
+
+def _at_work(told: Any) -> Any:
+    """What the engine tells of warnings, without collectors that have ended."""
+    while type(told) is warnings_caught and told.over:
+        told = told.before
+    if type(told) is warnings_caught:
+        told.before = _at_work(told.before)
+    return told
 
 
 def mjcf_folder() -> Path:

@@ -8,7 +8,7 @@ from decimal import Decimal
 from functools import cache
 
 QUANTITY = re.compile(
-    r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?![eE][-+]?\d)(\s*[^\W\d].*|\s+\S.*)"
+    r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?![eE][-+]?\d)(\s*(?:[^\W\d]|°).*|\s+\S.*)"
 )
 RECIPROCAL = re.compile(  # "2/kg" for a field in 1/kg
     r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(/\s*[^\W\d].*)"

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hapticclay.display import cell_text, text_table
+from hapticclay.display import cell_text, text_table, time_words
 
 
 @pytest.mark.parametrize(
@@ -54,3 +54,11 @@ def test_units_stand_below_the_names_where_a_table_is_wide():
 
 def test_a_table_without_rows_has_its_head():
     assert text_table({"a": [], "b [m]": []}).splitlines()[0].split() == ["a", "b", "[m]"]
+
+
+@pytest.mark.parametrize(
+    "x, words",
+    [(0.0, "0 ms"), (4e-3, "4 ms"), (0.5, "500 ms"), (0.9996, "1 s"), (4.0, "4 s")],
+)
+def test_a_time_is_in_ms_below_a_second(x, words):
+    assert time_words(x) == words

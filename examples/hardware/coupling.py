@@ -3,7 +3,8 @@ A virtual coupling
 ==================
 
 Motors that hold their force for a sample cannot render clay stiffer than 2/(Ts W): each sample
-overshoots. A spring and damper between the handle and a virtual tool make any clay renderable.
+overshoots. A spring k and a damper d between the handle and a virtual tool make clay of any
+stiffness renderable, if d pays for the hold of the spring, k Ts/2.
 """
 
 import matplotlib.pyplot as plt

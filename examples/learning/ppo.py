@@ -2,7 +2,7 @@
 
     python examples/learning/ppo.py --env CutLine-v0 --steps 300000 --seed 1
 
-Needs torch and hapticclay[gym,fast]. It writes the learning curve (CSV), the policy (its weights)
+Needs torch and hapticclay[gym]. It writes the learning curve (CSV), the policy (its weights)
 and, with --film, a film of an episode. After Schulman et al. 2017, with the details of
 Huang et al. 2022, "The 37 implementation details of PPO": one network each for policy and value,
 observations and rewards normalised, advantages by GAE, the value of the last observation where an

@@ -2,7 +2,7 @@
 
     python examples/learning/sac.py --env AdaptiveGain-v0 --steps 200000 --seed 1
 
-Needs torch beside hapticclay[gym,fast]. It writes what `ppo.py` writes, whose scales and files
+Needs torch beside hapticclay[gym]. It writes what `ppo.py` writes, whose scales and files
 it shares. After Haarnoja et al. 2018 (two critics, a temperature that holds the entropy of the
 policy at -1 per action). An action is held for REPEAT control periods. In AdaptiveGain the policy
 names the gain that it wants, and the environment's action moves the gain there: a random action is

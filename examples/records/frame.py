@@ -3,6 +3,7 @@ A record as a table
 ===================
 
 ``to_frame`` returns a pandas DataFrame; ``export`` writes CSV, Parquet, netCDF, MAT and others.
+Needs pandas: ``pip install 'hapticclay[data]'``.
 """
 
 import tempfile

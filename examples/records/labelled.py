@@ -3,6 +3,7 @@ A record with names and units
 =============================
 
 ``to_xarray`` returns the numbers with their axes, joints and units, and the whole scenario.
+Needs xarray: ``pip install 'hapticclay[data]'``.
 """
 
 import json

@@ -4,6 +4,7 @@ Probability of instability
 
 Hand and delay are random; each run is judged by itself. The interval shows how much so few runs can
 say. The runs are stored in a folder, and the same call resumes an interrupted study.
+Needs pyarrow: ``pip install 'hapticclay[sweep]'``.
 """
 
 import tempfile

@@ -5,6 +5,7 @@ Random hands, stored run by run
 ``hc.studies.run_columns`` makes one run for each row of some columns and stores the final values in
 a folder. A second call makes the runs that are missing, for example after an interruption. Here
 hands of random mass and damper pull into clay for 0.3 s.
+Needs pyarrow: ``pip install 'hapticclay[sweep]'``.
 """
 
 import tempfile

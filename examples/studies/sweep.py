@@ -4,6 +4,7 @@ A sweep, read as a table
 
 A sweep runs a space of parameters and writes a Parquet file for each chunk; the same command
 resumes an interrupted sweep. pandas, or any other reader, opens the folder.
+Needs pyarrow and pandas: ``pip install 'hapticclay[sweep,data]'``.
 """
 
 import tempfile

@@ -5,7 +5,7 @@ My leader and follower oscillate
 Two arms of seven joints that follow each other, gains in their drives. Left: how late the link may
 be, over a common factor of all Kp. Right: growth of the common motion over the share of a published
 friction compensation that is fed forward. Above some share it grows, and half the Kp with 1.5 times
-the Kd changes nothing.
+the Kd changes hardly anything.
 """
 
 from dataclasses import replace

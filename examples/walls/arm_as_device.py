@@ -4,6 +4,7 @@ An arm from a file as a device
 
 A program renders a floor under the handle of an arm of three joints, at 200 Hz through the port of
 a haptic device. The loop report has the stiffness that all joints together carry at this rate.
+Needs websockets: ``pip install 'hapticclay[device]'``.
 """
 
 import json

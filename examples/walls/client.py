@@ -4,6 +4,7 @@ A program's wall
 
 A program renders a wall at 200 Hz on the simulated device. From its messages alone the loop report
 finds the rendered stiffness, and the stiffness that its rate and the hand allow.
+Needs websockets: ``pip install 'hapticclay[device]'``.
 """
 
 import json

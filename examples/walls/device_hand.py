@@ -5,6 +5,7 @@ Clay at the hand of a device
 A device is the hand of a simulated arm. It is pulled through the clay along a line and feels the
 clay through a spring and damper that are passive at its rate. Here the device is simulated; for a
 real Inverse3, give its address instead.
+Needs websockets: ``pip install 'hapticclay[device]'``.
 """
 
 import matplotlib.pyplot as plt

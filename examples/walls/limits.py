@@ -27,7 +27,7 @@ ax.semilogy(ms, [hc.walls.stiffness_band(x)[1] for x in late], label="exact, no 
 ax.plot(
     ms, [hc.walls.hulin_limit(x) for x in late], "--", label="Hulin 2006: (b + B)/(Ts/2 + delay)"
 )
-ax.plot(0.0, hc.walls.hand_box_limit(wall, box), "ks", mfc="none", label="any hand of a box")
+ax.plot(0.0, hc.walls.hand_box_limit(wall, box), "ks", mfc="none", label="worst hand tried")
 ax.plot(ms, [hc.walls.colgate_schenkel_limit(x) for x in late], ":", label="passive, Colgate 1997")
 for samples in (0, 1):
     one = replace(wall, delay=samples * wall.Ts)

@@ -5,6 +5,7 @@ Programs at both ends of a pair
 One program is the hand at the leader, another the wall that the follower meets, each at 200 Hz
 through the port of a haptic device. Law and link, 10 ms late, run between both arms. In the end the
 wall takes the 2 N of the hand; the stiffer one is hit with more.
+Needs websockets: ``pip install 'hapticclay[device]'``.
 """
 
 import json

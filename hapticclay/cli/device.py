@@ -76,7 +76,7 @@ class DeviceCommand:
         device_id: Identifier of the Inverse3, hexadecimal.
         grip_id: Identifier of the grip, hexadecimal.
         largest_force: Larger forces are limited to this [N].
-        duration: End after this time on the computer's clock [s]; None runs until Ctrl-C.
+        duration: End after this time on the computer's clock [s]; by default at Ctrl-C.
         out: Folder for the record, the exchanges and the report; by default out/device, for a
             report out/loop.
         plots: Draw the plots.
@@ -128,7 +128,7 @@ class DeviceCommand:
             return self._serve_pair(self.pair, out)
         with self._server() as server, console.ctrl_c() as stop:
             print(f"{self._shown} listens at {server.url}; Ctrl-C ends the session", flush=True)
-            self._wait(stop, lambda: server.service.device.ended)
+            self._wait(stop, lambda: server.service.ended)
             planned = not stop.is_set()
             server.close()
             return self._deliver(server, out, planned)
@@ -232,11 +232,14 @@ class DeviceCommand:
         return 0
 
     def _report(self, out: Path) -> int:
-        from ..ports.exchanges import Exchanges
+        from ..ports.exchanges import FILE, Exchanges
         from ..simulation.record import Record
 
         if self.source is None:
             raise ParameterError("source", "", "give the folder that a session wrote")
+        if not (self.source.is_file() or (self.source / FILE).is_file()):
+            bound = f"must be the folder of a session that a program took part in (no {FILE} there)"
+            raise ParameterError("source", str(self.source), bound)
         exchanges = Exchanges.load(self.source)
         writable(out)
         scenario = Record.load(self.source).scenario

@@ -148,6 +148,8 @@ def deliver_loops(
     from ..ports.exchanges import FILE
 
     talks = sorted(talks, key=len, reverse=True)
+    if not talks:
+        print("no program connected: there is no loop to report on")
     if len(talks) > 1:
         print(f"{len(talks)} clients; the report is of the one with the most messages")
     if talks and len(talks[0]) > 1:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import textwrap
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -37,13 +38,18 @@ class FieldsCommand:
         known, shown = leaves(Scenario, part=Scenario()), []
         for name in self.names:
             own = parameters(EXPERIMENTS[name]).values() if name in EXPERIMENTS else ()
-            found = list(own) or [f for f in known if name in f.name]
+            found = list(own) or [f for f in known if name in f.name or _is_entry(name, f.name)]
             if not found:
                 refusal = no_field(name, "", [*EXPERIMENTS, *dotted_names(Scenario)])
                 raise ParameterError("field", name, refusal.bound)
             shown += [f for f in found if f not in shown]
         print(field_list(shown if self.names else known))
         return 0
+
+
+def _is_entry(name: str, field: str) -> bool:
+    """Whether a name is that of an entry of a field, as gain.x or clay.x.values.1."""
+    return name.startswith(f"{field}.") and bool(re.fullmatch(r"[xy]|\d+", name[len(field) + 1 :]))
 
 
 def field_list(fields: Iterable[Field]) -> str:
@@ -72,12 +78,10 @@ def _takes(node: Node) -> str:
     if not node.takes_numbers:
         return " | ".join(words)
     if isinstance(low, str):  # the name of a field
-        words.insert(0, f"{low} to {high:.10g}")
+        words.insert(0, f"{low} to {high:g}")
     elif math.isfinite(low):
         above = "above " if node.bound.above else ""
-        words.insert(
-            0, f"{above}{low:g}{f' to {high:.10g}' if math.isfinite(high) else ' or more'}"
-        )
+        words.insert(0, f"{above}{low:g}{f' to {high:g}' if math.isfinite(high) else ' or more'}")
     elif words:
         words.insert(0, "a number")
     return " | ".join(words)

@@ -11,7 +11,7 @@ from ..errors import Bound
 from ..files import writable
 from ..model.constants import AXES
 from . import console
-from .log_options import LogOptions, column_names, found_line
+from .log_options import LogOptions, column_names, found_line, hinted
 from .options import Loose
 from .unused import Unused
 
@@ -127,7 +127,8 @@ class IdentifyCommand:
         writable(self.out)
         what, given = self.what or "G", column_names(self.columns, COLUMNS)
         log = self.log.log(file, "csv" if self.csv else "file")
-        names = named_columns(log, given, input="command" if what == "G" else "force")
+        with hinted(given):
+            names = named_columns(log, given, input="command" if what == "G" else "force")
         axis = "x" if self.axis == "both" else self.axis
         data = measured(log, names, "hold" if self.held else "spline")
         timing = {"held": self.held, "delay": self.delay}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from ..files import writable
 from . import console
@@ -28,17 +28,16 @@ class LabCommand:
         figures: Formats and style of the figures.
     """
 
-    source: Loose[str]
+    source: Loose[Literal["wall", "zwidth", "delay", "jnd", "pair"]]
     out: Path | None = None
     quick: bool = False
     view: bool = False
     figures: console.FigureOptions = console.FigureOptions()
 
     def __call__(self) -> int:
-        from ..errors import choice
-        from ..studies.labs import LABS, lab
+        from ..studies.labs import lab
 
-        name = choice("lab", self.source, tuple(LABS))
+        name = self.source
         out = self.out or Path("out/lab") / name
         writable(out)
         with console.progress_bar(total=0, bar_format="{elapsed} {desc}") as bar:

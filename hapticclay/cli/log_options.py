@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+import contextlib
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -50,8 +51,22 @@ class LogOptions:
         return out
 
 
+EXAMPLE = "t=time input=cmd output=pos"
+
+
+@contextlib.contextmanager
+def hinted(given: Collection[str], example: str = EXAMPLE) -> Iterator[None]:
+    """Says how columns are named, in a refusal of one that was looked for and not found."""
+    try:
+        yield
+    except ParameterError as error:
+        key = error.field.removeprefix("columns.")
+        hint = "" if key in given else f"; give --columns {example}"
+        raise ParameterError(error.field, error.value, error.bound + hint) from None
+
+
 def column_names(
-    words: Sequence[str], columns: Collection[str], example: str = "t=time input=cmd output=pos"
+    words: Sequence[str], columns: Collection[str], example: str = EXAMPLE
 ) -> dict[str, str]:
     """Names of columns from words such as "input=cmd"."""
     out: dict[str, str] = {}

@@ -14,6 +14,10 @@ from .commands import COMMANDS, load_command
 from .options import SCENARIO
 
 NARROWEST = 20  # columns of a terminal in which help is laid out; in five that never ends
+PAPER = (
+    "Sections, figures and equations are those of Her, Hsu, Lan, Karkoub, J. Intelligent and "
+    "Robotic Systems 35 (2002)."
+)
 ABOUT = "Virtual clay, cut with a simulated haptic arm."
 
 
@@ -38,12 +42,12 @@ def _print_command(words: Sequence[str], width: int) -> None:
         from ..scene.experiments import EXPERIMENTS
 
         if line.origin == parser.EXPERIMENT:
-            about = _paragraphs(EXPERIMENTS[line.source])
+            about, app.help_epilogue = _paragraphs(EXPERIMENTS[line.source]), PAPER
         elif not line.origin:
             for name, kind in EXPERIMENTS.items():
                 app.command(parser.new_app(name, help=_paragraphs(kind)[0], group="Experiments"))
             app.help_epilogue = (
-                f"hapticclay {line.name} EXPERIMENT --help shows the options of one."
+                f"hapticclay {line.name} EXPERIMENT --help shows the options of one. {PAPER}"
             )
     loose = [option for option in line.options.values() if option.note]
     shown = [option.usage if option.default is UNSET else f"[{option.usage}]" for option in loose]
@@ -51,7 +55,10 @@ def _print_command(words: Sequence[str], width: int) -> None:
     for text in (usage, *about):
         print(textwrap.fill(text, width) + "\n")
     color = None if os.environ.get("NO_COLOR") else "auto"
-    app.help_print([], console=Console(width=width, color_system=color))
+    console = Console(width=width, color_system=color)
+    with console.capture() as page:  # rich would end the process where a pipe is closed
+        app.help_print([], console=console)
+    print(page.get(), end="")
 
 
 def _paragraphs(kind: type) -> list[str]:

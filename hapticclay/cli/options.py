@@ -89,7 +89,8 @@ class Option:
     def usage(self) -> str:
         """What stands for a word without a name in the first line of a help page."""
         also = {SCENARIO: "EXPERIMENT|FILE", RECORD: "EXPERIMENT|FILE|RECORD"}
-        return also.get(self.note) or self.name.upper()
+        many = "..." if self.node.arity == math.inf else ""
+        return also.get(self.note) or self.name.upper() + many
 
     @property
     def label(self) -> str:

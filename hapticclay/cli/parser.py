@@ -118,7 +118,9 @@ def begun(words: Sequence[str], whole: bool = True) -> tuple[Line, list[str]]:
     Where the line is not `whole`, as for a help page, the scenario may be left out.
     """
     if not words:
-        raise _refused(f"give a command: {', '.join(COMMANDS)}")
+        raise _refused(
+            f"give a command: {', '.join(COMMANDS)}; hapticclay --help says what each is for"
+        )
     name, *rest = words
     if name.startswith("-"):
         raise _refused(f"{name}: no option of hapticclay; see hapticclay --help")
@@ -143,8 +145,9 @@ def _scenario_of(line: Line, words: list[str], at: int | None) -> tuple[str, str
     from ..scene.files import is_scenario_file
 
     recorded = line.options[SCENARIO].note == RECORD
-    if at is None and recorded:
-        return EXPERIMENT, "constant"
+    usual = line.options[SCENARIO].default
+    if at is None and usual is not UNSET:
+        return EXPERIMENT, usual
     if at is None:
         raise _refused(f"give an experiment or a scenario file: {', '.join(EXPERIMENTS)}")
     word = words.pop(at)

@@ -19,6 +19,8 @@ EXAMPLE = "t=time x=pos fx=force"
 class ReplayCommand:
     """Run a scene under a recorded force or motion of the hand, and lay the recording beside it.
 
+    --recording is needed.
+
     Attributes:
         scenario: The experiment, or a scenario file; its hand, start and duration are those of the
             recording.
@@ -43,7 +45,8 @@ class ReplayCommand:
         from ..studies.replay import COLUMNS, recorded, replay
 
         if self.recording is None:
-            raise ParameterError("recording", None, "must be given: a log")
+            bound = "must be given: --recording FILE, the log of a force or motion"
+            raise ParameterError("recording", None, bound)
         columns = column_names(self.columns, COLUMNS, EXAMPLE)
         recording = recorded(self.log.log(self.recording, "recording"), columns)
         out = self.out or console.default_folder("replay", recording)

@@ -31,6 +31,11 @@ FORMATS = {
     "steady v [m/s]": "z.6f",
     "expected v [m/s]": "z.6f",
 }
+MISSING = {  # speeds, and why a stretch has none
+    "steady v": "the speed did not settle on that stretch",
+    "expected v": "has no formula with a hand, a varying force or clay that changes on the way",
+}
+LEAST_ENERGY = 1e-24  # [J] 1 kg at 1 pm/s has less
 CHOSEN = "is chosen by --error: leave it out"
 
 
@@ -209,7 +214,7 @@ def _crossing_lines(record: Record) -> list[str]:
 
 def _energy_lines(record: Record) -> list[str]:
     through = record.energy.get("throughput", 0.0)
-    if not through:
+    if through < LEAST_ENERGY:  # of an arm at rest: rounding
         return []
     share = abs(record.energy["residual"]) / through
     return [f"energy: balanced within {share:.1e} of {through:.4g} J"]
@@ -251,7 +256,12 @@ def _stretch_table(clay: Clay | None, pieces: list[tuple[str, dict[str, Any]]]) 
         table["fh/v [N.s/m]"] = [x["mean"] if x else math.nan for x in felt]
     table["steady v [m/s]"] = [_known(r["steady_speed"]) for r in rows]
     table["expected v [m/s]"] = [_known(r["expected_speed"]) for r in rows]
-    return text_table(table, FORMATS)
+    notes = [
+        f"{name} -: {why}"
+        for name, why in MISSING.items()
+        if any(map(math.isnan, table[f"{name} [m/s]"]))
+    ]
+    return "\n".join([text_table(table, FORMATS), *notes])
 
 
 def _known(x: float | None) -> float:

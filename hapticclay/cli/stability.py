@@ -148,7 +148,11 @@ def clay_of(words: Sequence[str], b: float | None = None) -> Flow:
     if "=" not in text:
         if b is not None:
             raise ParameterError("b", b, f"must not be given beside {text!r}, which has its own")
-        return material(text)
+        try:
+            return material(text)
+        except ParameterError as error:
+            bound = f"{error.bound} (or numbers with their names, as Fy=5 b=30)"
+            raise ParameterError(error.field, error.value, bound) from None
     found = {} if b is None else {"b": b}
     for word in text.split():
         name, equals, value = word.partition("=")

@@ -23,7 +23,8 @@ class VideoCommand:
 
     Attributes:
         scenario: The experiment, a scenario file, or the folder of a record.
-        out: The file: .mp4, .webp or .gif.
+        out: The file: .mp4, .webp or .gif; by default out/film.mp4, or .webp where no codec for
+            .mp4 is installed.
         camera: Point of view.
         speed: Playback speed: 1 is real time, 2 twice as fast.
         size: Width and height [pixels].
@@ -33,8 +34,8 @@ class VideoCommand:
         magnify: Show the motion of an arm from a file about its median pose so many times larger.
     """
 
-    scenario: RecordWord
-    out: Path = Path("out/film.mp4")
+    scenario: RecordWord = "constant"
+    out: Path | None = None
     camera: Literal["room", "top", "close"] = "room"
     speed: float = 1.0
     size: tuple[Pixels, Pixels] = (960, 480)
@@ -51,18 +52,17 @@ class VideoCommand:
         options = film.FilmOptions(
             self.camera, self.speed, self.size, self.plots, self.smooth, self.tool, self.magnify
         )
-        writable(self.out.parent)
-        film.ready(self.out, options)
+        out = self.out or film.usual_file(Path("out"))
+        writable(out.parent)
+        film.ready(out, options)
         if not isinstance(record, Record):
             record = simulate_with_progress(record, 1)
 
         def progress(images: Iterator[Any], count: int) -> Iterator[Any]:
             return iter(
-                console.progress_bar(
-                    images, total=count, desc=self.out.name, unit="frame", delay=0.0
-                )
+                console.progress_bar(images, total=count, desc=out.name, unit="frame", delay=0.0)
             )
 
-        made = film.film(record, self.out, options, progress)
+        made = film.film(record, out, options, progress)
         print(f"written to {made}")
         return 0

@@ -54,7 +54,7 @@ class ViewCommand:
             localhost:9870, for PlotJuggler.
     """
 
-    scenario: RecordWord
+    scenario: RecordWord = "constant"
     stiffness: float = 10.0
     tool: Prefixed[Tool] = Tool()
     out: Path | None = None

@@ -135,7 +135,8 @@ class PairServers:
     @property
     def ended(self) -> str:
         """What ended the run, "" while nothing has."""
-        return self._plant.ended
+        faults = [server.service.ended for server in self.served.values()]
+        return next(filter(None, faults), self._plant.ended)
 
     @property
     def recorded(self) -> bool:

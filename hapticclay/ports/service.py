@@ -56,6 +56,7 @@ class Service:
         self._turns = turning(device.scenario)
         self.protocol = protocol_of(inverse3.protocol)
         self.skipped = self.samples = 0  # control samples by the wall clock: late, and made
+        self._fault = ""  # that ended the device
         self._sessions: dict[int, Session] = {}
         self._logs: dict[int, ExchangeLog] = {}
         self._count = 0  # of clients so far
@@ -104,7 +105,7 @@ class Service:
         began = device.t
         applied = device.drive(self._drive())
         if self.clock == "tick" and session.number == min(self._sessions):
-            device.advance()
+            self._advance()
             for s in self._sessions.values():  # a command acts for one tick
                 if s.number != session.number:
                     s.command = IDLE
@@ -156,6 +157,21 @@ class Service:
         self.notices[notice] += 1
         if self.notices[notice] == 1:
             LOG.warning(notice)
+
+    @property
+    def ended(self) -> str:
+        """Why the device stopped; "" while it runs."""
+        return self._fault or self.device.ended
+
+    def _advance(self, samples: int | None = None) -> None:
+        """Advances the device, which stops where its simulation fails: clients are not to wait."""
+        if self._fault:
+            return
+        try:
+            self.device.advance(samples)
+        except Exception as error:
+            self._fault = one_line(f"{type(error).__name__}: {error}", LONGEST_NOTICE)
+            LOG.error("the device stopped: %s", self._fault, exc_info=error)
 
     # ---- conversion between cursor and arm
 
@@ -217,7 +233,7 @@ class Service:
     def _run_clock(self) -> None:
         sample = float(self.device.scenario.Ts or self.device.scenario.dt)
         begin = time.perf_counter()
-        while not self._stop.is_set() and not self.device.ended:
+        while not self._stop.is_set() and not self.ended:
             if self.device.paced:
                 with self._lock:
                     self.device.drive(self._drive())
@@ -232,7 +248,7 @@ class Service:
                 due = min(int(late / sample), AT_ONCE)
                 if due:
                     self.device.drive(self._drive())
-                    self.device.advance(due)
+                    self._advance(due)
                     self.samples += due
             time.sleep(0.0 if due else 0.25 * sample)
 

@@ -36,7 +36,19 @@ def naming_file(path: str | os.PathLike[str], name: str = "scenario") -> Iterato
 
 
 def read_settings(path: str | os.PathLike[str], name: str = "scenario") -> dict[str, Any]:
-    """Reads a scenario file as plain data; a scenario without a name gets that of the file."""
+    """Reads a file of a scenario, or of what `name` says, as plain data."""
+    data = file_data(path, name)
+    schema = data.get("schema")
+    if isinstance(schema, str) and not schema.startswith(f"hapticclay-{name}-"):
+        raise ParameterError(name, str(path), f"must be a {name}; its schema is {schema!r}")
+    if name == "scenario" and isinstance(data.get("leader"), Mapping):
+        bound = "must be a scenario; a leader and a follower are for hapticclay pair"
+        raise ParameterError(name, str(path), bound)
+    return data
+
+
+def file_data(path: str | os.PathLike[str], name: str = "scenario") -> dict[str, Any]:
+    """Reads a file, whatever it describes; what has no name gets that of the file."""
     file = Path(path)
     kind = _file_kind(file, name)
     try:
@@ -53,9 +65,6 @@ def read_settings(path: str | os.PathLike[str], name: str = "scenario") -> dict[
             fault = f"byte {error.start} is not UTF-8"
         bound = f"must be {kind}: {fault}"
         raise ParameterError(name, str(path), bound) from None
-    if name == "scenario" and isinstance(data.get("leader"), Mapping):
-        bound = "must be a scenario; a leader and a follower are for hapticclay pair"
-        raise ParameterError(name, str(path), bound)
     data = with_present_names(data)
     arm = data.get("arm")
     if isinstance(arm, Mapping) and isinstance(arm.get("file"), str):
@@ -65,7 +74,21 @@ def read_settings(path: str | os.PathLike[str], name: str = "scenario") -> dict[
 
 def beside(name: str, folder: Path) -> str:
     """A file beside one that names it; else the name as it is, which may be one of the package."""
-    return str(folder / name) if (folder / name).is_file() else name
+    if not (folder / name).is_file():
+        return name
+    plain = os.path.normpath(folder / name)  # without a/.., unless a is a link
+    return plain if os.path.isfile(plain) else str(folder / name)
+
+
+def _from_folder(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Data whose arm has a relative path, which then holds from the folder of the file."""
+    arm = data.get("arm")
+    name = arm.get("file") if isinstance(arm, Mapping) else None
+    if not isinstance(name, str) or os.path.isabs(name) or not os.path.isfile(name):
+        return dict(data)
+    with contextlib.suppress(ValueError):  # on another drive
+        name = os.path.relpath(os.path.realpath(name), os.path.realpath(folder))
+    return {**data, "arm": {**arm, "file": Path(name).as_posix()}}
 
 
 def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -89,7 +112,7 @@ def write_part(
     """Writes the fields of a part that differ from the defaults, whole or not at all."""
     file, units = Path(path), {}
     kind = _file_kind(file, name)
-    data = {**head, **plain_data(part, False, units)}
+    data = _from_folder({**head, **plain_data(part, False, units)}, file.parent)
     text = toml_text(data, units) if kind == "TOML" else json.dumps(data, indent=2) + "\n"
     try:
         raw = text.encode()

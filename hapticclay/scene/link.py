@@ -24,7 +24,8 @@ class Link:
             behind them.
         delay: one-way delays (there, back) [s], 0 to 10; one number for both. Waves are read at
             control samples: their delay counts as the next whole number of samples, at least one.
-        jitter: largest further delay of a packet [s], 0 to 10; the receiver waits for it.
+        jitter: largest further delay of a packet [s], 0 to 10; in theory the receiver waits for it,
+            in runs it takes the newest packet that is there.
         loss: share of packets that is lost, 0 to 0.9; the receiver holds the last one.
         scale: (motion, force): the follower's motion per leader's, and the leader's force per
             follower's; > 0, at most 1e6.
@@ -32,7 +33,7 @@ class Link:
         local_force: (leader, follower) gains of the own measured force, fed to the own motors, 0 to
             1e6: how much lighter each arm is made; with force sensors alone.
         impedance: wave impedance of each joint [N.m.s/rad], > 0, at most 1e9; one number for all;
-            None for the follower's Kd, which matches it: then no wave is reflected.
+            None for the follower's Kd, which matches it: then Kp alone reflects.
         passivity: whether, in runs, an observer and a controller at each end let out no more energy
             than came in at the other one (Ryu, Kwon, Hannaford 2004); theory leaves them out.
         energy: reserve E0 that each of them may let out besides [J], 0 to 1e6; None for 0.01 J.

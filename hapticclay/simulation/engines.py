@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from importlib.metadata import distributions
+from pathlib import Path
 
 from ..errors import ParameterError, choice
 from ..kernel import native
@@ -31,8 +33,18 @@ def remedy(why: str) -> str:
     """What gets the compiled kernel."""
     root = native.PACKAGE.parent
     again = f"pip install -e {root}" if (root / "setup.py").is_file() else "pip install . again"
+    if why == "not built" and _installed_elsewhere():
+        return f"these are the sources: run outside {root}, where the installed one is, or {again}"
     lacks = "compiler" in why or "Python.h" in why
     return f"apt install gcc python3-dev, then {again}" if lacks else again
+
+
+def _installed_elsewhere() -> bool:
+    """Whether Python would import another hapticclay, had it not found this one."""
+    places = (Path(str(d.locate_file("hapticclay"))) for d in distributions(name="hapticclay"))
+    return any(
+        (p / "__init__.py").is_file() and p.resolve() != native.PACKAGE.resolve() for p in places
+    )
 
 
 def made_by() -> str:
@@ -47,7 +59,7 @@ def give_notice(why: str) -> None:
     if not _notice_given:
         _notice_given = True
         print(
-            "hapticclay: Python makes the steps, some 15 times slower: "
+            "hapticclay: Python makes the steps, some 10 times slower: "
             f"no compiled kernel ({why}); {remedy(why)}",
             file=sys.stderr,
         )

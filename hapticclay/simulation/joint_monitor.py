@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..arms.joint_law import JointPD, compensated
-from ..model.operator import NO_HAND
 from ..scene.scenario import Scenario
-from ..theory.client_loop import held_arm
+from ..theory.client_loop import with_hands_of
 from ..theory.joint_gains import joint_loop
 from .monitor import LIMITS, OFTEN, STILL, WHILE, Outcome, at_rest
 
@@ -176,11 +175,9 @@ class JointMonitor:
 
 def is_stable_at_start(scenario: Scenario) -> bool:
     """Whether the loop of the joints is stable at the arm's pose; so is one that is not known."""
-    arm = scenario.file_arm
-    law, (hand, other) = scenario.controller, scenario.operators
-    if not isinstance(law, JointPD) or hand != other:
+    law = scenario.controller
+    if not isinstance(law, JointPD):
         return True
-    linear = held_arm(arm.linear(), hand or NO_HAND)
     delay = scenario.hardware.delay if scenario.hardware else 0.0
-    feeds = compensated(arm, law)
-    return joint_loop(linear, law, scenario.Ts or scenario.dt, delay, feeds).stable()
+    feeds, Ts = compensated(scenario.file_arm, law), scenario.Ts or scenario.dt
+    return joint_loop(with_hands_of(scenario), law, Ts, delay, feeds).stable()

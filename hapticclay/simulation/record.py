@@ -431,6 +431,8 @@ class Record:
         file = file / "record.npz" if os.path.isdir(file) else file
         try:
             check_regular(file)
+            if os.path.isdir(path) and not file.exists():
+                raise ValueError(f"{file.name} is not in this folder")
             if file.is_file() and not zipfile.is_zipfile(file):
                 raise ValueError("give its folder, or its record.npz; this is another file")
             with open(file, "rb") as f, np.load(f, allow_pickle=False) as z:

@@ -16,7 +16,7 @@ from ..arguments import checked, named
 from ..errors import ParameterError
 from ..fields import plain_data
 from ..results import Result
-from ..scene.files import read_settings
+from ..scene.files import file_data
 from ..scene.scenario import Scenario
 from ..scene.virtual_wall import WALL_SCHEMA, WALL_SCHEMA_0_2, VirtualWall
 from ..simulation.record import Record
@@ -190,7 +190,7 @@ def compare_files(
 
 def is_wall_file(path: str | os.PathLike[str]) -> bool:
     """Whether a file is that of a virtual wall."""
-    data = read_settings(path)
+    data = file_data(path)
     return data.get("schema") in (WALL_SCHEMA, WALL_SCHEMA_0_2) or bool(
         WALL_WORDS & {k.split(".")[0] for k in data}
     )

@@ -151,7 +151,7 @@ def wall_lab(quick: bool, tell: Tell) -> Lab:
         (
             "K Ts is nearly the same for all rates. What is it, and why?",
             "How does the limit change with the mass? Try it, then find the mass in the formula.",
-            "Stable without a hand and passive in every hand: why are they so close here?",
+            "Stable without a hand, and passive: why are the two limits so close here?",
         ),
         f"K Ts = {min(product):.4g} to {max(product):.4g} N.s/m, b is {DAMPER:g}",
         {
@@ -212,7 +212,7 @@ def delay_lab(quick: bool, tell: Tell) -> Lab:
     late = [replace(WALL, delay=float(d) * TS) for d in line]
     chart = Chart(
         "delay", "Largest stiffness over the delay",
-        "Stable without a hand, and passive in every hand; lines are theory, marks runs.",
+        "Stable without a hand, and passive; lines are theory, marks runs.",
         "delay [samples]", "largest stiffness K [N/m]",
         (
             curve("stable: b/(Ts/2 + delay)", line, [wall_limits.hulin_limit(w) for w in late]),
@@ -385,8 +385,8 @@ def pair_lab(quick: bool, tell: Tell) -> Lab:
             "(b + 2 Kd)/Kp - Ts from it, and say why low gains carry less than the rule says.",
             "Which of limit and frequency changes with the mass? What changes if all of the delay "
             "is on the way back?",
-            "Wave variables carry any delay. What does the hand pay for it in free motion, and "
-            "what at a wall?",
+            "Wave variables carry any constant delay. What does the hand pay for it in free "
+            "motion, and what at a wall?",
         ),
         f"from Kp = {gains[0]:g} to {Kp:g} N/m: {runs[0]:g} to {runs[-1]:g} ms one way by runs, "
         f"{exact[0]:.4g} to {exact[-1]:.4g} ms exact; they swing at "

@@ -13,6 +13,7 @@ from ..model.constants import TS
 from ..model.flow import Flow
 from ..results import Result
 from ..theory import describing, loop_passivity, relay_cycle, stability_margins
+from ..theory.held_words import hand_words
 from ..theory.loops import TIMING, Loop
 from .boundary import PushedLoop
 from .stability_map import StabilityMap
@@ -109,6 +110,7 @@ class LoopVerdicts(Result):
         answers: the verdicts on the linear loop.
         clay: what theory says where the clay yields; None for viscous clay.
         chart: a map; None for none.
+        assumed: what the verdicts rest on, a sentence each.
     """
 
     written_as = "stability"
@@ -127,6 +129,7 @@ class LoopVerdicts(Result):
     answers: tuple[Answer, ...]
     clay: YieldingClay | None = None
     chart: StabilityMap | YieldMap | None = None
+    assumed: tuple[str, ...] = ()
 
     def headline(self) -> str:
         """The first verdict."""
@@ -151,7 +154,7 @@ class LoopVerdicts(Result):
             parts = [heading, *parts, "", *self.clay.lines()]
             if tables["cycles"]["cycle"]:
                 parts.append(text_table(tables["cycles"], FORMATS, form))
-        return "\n".join(parts)
+        return "\n".join([*parts, *self.assumed])
 
     def figures(self) -> dict[str, Any]:
         """The map."""
@@ -161,6 +164,7 @@ class LoopVerdicts(Result):
         """Verdicts, clay and map."""
         return {
             "verdicts": self.answers,
+            "assumed": self.assumed,
             "clay": self.clay and self.clay.contents(),
             "map": self.chart and fields_of(self.chart),
         }
@@ -177,13 +181,24 @@ def loop_verdicts(loop: PushedLoop, delay: float = 0.0, flow: Flow | None = None
         found = stability_margins.small_gain(linear, equation=n)
         answers.append(_answer(f"small gain, Eq. {n}", found, "right over left side"))
     found = loop_passivity.passivity(linear)
-    answers.append(_answer("passive: stable with every hand", found, "least Re Z [N.s/m]"))
+    answers.append(_answer("passive: stable with every passive hand", found, "least Re Z [N.s/m]"))
+    held = "held clay passive" + " with the hand's damper" * bool(loop.operator)
     for late in (0.0, delay) if delay else (0.0,):
-        question = f"... {1e3 * late:g} ms late" if late else "held clay passive with this hand"
+        question = f"... {1e3 * late:g} ms late" if late else held
         found = loop_passivity.clay_passivity(loop.b, loop.Ts or TS, loop.hand.damper, delay=late)
         answers.append(_answer(question, found, "N.s/m to spare"))
     answers.append(_transparency(linear))
-    return LoopVerdicts(tuple(answers), flow and yielding_clay(linear, flow))
+    about = f"{loop.axis} axis, K = {loop.K:g} 1/kg, clay of {loop.b:g} N.s/m"
+    assumed = (
+        f"{about}, {hand_words(loop.operator)}",
+        stability_margins.LINEAR,
+        "margins, small gain, Re Z and transparency: continuous time, without delay",
+    )
+    return LoopVerdicts(tuple(answers), flow and yielding_clay(linear, flow), assumed=assumed)
+
+
+def _held(loop: PushedLoop) -> str:
+    return "with this hand" if loop.operator else "without a hand"
 
 
 def _answer(question: str, v: Any, what: str, factor: float = 1.0) -> Answer:
@@ -193,7 +208,7 @@ def _answer(question: str, v: Any, what: str, factor: float = 1.0) -> Answer:
 def _limits(loop: PushedLoop, linear: Loop, delay: float) -> list[Answer]:
     """Largest stable K, at once and late, in continuous time and sampled."""
     Ts, late = loop.Ts or TS, f"... {1e3 * delay:g} ms late"
-    timings = {"stable with this hand": {}, f"... sampled every {1e3 * Ts:g} ms": {"Ts": Ts}}
+    timings = {f"stable {_held(loop)}": {}, f"... sampled every {1e3 * Ts:g} ms": {"Ts": Ts}}
     if delay:
         timings |= {late: {"delay": delay}, f"{late}, sampled": {"Ts": Ts, "delay": delay}}
     out = []

@@ -195,8 +195,10 @@ def named_columns(log: Log, given: Mapping[str, str], **meanings: str) -> dict[s
     }
     for key, name in given.items():
         names[key] = log.names[log.place(name, f"columns.{key}")]
-    if len(set(names.values())) < len(names):
-        raise ParameterError("columns", names, "must be different columns")
+    for name in names.values():
+        keys = [key for key in COLUMNS if names.get(key) == name]
+        if len(keys) > 1:
+            raise ParameterError("columns", name, f"is {' and '.join(keys)}: give each its own")
     return {key: names[key] for key in COLUMNS if key in names}
 
 

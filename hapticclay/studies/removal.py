@@ -118,12 +118,12 @@ class Removal:
         square = dx * dx + dy * dy
         x, y = x[None, :], y[:, None]
         if square > 0.0:
-            along = np.clip((x * dx + y * dy) / square, 0.0, 1.0)
+            along = np.minimum(np.maximum((x * dx + y * dy) / square, 0.0), 1.0)
             x, y = x - along * dx, y - along * dy
         wide, high = self.wide[i], self.high[j][:, None]
         away = np.maximum(np.sqrt(x * x + y * y), 1e-9)
         across = np.maximum(np.hypot(x * wide, y * high) / away, 1e-9)  # the cell's size that way
-        cover = np.clip(0.5 + (r - away) / across, 0.0, 1.0)
+        cover = np.minimum(np.maximum(0.5 + (r - away) / across, 0.0), 1.0)
         cut = self.cut[j, i]
         np.maximum(cut, cover, out=cover)
         gained = float(((cover - cut) * self.clay[j, i] * wide * high).sum()) * self.tool.depth
@@ -241,5 +241,5 @@ def _cell_parts(edges: np.ndarray, lines: np.ndarray) -> np.ndarray:
 
 
 def _cells_between(centres: np.ndarray, low: float, high: float) -> slice:
-    begin, end = np.searchsorted(centres, (low, high))
+    begin, end = centres.searchsorted((low, high))
     return slice(int(begin), int(end))

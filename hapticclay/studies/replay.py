@@ -16,6 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..arguments import checked, named
+from ..columns.finding import find
 from ..columns.log import Log, open_log
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
@@ -108,7 +109,9 @@ class Recording:
 
 def recorded(log: Log, columns: Mapping[str, str]) -> Recording:
     """The recording in the columns of a log."""
-    names = {k: columns.get(k, k) for k in COLUMNS if k in columns or k == "t" or _has(log, k)}
+    names = {k: columns.get(k, k) for k in COLUMNS if k in columns or _has(log, k)}
+    if "t" not in names:
+        names["t"] = find(log, "columns.t", "t", "time")
     cells = {key: log.values(name, UNITS[key]) for key, name in names.items()}
     p, f = (_pair(cells, x, y) for x, y in (AXES, ("fx", "fy")))
     if p is None and f is None:

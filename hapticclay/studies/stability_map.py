@@ -161,7 +161,7 @@ def _gain_damping(loop: PushedLoop, columns: int, rows: int, progress: Progress)
     notes = []
     for name, holds in (
         ("small gain (Eq. 13)", small_gain),
-        ("passive: stable with every hand", passive),
+        ("passive: stable with every passive hand", passive),
     ):
         y = [_largest_gain(lambda K, b=b, holds=holds: holds(b, K)) for b in dense]
         if any(y):

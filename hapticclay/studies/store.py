@@ -24,7 +24,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from ..arguments import checked
-from ..errors import ParameterError, Warning
+from ..errors import ParameterError, Warning, needing
 from ..files import MOST_SETTINGS, Unfit, atomic, parse_json, read_bytes, versions
 from .sweep_rows import RESULT_COLUMNS, Notes, column_note
 from .workers import leave_if_imported
@@ -285,12 +285,8 @@ def claimed(plan: P, out: Path) -> Iterator[tuple[P, list[range]]]:
 
     Yields the plan, with the chunk size of the folder if it had none, and the runs to make.
     """
-    try:
+    with needing("a sweep", "pyarrow", "sweep"):
         import pyarrow  # noqa: F401
-    except ImportError:
-        raise ParameterError(
-            "sweep", "pyarrow", "must be installed: pip install 'hapticclay[sweep]'"
-        ) from None
     try:
         out.mkdir(parents=True, exist_ok=True)
         # not through a link: what it names would be emptied
@@ -415,7 +411,8 @@ def read_sweep(out: str | os.PathLike[str]):
     Raises:
         ParameterError: there is no sweep, or a part is damaged or belongs to another sweep.
     """
-    import pyarrow as pa
+    with needing("a sweep", "pyarrow", "sweep"):
+        import pyarrow as pa
 
     files = _part_files(Path(out))
     if not files:

@@ -16,6 +16,7 @@ from .wall import Wall
 
 SOFTEST = 0.03  # first K of the search over that of the linear loop at B = 0, and
 SOFT_BOUNDS = (1e-4, 1e-3)  # its bounds over the largest K of the linear loop
+TOP_POINTS = 17  # of a line, where it falls
 
 
 def theoretical_damping(wall: Wall) -> float:
@@ -58,7 +59,7 @@ def theory_limits(wall: Wall, top: float, grid: Sequence[float]) -> list[Limit]:
         first = next((x for x in grid if x > 0.0), 1.0)
         B += np.linspace(min(grid[0], 0.0), first, 5)[:-1].tolist()
         if top > first:
-            B += [*np.geomspace(first, top, LIMIT_POINTS), *np.linspace(0.5 * top, top, 17)]
+            B += [*np.geomspace(first, top, LIMIT_POINTS), *np.linspace(0.5 * top, top, TOP_POINTS)]
     B, note = np.unique(B).tolist(), wall.exact_note
     if wall.left_out:
         note = f"of the linear loop: {' and '.join(wall.left_out)} left out"

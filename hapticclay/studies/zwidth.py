@@ -367,7 +367,7 @@ def _region(
         box_exact = [exact_limit(w) for w in held]
         box_K = find(held, box_exact, half)
         note = "worst hand of the box, linear loop"
-        limits.append(Limit("any hand of the box", "exact", grid, tuple(box_exact), note))
+        limits.append(Limit("worst hand tried of the box", "exact", grid, tuple(box_exact), note))
     show(1.0)
     verdict, given = BY_GROWTH if linear else BY_REST, (tuple(grid), tuple(K), tuple(exact))
     boxed = (box, tuple(box_K), tuple(box_exact))

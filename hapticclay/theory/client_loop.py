@@ -86,18 +86,28 @@ class Handle:
         return float(1.0 / (self.normal @ np.linalg.inv(self.inertia) @ self.normal))
 
 
-def held_arm(linear: Linear, operator: Operator) -> Linear:
+def with_hand(linear: Linear, hand: Operator | Sequence[Operator]) -> Linear:
     """The arm with a hand at its handle: mass, damper and spring along x, y and z.
 
-    Gravity acts on the mass, too: it is held as the arm's own weight is.
+    Gravity, along z where the masses differ, acts on them, too: they are held as the arm's own
+    weight is.
     """
-    square = linear.jacobian.T @ linear.jacobian
+    hands = [hand] * 3 if isinstance(hand, Operator) else hand
+    J = linear.jacobian
+    mass, damper, spring = (J.T @ (x[:, None] * J) for x in np.array([astuple(h) for h in hands]).T)
+    weight = hands[-1].mass * linear.weight_stiffness
     return linear._replace(
-        inertia=linear.inertia + operator.mass * square,
-        damping=linear.damping + operator.damper * square,
-        stiffness=linear.stiffness + operator.spring * square,
-        gravity_stiffness=linear.gravity_stiffness + operator.mass * linear.weight_stiffness,
+        inertia=linear.inertia + mass,
+        damping=linear.damping + damper,
+        stiffness=linear.stiffness + spring,
+        gravity_stiffness=linear.gravity_stiffness + weight,
     )
+
+
+def with_hands_of(scenario: Scenario) -> Linear:
+    """A scenario's arm from a file, at its pose, with the hand of each axis at its handle."""
+    hands = dict(zip(scenario.axes, scenario.hands, strict=True))
+    return with_hand(scenario.file_arm.linear(), [hands.get(axis, NO_HAND) for axis in "xyz"])
 
 
 @dataclass(frozen=True)
@@ -127,7 +137,7 @@ class JointHandle:
     def of(cls, scenario: Scenario, normal: tuple[float, ...]) -> JointHandle:
         """The handle of a scenario's arm from a file, at its pose."""
         arm = scenario.file_arm
-        linear = held_arm(arm.linear(), scenario.operators[0] or NO_HAND)
+        linear = with_hands_of(scenario)
         stiffness = linear.stiffness
         if not compensated(arm, None):
             stiffness = stiffness + linear.gravity_stiffness
@@ -160,12 +170,14 @@ def client_map(handle: AnyHandle, K: float, B: float, Ts: float, delay: float) -
 
 def holds(handle: AnyHandle, K: float, B: float, Ts: float, delay: float) -> bool:
     """Whether the loop is stable: all modes but rigid motion lie within the unit circle."""
-    return _stable(client_map(handle, K, B, Ts, delay))
+    return bool(_stable(client_map(handle, K, B, Ts, delay)))
 
 
-def _stable(loop: np.ndarray) -> bool:
-    z = np.linalg.eigvals(loop)
-    return bool(np.abs(z[np.abs(z - 1.0) > AT_REST]).max(initial=0.0) < 1.0 + ROUNDING)
+def _stable(loops: np.ndarray) -> np.ndarray:
+    """Whether maps of shape (..., n, n) are stable."""
+    z = np.linalg.eigvals(loops)
+    moving = np.where(np.abs(z - 1.0) > AT_REST, np.abs(z), 0.0)
+    return moving.max(axis=-1) < 1.0 + ROUNDING
 
 
 Sample = Annotated[float, Bound(1e-6, 1.0, "s")]
@@ -184,18 +196,18 @@ def rendered_stiffness_limits(
     handle: AnyHandle, B: Sequence[float], Ts: Sample, delay: Delay = 0.0
 ) -> tuple[float, ...]:
     """Largest stable stiffness by damping of the wall: the Z-width of a program's loop."""
-    dampings = [number("B", b, -1e6, 1e6) for b in B]
+    dampings = np.array([number("B", b, -1e6, 1e6) for b in B])[:, None, None]
     free = client_map(handle, 0.0, 0.0, Ts, delay)  # the loop is linear in K and B
     by_K = client_map(handle, 1.0, 0.0, Ts, delay) - free
     by_B = client_map(handle, 0.0, 1.0, Ts, delay) - free
-    grid = np.geomspace(SOFTEST, STIFFEST, SCANNED).tolist()
+    soft = free + dampings * by_B
 
-    def limit(B: float) -> float:
-        soft = free + B * by_B
-        low, high = roots.first_failure(lambda K: _stable(soft + K * by_K), grid, rtol=1e-9)
-        return low if high < math.inf else math.inf
+    def stable(which: np.ndarray, K: np.ndarray) -> np.ndarray:
+        return _stable(soft[which] + K[:, None, None] * by_K)
 
-    return tuple(map(limit, dampings))
+    grid = np.geomspace(SOFTEST, STIFFEST, SCANNED)
+    low, high = roots.first_failures(stable, len(soft), grid, 1e-9)
+    return tuple(np.where(high < math.inf, low, math.inf).tolist())
 
 
 @checked

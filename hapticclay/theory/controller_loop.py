@@ -170,8 +170,8 @@ def controller_stability(
     The law is linearised around rest; handle, hand and physical clay move exactly between samples,
     under torques that are held and delayed. Velocity by difference, its filter and the force filter
     count; friction, converters, torque limits and the muscle force do not (`left_out`). Gains from
-    1/1000 to 1000 times the own one are searched, 1 % apart; the ends of the band are exact to
-    rounding.
+    1/1000 to 1000 times the own one are searched, 2 % apart, so a narrower window may be
+    missed; the ends of the band are exact to rounding.
 
     Args:
         scenario: the run, with its controller; rest is sought from its start.

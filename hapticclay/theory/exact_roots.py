@@ -4,9 +4,6 @@ Floats are rational numbers. With coefficients of type `Fraction`, sums, product
 roots on each side of the axis have no rounding: a pole or zero on the axis, or 1e-12 beside it,
 counts as what it is. Only the coefficients that were given are rounded. A root that a change of
 their last digits moves onto the axis lies on it `within_rounding`.
-
-A `Polynomial` of rational numbers is slow. Searches take out the common denominator and go on with
-`Integers`.
 """
 
 from __future__ import annotations
@@ -24,79 +21,96 @@ ROUNDING = 2.0**-46  # 64 last digits: products of order 8 of rounded factors
 BITS = 160  # of a real root
 NEAR = 1e-4  # of their size: closer real roots are separated by their common parabola
 
-Integers = list[int]  # coefficients of a polynomial, lowest power first
+
+class Rational(Polynomial):
+    """A polynomial of rational coefficients, kept as integers over one denominator.
+
+    Attributes:
+        integers: lowest power first.
+        common: the denominator, above 0.
+    """
+
+    integers: list[int]
+    common: int
+    symbol = "x"  # type: ignore[assignment]  # `of` does not call the parent's constructor
+
+    @classmethod
+    def of(cls, integers: Sequence[int], common: int = 1) -> Rational:
+        """The polynomial of these integers over a denominator."""
+        n = len(integers)
+        while n > 1 and not integers[n - 1]:
+            n -= 1
+        made = cls.__new__(cls)
+        made.integers, made.common = list(integers[:n]) or [0], common
+        return made
+
+    @property
+    def coef(self) -> np.ndarray:
+        """Coefficients of type `Fraction`, lowest power first."""
+        return np.array([Fraction(x, self.common) for x in self.integers], dtype=object)
+
+    @coef.setter
+    def coef(self, values: Iterable[Any]) -> None:  # pyright: ignore
+        ratios = [Fraction(x).as_integer_ratio() for x in values]
+        self.common = math.lcm(*(below for _, below in ratios))
+        self.integers = [above * (self.common // below) for above, below in ratios]
+
+    def __neg__(self) -> Rational:
+        return self.of([-x for x in self.integers], self.common)
+
+    def __add__(self, other: Any) -> Polynomial:
+        if not isinstance(other, Rational):
+            return Polynomial(self.coef) + other
+        common = math.lcm(self.common, other.common)
+        mine, theirs = common // self.common, common // other.common
+        both = itertools.zip_longest(self.integers, other.integers, fillvalue=0)
+        return self.of([mine * a + theirs * b for a, b in both], common)
+
+    def __sub__(self, other: Any) -> Polynomial:
+        return self + -other
+
+    def __mul__(self, other: Any) -> Polynomial:
+        if not isinstance(other, Rational):
+            return Polynomial(self.coef) * other
+        out = [0] * (len(self.integers) + len(other.integers) - 1)
+        for i, a in enumerate(self.integers):
+            for j, b in enumerate(other.integers):
+                out[i + j] += a * b
+        return self.of(out, self.common * other.common)
 
 
-def exact(p: Polynomial) -> Polynomial:
+def exact(p: Polynomial) -> Rational:
     """The polynomial with rational coefficients."""
-    return rational(p.coef.tolist())
+    return p if isinstance(p, Rational) else rational(p.coef.tolist())
 
 
-def rational(c: Iterable[Any]) -> Polynomial:
+def rational(c: Iterable[Any]) -> Rational:
     """The polynomial of these coefficients as rational numbers."""
-    return Polynomial(np.array([Fraction(x) for x in c] or [Fraction(0)], dtype=object))
+    ratios = [x.as_integer_ratio() for x in c]
+    common = math.lcm(*(below for _, below in ratios))
+    return Rational.of([above * (common // below) for above, below in ratios], common)
 
 
 def value(p: Polynomial, x: Fraction) -> Fraction:
     """p(x) in exact arithmetic, which `Polynomial` leaves where it maps its domain."""
-    c, common = over_denominator(p)
-    return at(c, x) / common
+    p = exact(p)
+    above, below = x.as_integer_ratio()
+    out, power = 0, 1  # of integers: one division at the end
+    for c in reversed(p.integers):
+        out = out * above + c * power
+        power *= below
+    return Fraction(out * below, p.common * power)
+
+
+def derivative(p: Polynomial) -> Rational:
+    """p' in exact arithmetic."""
+    p = exact(p)
+    return Rational.of(_derivative(p.integers), p.common)
 
 
 def approximate(p: Polynomial) -> Polynomial:
     """The polynomial with coefficients of type float."""
     return Polynomial(p.coef.astype(float))
-
-
-# ---- polynomials with integer coefficients -------------------------------------------------------
-
-
-def over_denominator(p: Polynomial) -> tuple[Integers, int]:
-    """Coefficients over their common denominator, without zeros of the highest powers."""
-    c = [Fraction(x).as_integer_ratio() for x in p.coef.tolist()]
-    while c and not c[-1][0]:
-        c.pop()
-    common = math.lcm(*(x[1] for x in c))
-    return [x[0] * (common // x[1]) for x in c], common
-
-
-def at(c: Sequence[int], x: Fraction) -> Fraction:
-    """Value at x."""
-    out, power = 0, 1  # one division at the end
-    for i in reversed(c):
-        out = out * x.numerator + i * power
-        power *= x.denominator
-    return Fraction(out * x.denominator, power)
-
-
-def product(a: Sequence[int], b: Sequence[int]) -> Integers:
-    """a b."""
-    out = [0] * (len(a) + len(b) - 1) if a and b else []
-    for i, x in enumerate(a):
-        for j, y in enumerate(b, i):
-            out[j] += x * y
-    return out
-
-
-def combined(m: int, a: Sequence[int], n: int, b: Sequence[int]) -> Integers:
-    """m a + n b."""
-    return [m * x + n * y for x, y in itertools.zip_longest(a, b, fillvalue=0)]
-
-
-def lowest(c: Sequence[int]) -> int:
-    """The lowest power whose coefficient is not zero; 0 if there is none."""
-    return next((i for i, x in enumerate(c) if x), 0)
-
-
-def derivative(c: Sequence[int]) -> Integers:
-    """The derivative."""
-    return [i * x for i, x in enumerate(c)][1:]
-
-
-def alternating(c: Sequence[int]) -> tuple[Integers, Integers]:
-    """The value at j omega is even + j omega odd, both polynomials in omega^2."""
-    even, odd = ([x if i % 2 == 0 else -x for i, x in enumerate(c[j::2])] for j in (0, 1))
-    return even, odd
 
 
 # ---- sides of the axis ---------------------------------------------------------------------------
@@ -109,12 +123,8 @@ def roots_right(p: Polynomial) -> tuple[int, int]:
     each on its right. Sturm's chain counts the turns (Gantmacher, The Theory of Matrices, 1959, ch.
     15).
     """
-    return sides(over_denominator(p)[0])
-
-
-def sides(c: Sequence[int]) -> tuple[int, int]:
-    """As `roots_right`, of a polynomial with these coefficients."""
-    c = _without_zeros(c)
+    c = _integers(p)
+    c = c[next(i for i, x in enumerate(c) if x) :]
     n = len(c) - 1
     parts = [[0] * (n + 1), [0] * (n + 1)]  # p(j omega) = parts[0] + j parts[1]
     for i, x in enumerate(c):
@@ -123,13 +133,18 @@ def sides(c: Sequence[int]) -> tuple[int, int]:
     left_excess = _real_index(chain) if n % 2 else -_real_index(chain)
     on, common = 0, chain[-1]
     while len(common) > 1:  # roots in pairs s, -s: the real ones of the chain lie on the axis
-        shared = _sturm_chain(common, derivative(common))
+        shared = _sturm_chain(common, _derivative(common))
         on += _real_index(shared)
         common = shared[-1]
     return (n - on - left_excess) // 2, on
 
 
-def _primitive(c: Sequence[int]) -> Integers:
+def _integers(p: Polynomial) -> list[int]:
+    """Coefficients, lowest power first, over a common denominator and without common factors."""
+    return _primitive(exact(p).integers)
+
+
+def _primitive(c: Sequence[int]) -> list[int]:
     """Coefficients without common factors and without zeros of the highest powers."""
     n = len(c)
     while n and not c[n - 1]:
@@ -138,7 +153,11 @@ def _primitive(c: Sequence[int]) -> Integers:
     return [x // divisor for x in c[:n]]
 
 
-def _sturm_chain(f: Sequence[int], g: Sequence[int]) -> list[Integers]:
+def _derivative(c: Sequence[int]) -> list[int]:
+    return [i * x for i, x in enumerate(c)][1:]
+
+
+def _sturm_chain(f: Sequence[int], g: Sequence[int]) -> list[list[int]]:
     """f, g and the remainders with their signs changed; the last is their common divisor."""
     chain, following = [_primitive(f)], _primitive(g)
     while following:
@@ -166,30 +185,31 @@ def _real_index(chain: Sequence[Sequence[int]]) -> int:
 # ---- values on the axis --------------------------------------------------------------------------
 
 
-def axis_parts(p: Polynomial) -> tuple[Polynomial, Polynomial]:
+def axis_parts(p: Polynomial) -> tuple[Rational, Rational]:
     """p(j omega) = even + j omega odd, both polynomials in omega^2."""
-    c = exact(p).coef
+    p = exact(p)
+    c = p.integers
     even, odd = ([x if i % 2 == 0 else -x for i, x in enumerate(c[j::2])] for j in (0, 1))
-    return rational(even), rational(odd)
+    return Rational.of(even, p.common), Rational.of(odd, p.common)
 
 
-def within_rounding(c: Sequence[int], x: Fraction) -> bool:
-    """Whether a change of coefficients in their last digits makes c zero at omega^2 = x."""
-    even, odd = alternating(c)
-    sizes = ([abs(i) for i in part] for part in (even, odd))
-    least, most = (at(e, x) ** 2 + x * at(o, x) ** 2 for e, o in ((even, odd), sizes))
+def within_rounding(p: Polynomial, x: Fraction) -> bool:
+    """Whether a change of its coefficients in their last digits makes p zero at omega^2 = x."""
+    even, odd = axis_parts(p)
+    sizes = (Rational.of([abs(x) for x in part.integers], part.common) for part in (even, odd))
+    least, most = (value(e, x) ** 2 + x * value(o, x) ** 2 for e, o in ((even, odd), sizes))
     return least <= Fraction(ROUNDING) ** 2 * most
 
 
 def axis_roots(p: Polynomial) -> list[tuple[Fraction, int]]:
     """Pairs of roots of p on the imaginary axis within rounding: omega^2, and their side of it."""
-    c, _ = over_denominator(p)
-    (even, odd), (slope_even, slope_odd) = alternating(c), alternating(derivative(c))
+    even, odd = axis_parts(p)
+    slope_even, slope_odd = axis_parts(derivative(exact(p)))
     found: list[tuple[Fraction, int]] = []
-    for x in sorted([*positive_zeros(even), *positive_zeros(odd)]):
-        if within_rounding(c, x) and not (found and x - found[-1][0] <= Fraction(NEAR) * x):
-            beside = at(even, x) * at(slope_even, x)  # Re p p'*
-            beside += x * at(odd, x) * at(slope_odd, x)
+    for x in sorted([*positive_roots(even), *positive_roots(odd)]):
+        if within_rounding(p, x) and not (found and x - found[-1][0] <= Fraction(NEAR) * x):
+            beside = value(even, x) * value(slope_even, x)  # Re p p'*
+            beside += x * value(odd, x) * value(slope_odd, x)
             found.append((x, (beside < 0) - (beside > 0)))
     return found
 
@@ -219,44 +239,42 @@ def unit_crossings(n: Polynomial, d: Polynomial) -> tuple[np.ndarray, np.ndarray
 
 def positive_roots(p: Polynomial) -> list[Fraction]:
     """Positive real roots of p to `BITS` bits, ascending, each once."""
-    return positive_zeros(over_denominator(p)[0])
-
-
-def positive_zeros(c: Sequence[int]) -> list[Fraction]:
-    """As `positive_roots`, of a polynomial with these coefficients."""
-    f, found = _without_zeros(c), set()
+    f, found = Rational.of(_trimmed(p)), set()
     for group in _groups(_rough_roots(f)):
         found.update(_separated(f, group))
     return sorted(found)
 
 
-def _without_zeros(c: Sequence[int]) -> Integers:
-    """Coefficients without common factors and without the zeros at both ends."""
-    c = _primitive(c)
-    return c[lowest(c) :]
-
-
-def _rough_roots(c: Sequence[int]) -> list[Fraction]:
+def _rough_roots(p: Rational) -> list[Fraction]:
     """Real positive roots in floats; imaginary parts up to 1e-6 count as rounding."""
-    y, scale = _scaled_roots(c)
+    y, scale = _scaled_roots(p)
     y = y[(np.abs(y.imag) <= 1e-6 * np.abs(y)) & (y.real > 0.0)].real
     return sorted(Fraction(x) * scale for x in y.tolist())
 
 
-def _scaled_roots(c: Sequence[int]) -> tuple[np.ndarray, Fraction]:
-    """Roots in floats, in the unit that balances the first and last coefficient, neither zero."""
-    last = len(c) - 1
-    if last < 1:
+def _scaled_roots(p: Polynomial) -> tuple[np.ndarray, Fraction]:
+    """Roots other than zero in floats, in the unit that balances the first and last coefficient."""
+    c = _trimmed(p)
+    if len(c) < 2:
         return np.empty(0), Fraction(1)
-    power = round((c[0].bit_length() - c[-1].bit_length()) / last)
-    scaled = [x << power * (i if power > 0 else i - last) for i, x in enumerate(c)]
+    last = len(c) - 1
+    bits = round((c[0].bit_length() - c[-1].bit_length()) / last)
+    shifts = (bits * i if bits > 0 else -bits * (last - i) for i in range(last + 1))
+    scaled = [x << shift for x, shift in zip(c, shifts, strict=True)]
     most = max(map(abs, scaled))
-    return np.roots([x / most for x in scaled[::-1]]), Fraction(2) ** power
+    return np.roots([x / most for x in scaled[::-1]]), Fraction(2) ** bits
+
+
+def _trimmed(p: Polynomial) -> list[int]:
+    """Coefficients over a common denominator, without the zeros at both ends."""
+    c = exact(p).integers
+    kept = [i for i, x in enumerate(c) if x]
+    return c[kept[0] : kept[-1] + 1] if kept else []
 
 
 def approximate_roots(p: Polynomial) -> np.ndarray:
     """Roots other than zero in floats, of coefficients of any size."""
-    z, scale = _scaled_roots(_without_zeros(over_denominator(p)[0]))
+    z, scale = _scaled_roots(p)
     return z * float(scale)
 
 
@@ -265,8 +283,9 @@ def root_sizes(p: Polynomial) -> tuple[float, float]:
 
     Fujiwara's bounds, which no rounding of roots loses.
     """
-    c = _without_zeros(over_denominator(p)[0])
-    logs = [math.log(abs(x)) if x else -math.inf for x in c]
+    c = _trimmed(p)
+    ratios = (Fraction(abs(x), exact(p).common).as_integer_ratio() for x in c)
+    logs = [math.log(x) - math.log(below) if x else -math.inf for x, below in ratios]
     last = len(c) - 1
     small = min((logs[0] - x) / i for i, x in enumerate(logs) if i)
     large = max((x - logs[-1]) / (last - i) for i, x in enumerate(logs[:-1]))
@@ -284,15 +303,15 @@ def _groups(x: Sequence[Fraction]) -> list[list[Fraction]]:
     return out
 
 
-def _separated(f: Integers, group: Sequence[Fraction]) -> list[Fraction]:
+def _separated(f: Rational, group: Sequence[Fraction]) -> list[Fraction]:
     """The roots of f from approximate ones, which lie close together."""
     if len(group) == 2:
         middle = _shortened((group[0] + group[1]) / 2)
         g = derivative(f)
-        here, slope, bend = (at(p, middle) for p in (f, g, derivative(g)))
+        at, slope, bend = (value(p, middle) for p in (f, g, derivative(g)))
         if not bend:
             return [middle]
-        square = (slope / bend) ** 2 - 2 * here / bend  # of the distance from the parabola's axis
+        square = (slope / bend) ** 2 - 2 * at / bend  # of the distance from the parabola's axis
         if square < 0:  # a pair of complex roots, or a double root but for rounding
             return [middle] if -square <= (Fraction(1e-9) * middle) ** 2 else []
         apart = _square_root(square)
@@ -300,14 +319,14 @@ def _separated(f: Integers, group: Sequence[Fraction]) -> list[Fraction]:
     return [_polished(f, x) for x in group] if len(group) < 3 else list(group)
 
 
-def _polished(f: Integers, x: Fraction) -> Fraction:
+def _polished(f: Rational, x: Fraction) -> Fraction:
     """The root of f near x, by Newton's method; x where that leaves its neighbourhood."""
     slope, start = derivative(f), x
     for _ in range(8):
-        down = at(slope, x)
+        down = value(slope, x)
         if not down:
             return x
-        step = at(f, x) / down
+        step = value(f, x) / down
         if abs(x - step - start) > Fraction(NEAR) * start:
             return start
         x = _shortened(x - step)

@@ -86,8 +86,9 @@ def slopes(edge: Edge, over: Sequence[Number]) -> np.ndarray:
     for number in over:
         found = [_open(edge.at(p, **change), theta) for change in number.changes]
         by_a = sum(w * x for w, x in zip(number.weights, found, strict=True))
-        out.append(-(by_a * np.conj(by_theta)).imag / (by_p * np.conj(by_theta)).imag)
-    return np.array(out)
+        out.append(-(by_a * np.conj(by_theta)).imag)
+    below = (by_p * np.conj(by_theta)).imag
+    return np.array(out) / below if below else np.full(len(out), math.nan)
 
 
 def _open(loop: JointLoop, theta: float) -> complex:

@@ -16,6 +16,7 @@ import numpy as np
 ROUNDS = 60  # of the refinement
 EXACT = 1e-14  # imaginary part over size of an eigenvalue that counts as real
 REAL = 1e-7  # the same where refinement ended
+NO_SIZE = 1e-300  # of an eigenvalue of a response that is 0, as where nothing is held
 
 Response = Callable[[np.ndarray], np.ndarray]  # angles (m,) -> matrices (m, k, k)
 Sign = Callable[[np.ndarray], np.ndarray]  # eigenvalues -> real numbers whose zeros are sought
@@ -45,6 +46,11 @@ def zeros(response: Response, angles: np.ndarray, sign: Sign) -> tuple[np.ndarra
     i, branch = np.nonzero(below[:-1] != below[1:])
     ends = angles[i], angles[i + 1]
     return _refined(response, sign, ends, (values[i, branch], values[i + 1, branch]))
+
+
+def log_size(values: np.ndarray) -> np.ndarray:
+    """Logarithm of the sizes of eigenvalues, 0 on the unit circle; finite for those that are 0."""
+    return np.log(np.maximum(np.abs(values), NO_SIZE))
 
 
 def branches(values: np.ndarray) -> np.ndarray:

@@ -14,20 +14,22 @@ from ..arguments import checked, named
 from ..arms.joint_law import JointPD, checked_law, compensated
 from ..arms.mechanism import Linear
 from ..arms.mjcf_arm import MjcfArm
+from ..display import time_words
 from ..results import Result, Tables
 from . import joint_changes, joint_crossings, roots
 from .client_loop import Delay, Sample
 from .joint_changes import Edge, Number, slopes
 from .joint_crossings import Crossing
 from .joint_families import Circle, Family, Limit
-from .joint_loop import JointLoop, grid, timing_words
+from .joint_loop import JointLoop, grid, is_stable, timing_words
 
 LATEST = 2.0  # [s] largest added delay that is looked for
 SLOWEST = 1.0  # [s] largest control sample that is looked for
 PERIODS = 120  # control samples tried, evenly in their logarithm
 BEYOND = 1e-6  # share beyond a limit at which its motion is looked at
 ROUNDS = 30  # of the search for a delay
-IGNORED = "joint friction, encoder counts, torque limits, backlash and elastic links: left out"
+SMALL = "small motions about the pose"
+IGNORED = "joint friction, counts, converters, torque limits, backlash, elastic links: left out"
 
 
 @named
@@ -123,8 +125,8 @@ class JointLimits(Result):
 
     @property
     def stable(self) -> bool:
-        """Whether the present gains are stable."""
-        return self.radius < 1.0
+        """Whether the present gains are stable, to rounding."""
+        return bool(is_stable(self.radius))
 
     def headline(self) -> str:
         """The verdict in one line."""
@@ -139,8 +141,14 @@ class JointLimits(Result):
             if math.isinf(self.scale)
             else f"{self.scale:.4g} times ({self.buzz:.3g} Hz)"
         )
-        left = "any" if math.isinf(self.delay_left) else f"{1e3 * self.delay_left:.3g} ms"
-        return f"stable at {at}: all Kp up to {more}, delay left {left}, {self.joint} first"
+        return f"stable at {at}: all Kp up to {more}, delay left {self._left}, {self.joint} first"
+
+    @property
+    def _left(self) -> str:
+        """Delay that may be added, in words."""
+        if math.isinf(self.delay_left):
+            return f"more than {LATEST:g} s"
+        return time_words(self.delay_left)
 
     def _way_back(self) -> str:
         if math.isnan(self.scale):
@@ -166,11 +174,10 @@ class JointLimits(Result):
         if math.isinf(self.scale):
             return "nothing: no factor of Kp buzzes"
         if self.delay:
-            left = "any" if math.isinf(self.delay_left) else f"{1e3 * self.delay_left:.3g} ms"
             shorter = min(self.delay, 1e-3)
             gain = -shorter * self.scale_per_delay
             less = f"{1e3 * shorter:.3g} ms less raises the factor of all Kp by {gain:.3g}"
-            return f"delay ({left} left): {less}"
+            return f"delay ({self._left} left): {less}"
         return f"rate ({1.0 / self.Ts:.4g} Hz, at least {self.slowest_rate:.4g} Hz needed)"
 
     def tables(self) -> Tables:
@@ -435,7 +442,9 @@ class Study:
 
     def assumed(self) -> tuple[str, ...]:
         """What the verdict rests on, a sentence each."""
-        return (*self.arm.notes, gravity_words(self.compensated), IGNORED)
+        held = f"{SMALL}, no hand at the handle"
+        law = f"law: {self.law.words}"
+        return (*self.arm.notes, gravity_words(self.compensated), law, held, IGNORED)
 
 
 # ---- present motion, delay and rate --------------------------------------------------------------
@@ -486,7 +495,7 @@ def samples_left(loop: JointLoop, before: float = 0.0) -> Crossing:
         loop: the loop.
         before: how far a crossing may lie before the present delay [samples].
     """
-    theta, x = joint_crossings.zeros(loop.opened, grid(loop), lambda values: np.log(np.abs(values)))
+    theta, x = joint_crossings.zeros(loop.opened, grid(loop), joint_crossings.log_size)
     late = np.angle(x)[:, None] / theta[:, None] + np.arange(-1, 3) * 2.0 * math.pi / theta[:, None]
     late = np.where(late >= -before, late, math.inf)
     if not len(theta):

@@ -17,6 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..arms import joint_law
+from ..display import time_words
 from ..errors import ParameterError
 from . import linear_loop
 
@@ -75,7 +76,11 @@ class JointLoop:
         a = np.zeros((3 * n, 3 * n))
         a[:n, n : 2 * n] = np.eye(n)
         a[n : 2 * n] = np.hstack([-inverse @ self.stiffness, -inverse @ self.damping, inverse])
-        e = expm(a * t)
+        with np.errstate(over="ignore", invalid="ignore"):
+            e = expm(a * t)
+        if not np.isfinite(e).all():
+            bound = f"must be smaller at this rate: motion over {t:g} s is beyond all numbers"
+            raise ParameterError("damping", float(np.abs(self.damping).max()), bound)
         return e[: 2 * n, : 2 * n], e[: 2 * n, 2 * n :]
 
     @cached_property
@@ -153,7 +158,7 @@ class JointLoop:
 
     def stable(self) -> bool:
         """Whether all motion but rest decays."""
-        return self.radius() < 1.0 + ROUNDING
+        return bool(is_stable(self.radius()))
 
     # ---- on the unit circle
 
@@ -220,19 +225,33 @@ class JointLoop:
         return self
 
 
+def is_stable(radius: Any) -> Any:
+    """Whether loops with these largest eigenvalues are stable, to rounding."""
+    return radius < 1.0 + ROUNDING
+
+
 def timing_words(Ts: float, delay: float) -> str:
     """Rate and delay, as headlines say them."""
-    return f"{1.0 / Ts:.4g} Hz, {1e3 * delay:.3g} ms late"
+    return f"{1.0 / Ts:.4g} Hz, {time_words(delay)} late"
 
 
 def grid(loop: Any) -> np.ndarray:
     """Angles of a search, > 0 and <= pi: even, by factors, and dense at resonances."""
+    return np.unique(np.concatenate([even_grid(loop), resonant_grid(loop)]))
+
+
+def even_grid(loop: Any) -> np.ndarray:
+    """Angles of a search that depend on whole samples of delay alone, > 0 and <= pi."""
     even = np.linspace(0.0, math.pi, 400 * (1 + loop.samples_late // 8) + 1)[1:]
-    found: list[Any] = [even, np.geomspace(1e-6, 1.0, 400)]
-    if loop.states <= MOST_STATES // 3:
-        found.append(near_resonances(np.linalg.eigvals(loop.map())))
-    every = np.concatenate(found)
-    return np.unique(every[(every > 0.0) & (every <= math.pi)])
+    return np.concatenate([even, np.geomspace(1e-6, 1.0, 400)])
+
+
+def resonant_grid(loop: Any) -> np.ndarray:
+    """Angles of a search around eigenvalues near the unit circle, > 0 and <= pi."""
+    if loop.states > MOST_STATES // 3:
+        return np.empty(0)
+    near = near_resonances(np.linalg.eigvals(loop.map()))
+    return near[(near > 0.0) & (near <= math.pi)]
 
 
 def near_resonances(z: np.ndarray) -> np.ndarray:

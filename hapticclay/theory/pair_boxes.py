@@ -17,6 +17,7 @@ from ..model.operator import Operator
 from ..results import Result, Tables
 from ..scene.pair import Contact, Pair, touched_load
 from .hand_boxes import Box
+from .pair_onset import LATEST
 from .pair_verdict import Study
 
 CORNERS = "the corners and random members: no proof for those between"
@@ -58,7 +59,7 @@ class PairHands(Result):
         """The result in one line."""
         share = float(np.mean(self.stable))
         least = 1e3 * float(self.delay.min())
-        late = "any delay" if math.isinf(least) else f"{least:.3g} ms"
+        late = f"any delay up to {LATEST:g} s" if math.isinf(least) else f"{least:.3g} ms"
         return (
             f"{self.kind}: stable in {share:.0%} of {len(self.stable)} hands; the worst has {late}"
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -17,8 +18,8 @@ from ..scene import pair as pairs
 from ..scene.link import ENDS
 from ..scene.pair import Pair
 from .architectures import ARCHITECTURES
-from .client_loop import held_arm
-from .joint_gains import IGNORED, joint_loop
+from .client_loop import with_hand
+from .joint_gains import IGNORED, SMALL, joint_loop
 from .joint_loop import JointLoop
 from .linear_loop import whole_samples
 from .pair_end import End, Load
@@ -97,6 +98,7 @@ class Build:
             out += [f"{name}: {note}" for note in pairs.notes_of(arm)]
         if pair.leader is pair.follower:
             out = [f"both arms: {note}" for note in pairs.notes_of(pair.leader)]
+        out += self._law_words()
         for i, name in enumerate(ENDS):
             words = contact.left_out(pair.touched[i]), pair_hardware.left_out(pair, i)
             out += [f"{name}: {x}" for x in words if x]
@@ -104,14 +106,24 @@ class Build:
             out.append("jitter and loss: as the constant delay that they come to")
         if pair.link.passivity:
             out.append("passivity controllers: left out, they are not linear; runs have them")
-        return (*out, IGNORED)
+        return (*out, f"{SMALL}s", IGNORED)
+
+    def _law_words(self) -> list[str]:
+        leader, follower = self.pair.laws
+        if not self.architecture.leader_law:
+            return [f"law of the follower: {follower.words}; the leader's gains take no part"]
+        if leader is follower:
+            return [f"both laws: {leader.words}"]
+        return [f"law of the leader: {leader.words}", f"law of the follower: {follower.words}"]
 
 
 def _scaled(pair: Pair, gain: float) -> Pair:
     """The pair with a factor on Kp of both laws."""
 
     def stiffer(law: JointPD) -> JointPD:
-        return replace(law, Kp=tuple(gain * x for x in law.Kp))
+        made = copy.copy(law)  # a factor that is tried may be beyond the bound of what is given
+        object.__setattr__(made, "Kp", tuple(gain * x for x in law.Kp))
+        return made
 
     laws = [stiffer(law) for law in pair.laws]
     return replace(pair, law=laws[0], follower_law=laws[1])
@@ -128,7 +140,7 @@ def _carried(pair: Pair, i: int) -> tuple[Linear, Load]:
     J, hand = linear.jacobian, hand or NO_HAND
     square = J.T @ J
     met = [J.T @ x @ J for x in pairs.touched_load(pair, i)]
-    held = held_arm(linear, hand)
+    held = with_hand(linear, hand)
     load = Load(
         hand.mass * square + met[0], hand.damper * square + met[1], hand.spring * square + met[2]
     )

@@ -27,7 +27,6 @@ TURN = 1e-6  # of an angle: of differences
 EVEN, BY_FACTORS = 300, 300  # angles of the search
 REAL = 1e-9  # imaginary part over size of an eigenvalue that counts as real
 AXIS = 1e-6  # of a sample: how long an eigenvalue on the negative axis is one
-NO_SIZE = 1e-300
 AROUND = 9  # angles around an edge of another loop
 TOPS, REFINED = 16, 30  # eigenvalues that are refined, and rounds of it
 
@@ -78,7 +77,7 @@ class Delays:
     @cached_property
     def _crossings(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles at which an eigenvalue of H has size 1, its argument, and how its size moves."""
-        theta, x = joint_crossings.zeros(self.loop.around, self.angles, _log_size)
+        theta, x = joint_crossings.zeros(self.loop.around, self.angles, joint_crossings.log_size)
         slope = np.array([self._slope(*each) for each in zip(theta, x, strict=True)])
         return theta, np.angle(x), slope
 
@@ -126,7 +125,7 @@ class Delays:
         here = self.loop.drag()
         later = self.loop.between(self.loop.there + 1, self.loop.back).drag()
         # a direction without resistance at any delay, as of an arm that nothing holds, has no edge
-        none = max(FREE, NO_DRAG / max(float(np.linalg.norm(here, 2)), NO_SIZE))
+        none = max(FREE, NO_DRAG / max(float(np.linalg.norm(here, 2)), joint_crossings.NO_SIZE))
         if none >= 1.0:
             return []
         values = np.linalg.eigvals(np.linalg.pinv(here, rcond=none) @ (here - later))
@@ -169,7 +168,7 @@ class Delays:
             found = self._of_steady_motion() or [edge]
             return min(found, key=lambda x: abs(x.samples - edge.samples))
         angles = np.unique(np.minimum(edge.theta * np.linspace(0.9, 1.1, AROUND), math.pi))
-        theta, x = joint_crossings.zeros(self.loop.around, angles, _log_size)
+        theta, x = joint_crossings.zeros(self.loop.around, angles, joint_crossings.log_size)
         if not len(theta):
             return edge
         turns = np.round((edge.samples * theta - np.angle(x)) / (2.0 * math.pi))
@@ -182,11 +181,13 @@ class Delays:
 
         With many samples eigenvalues lie near |z| = |eigenvalue of H|^(1/N), dense along the
         circle: where the phase of z^N fits. The largest, and those on the real axis, are refined by
-        z = (eigenvalue of H)^(1/N).
+        z = (eigenvalue of H)^(1/N). Where nothing goes around, as of a force measured in free
+        motion, they are those of both ends.
         """
         starts = sorted(self._starts(samples), key=lambda x: -abs(x[1]))[:TOPS]
         found = [_refined(self.loop, *start, samples) for start in starts]
         found += self._on_axis(samples)
+        found = found or self.loop.open_poles().tolist()
         return max((z for z in found if abs(z - 1.0) > AT_REST), key=abs, default=0j)
 
     def _starts(self, samples: float) -> list[tuple[complex, complex, int]]:
@@ -196,7 +197,8 @@ class Delays:
         for branch in values.T:
             turns = (samples * self.angles - np.unwrap(np.angle(branch))) / (2.0 * math.pi)
             for i, (a, b) in enumerate(itertools.pairwise(turns.tolist())):
-                for k in range(math.ceil(a), math.floor(b) + 1):
+                some = abs(branch[i]) > joint_crossings.NO_SIZE
+                for k in range(math.ceil(a), math.floor(b) + 1) if some else ():
                     theta = float(np.interp(k, (a, b), self.angles[i : i + 2]))
                     out.append((cmath.exp(1j * theta), complex(branch[i]), k))
         return out
@@ -208,7 +210,7 @@ class Delays:
         for z in (1.0 - off, 1.0 + off):
             values = np.linalg.eigvals(self.loop.around(-1j * np.log(z.astype(complex))))
             values = joint_crossings.branches(values)
-            gap = _log_size(values) - samples * np.log(z)[:, None]
+            gap = joint_crossings.log_size(values) - samples * np.log(z)[:, None]
             real = (np.abs(values.imag) <= REAL * np.abs(values)) & (values.real > 0.0)
             below = gap < 0.0  # a zero on the grid counts once
             i, branch = np.nonzero((below[:-1] != below[1:]) & real[:-1] & real[1:])
@@ -222,16 +224,10 @@ def _refined(loop: PairLoop, z: complex, x: complex, turns: int, samples: float)
     for _ in range(REFINED):
         values = np.linalg.eigvals(loop.around(np.array([-1j * cmath.log(z)])))[0]
         x = complex(values[np.argmin(np.abs(values - x))])
-        argument = cmath.phase(x)
+        argument, size = cmath.phase(x), math.log(abs(x))
         extra = round((samples * cmath.phase(z) - argument) / (2.0 * math.pi)) if turns else 0
-        before, z = (
-            z,
-            cmath.exp((math.log(abs(x)) + 1j * (argument + 2.0 * math.pi * extra)) / samples),
-        )
+        turned = argument + 2.0 * math.pi * extra
+        before, z = z, cmath.exp((size + 1j * turned) / samples)
         if abs(z - before) <= 1e-14:
             break
     return z
-
-
-def _log_size(values: np.ndarray) -> np.ndarray:
-    return np.log(np.maximum(np.abs(values), NO_SIZE))

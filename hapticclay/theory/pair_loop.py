@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import ParameterError
-from .joint_loop import FREE, MOST_STATES, ROUNDING
+from .joint_loop import FREE, MOST_STATES, is_stable
 from .pair_end import End
 
 NO_DRAG = 1e-12  # of balanced equations
@@ -125,7 +125,7 @@ class PairLoop:
 
     def stable(self) -> bool:
         """Whether all motion but rest decays."""
-        return self.radius() < 1.0 + ROUNDING
+        return bool(is_stable(self.radius()))
 
     # ---- rest, and steady motion
 

@@ -14,6 +14,7 @@ from ..errors import Bound, ParameterError
 from ..results import Result, Tables
 from ..scene.link import KINDS, Link
 from ..scene.pair import Pair
+from .held_words import pair_words
 from .pair_build import Build
 from .pair_delays import Delays
 from .pair_onset import LATEST, onset
@@ -94,7 +95,7 @@ def pair_map(
         pair: two arms, their laws and the link between them.
         gains: number of factors.
         delays: number of delays, from none on.
-        longest: largest one-way delay [s], at most 2; None for twice the pair's limit.
+        longest: largest one-way delay [s], at most 2; None for twice the median of the limits.
 
     Raises:
         ParameterError: as `pair_limits`.
@@ -115,7 +116,7 @@ def pair_map(
         limits,
         np.array(buzz),
         0.5 * sum(build.delays),
-        build.assumed(),
+        (pair_words(pair), *build.assumed()),
     )
 
 
@@ -138,6 +139,7 @@ class PairComparison(Result):
         kinds: kinds of the link, shape (m,).
         limits: what the pair carries with each; None where it is refused.
         refused: why, by kind.
+        assumed: what the verdicts rest on, a sentence each.
     """
 
     drawn_by = "hapticclay.views.pair_plots:comparison_plot"
@@ -147,6 +149,7 @@ class PairComparison(Result):
     kinds: tuple[str, ...]
     limits: tuple[PairLimits | None, ...]
     refused: dict[str, str]
+    assumed: tuple[str, ...] = ()
 
     def headline(self) -> str:
         """The comparison in one line."""
@@ -154,8 +157,9 @@ class PairComparison(Result):
         return f"stable as it is: {', '.join(held) or 'none'}"
 
     def remarks(self) -> Sequence[str]:
-        """What was refused."""
-        return [self.headline(), *(f"{kind}: {why}" for kind, why in self.refused.items())]
+        """What was refused, and what the verdicts rest on."""
+        why = [f"{kind}: {why}" for kind, why in self.refused.items()]
+        return [self.headline(), *why, *self.assumed]
 
     def tables(self) -> Tables:
         """Verdict, delay and motion of each architecture."""
@@ -200,7 +204,9 @@ def compare_links(pair: Pair) -> PairComparison:
                 raise
             limits.append(None)
             refused[kind] = str(error)
-    return PairComparison(KINDS, tuple(limits), refused)
+    felt = pair_words(replace(pair, link=_link(pair.link, "position-force")))
+    late = f"largest delay: looked for up to {LATEST:g} s, both ways alike"
+    return PairComparison(KINDS, tuple(limits), refused, (felt, late, *Build(pair).assumed()))
 
 
 def _link(link: Link, kind: Any) -> Link:

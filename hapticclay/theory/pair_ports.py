@@ -1,4 +1,4 @@
-"""What a hand feels through a pair, and whether any passive hand and object leave it stable.
+"""What a hand feels through a pair, and whether it is absolutely stable by Llewellyn's criterion.
 
 A pair is a two-port: forces on the handles of leader and follower, and their rates. Its admittance
 Y at a frequency, of sines between samples, gives all: impedance felt in free motion, against a wall
@@ -30,7 +30,6 @@ POINTS = 400
 AT = 1.0  # [Hz] at which mass, damping and stiffness are stated
 THREE_DB = 10.0**0.15  # factor of an amplitude
 STIFF = 1e12  # of a wall: no admittance
-SIDEBANDS = "sidebands beyond the Nyquist frequency are left out"
 
 
 @named
@@ -48,13 +47,16 @@ class PairTransparency(Result):
         contact: impedance of that contact [N.s/m].
         motion: motion of the follower over that of the leader, in free motion.
         force: force of the follower on a rigid wall over that of the hand.
-        criterion: Llewellyn's 2 Re y11 Re y22/|y12 y21| - cos arg(y12 y21); with at least 1 at all
-            frequencies, any passive hand and object leave the pair stable.
-        absolutely_stable: whether it is so, and the free pair is stable.
+        criterion: Llewellyn's 2 Re y11 Re y22/|y12 y21| - cos arg(y12 y21); below 1 at a frequency,
+            a passive hand and object are unstable there.
+        absolutely_stable: whether it is 1 or more at the frequencies, Re y11 and Re y22 are not
+            negative, and the free pair is stable: then passive hands and objects leave the pair
+            stable, but for those that resonate near the Nyquist frequency.
         worst: frequency of the least criterion [Hz].
         mass: mass felt in free motion at 1 Hz [kg].
         damping: damping felt there [N.s/m].
-        stiffness: stiffness felt against the rigid wall at the lowest frequency [N/m].
+        stiffness: size of force over position against the rigid wall at the lowest frequency [N/m].
+            With forces sent both ways unscaled it grows as that falls: nothing but delay yields.
         motion_bandwidth: frequency at which the follower's motion is 3 dB off [Hz]; NaN for none.
         force_bandwidth: the same of its force on the wall [Hz]; NaN for none.
         assumed: what the numbers rest on, a sentence each.
@@ -86,14 +88,15 @@ class PairTransparency(Result):
     def headline(self) -> str:
         """What the hand feels in one line."""
         least = float(self.criterion.min())
-        any_hand = (
-            "stable with any passive hand and object"
+        verdict = (
+            "absolutely stable by Llewellyn's criterion"
             if self.absolutely_stable
-            else f"not stable with each passive hand and object ({least:.3g}, {self.worst:.3g} Hz)"
+            else f"not absolutely stable (Llewellyn's {least:.3g} at {self.worst:.3g} Hz)"
         )
         return (
             f"{self.kind} along {self.axis}: {self.mass:.3g} kg and {self.damping:.3g} N.s/m in "
-            f"free motion, walls up to {self.stiffness:.4g} N/m; {any_hand}"
+            f"free motion, walls up to {self.stiffness:.4g} N/m at {self.frequency[0]:.3g} Hz; "
+            f"{verdict}"
         )
 
     def remarks(self) -> Sequence[str]:
@@ -143,7 +146,7 @@ def pair_transparency(
     build = Build(replace(pair, leader_operator=None, follower_clay=None))
     along = _along(pair, axis)
     top = 0.5 / pair.Ts
-    f = np.geomspace(LOWEST, HIGHEST * top, POINTS) if frequency is None else np.array(frequency)
+    f = np.geomspace(LOWEST, HIGHEST * top, POINTS) if frequency is None else np.sort(frequency)
     if not len(f) or not f.max() < top:
         bound = f"must be one or more frequencies below {top:g} Hz"
         raise ParameterError("frequency", f.tolist(), bound)
@@ -171,10 +174,20 @@ def pair_transparency(
         float(f[criterion.argmin()]),
         felt.imag / (2.0 * math.pi * AT),
         felt.real,
-        float((1j * omega * rigid).real[0]),
+        float(abs(omega[0] * rigid[0])),
         _bandwidth(f, motion),
         _bandwidth(f, force),
-        (*build.assumed(), SIDEBANDS),
+        (*build.assumed(), *_limits(axis, f, top)),
+    )
+
+
+def _limits(axis: str, f: np.ndarray, top: float) -> tuple[str, str]:
+    """What the criterion does not say."""
+    return (
+        f"hand and object along {axis} alone, at {len(f)} frequencies from {f.min():.3g} to "
+        f"{f.max():.3g} Hz",
+        f"sidebands beyond the Nyquist frequency of {top:.4g} Hz: left out; what resonates near it "
+        "may be unstable beside Llewellyn's criterion",
     )
 
 

@@ -12,22 +12,25 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
+from ..display import time_words
 from ..results import Result, Tables
 from ..scene.pair import Pair
 from . import joint_crossings, roots
+from .held_words import pair_words
 from .joint_families import NEAR
 from .joint_loop import MOST_STATES, grid
 from .pair_build import Build
 from .pair_delays import SLOWEST, Delays
 from .pair_loop import PairLoop
-from .pair_onset import Onset, onset
+from .pair_onset import LATEST, Onset, onset
 
 LARGE = 500  # states of a map whose eigenvalues are not worth their time
 HIGHEST = 64.0  # factor of all Kp up to which gains are tried
 EXACT = 1e-4  # relative width within which that factor is found
 COARSE = 1e-2  # the same for a map that is LARGE
 STEADY = 1e-6  # [Hz] of a motion that does not oscillate
-OPPOSED, COMMON = "arms opposed", "common motion"
+OPPOSED, COMMON, NONE = "arms opposed", "common motion", "rest alone"
+GONE = 1e-3  # size of an eigenvalue whose motion is over at the next sample
 
 
 @named
@@ -49,8 +52,8 @@ class PairLimits(Result):
         frequency: of the motion that turns unstable first, or is unstable now [Hz].
         joint: joint that moves most in it.
         mode: that motion in words.
-        gain: largest factor of all Kp of both arms, from the present ones on; inf for more than 64;
-            0 if the pair is unstable.
+        gain: largest factor of all Kp of both arms, from the present ones on, found by doubling;
+            inf for more than 64; 0 if the pair is unstable.
         slope: largest slope of a friction fed forward at one joint of both arms, Fc k + Fv, with
             none at the others [N.m.s/rad], shape (n,).
         law_slope: slopes of the leader's law [N.m.s/rad], shape (n,).
@@ -91,16 +94,16 @@ class PairLimits(Result):
 
     def headline(self) -> str:
         """The verdict in one line."""
-        at = f"{self.kind}, {1.0 / self.Ts:.4g} Hz, link {1e3 * self.present:.3g} ms"
+        at = f"{self.kind}, {1.0 / self.Ts:.4g} Hz, link {time_words(self.present)}"
         verdict = "stable" if self.stable else f"unstable (radius {self.radius:.6g})"
         return f"{verdict} at {at}: {self._delay_words()}; {self.mode}"
 
     def _delay_words(self) -> str:
         if math.isinf(self.delay):
-            return "any delay of the link"
+            return f"any delay of the link up to {LATEST:g} s"
         if self.delay == 0.0:
             return "no delay of the link is stable"
-        return f"one-way delay up to {1e3 * self.delay:.3g} ms"
+        return f"one-way delay up to {time_words(self.delay)}"
 
     def remarks(self) -> Sequence[str]:
         """What to change first, and what the verdict rests on."""
@@ -115,13 +118,13 @@ class PairLimits(Result):
                 "less: an undamped common motion, which Kp and Kd cannot touch"
             )
         cause, late = max(self.budget.items(), key=lambda x: x[1])
-        lateness = f"{cause} ({1e3 * late:.3g} ms each way"
+        lateness = f"{cause} ({time_words(late)} each way"
         if self.stable and math.isinf(self.delay):
-            return "nothing: no delay of the link is too long"
+            return f"nothing: no delay of the link up to {LATEST:g} s is too long"
         if self.stable:
-            return f"{lateness}; {1e3 * self.delay_left:.3g} ms are left)"
+            return f"{lateness}; {time_words(self.delay_left)} are left)"
         if self.delay > 0.0:
-            return f"{lateness}; the link may have {1e3 * self.delay:.3g} ms)"
+            return f"{lateness}; the link may have {time_words(self.delay)})"
         return f"gains and rate: unstable without any delay of the link; {lateness})"
 
     def tables(self) -> Tables:
@@ -186,7 +189,7 @@ def pair_limits(pair: Pair) -> PairLimits:
         fraction,
         study.budget(),
         pair.Ts,
-        study.build.assumed(),
+        (pair_words(pair), *study.build.assumed()),
     )
 
 
@@ -259,6 +262,8 @@ class Study:
             _, loop, z = self.onset
         else:
             loop, z = self.loop, self.worst
+        if abs(z) < GONE:  # as without gains
+            return z, self.build.names[0], NONE
         leader, follower = loop.shape(z)
         n, T = self.pair.n, self.pair.mapping
         energy = [

@@ -9,22 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from . import exact_roots
-from .exact_roots import (
-    Integers,
-    alternating,
-    combined,
-    over_denominator,
-    product,
-    square_root,
-    within_rounding,
-)
+from .exact_roots import axis_parts, exact, rational, square_root, value, within_rounding
 
 VARIABLE = Polynomial([0.0, 1.0])  # s itself
 ROUNDED = 1e-14  # a sum below this share of its terms is their rounding
@@ -59,7 +50,8 @@ def hurwitz(p: Polynomial) -> bool:
 
     The answer is exact.
     """
-    return not np.any(p.coef) or exact_roots.roots_right(p) == (0, 0)
+    p = exact(p)
+    return not any(p.integers) or exact_roots.roots_right(p) == (0, 0)
 
 
 def multiplicity_of_zero(p: Polynomial) -> int:
@@ -96,13 +88,7 @@ def crossings(A: Polynomial, B: Polynomial) -> list[tuple[float, float]]:
     cross at 0 and at infinity. Roots that stay at zero do not count. Roots of A and of B on the
     axis within rounding do not count either: the loop has them at K = 0 and at infinity.
     """
-    return [(x.K, x.omega) for x in _every_crossing(*_over_unit(A, B)) if not x.end]
-
-
-def _over_unit(A: Polynomial, B: Polynomial) -> tuple[Integers, Integers, Fraction]:
-    """a, b, u: A + K B has the roots of a + K/u b."""
-    (a, below_a), (b, below_b) = over_denominator(A), over_denominator(B)
-    return a, b, Fraction(below_b, below_a)
+    return [(x.K, x.omega) for x in _every_crossing(A, B) if not x.end]
 
 
 @dataclass(frozen=True)
@@ -114,31 +100,31 @@ class _Crossing:
     end: int = 0
 
 
-def _every_crossing(a: Integers, b: Integers, unit: Fraction) -> list[_Crossing]:
+def _every_crossing(A: Polynomial, B: Polynomial) -> list[_Crossing]:
     """The crossings with K > 0 at a root of A, between, and at a root of B, K ascending."""
-    if not (a and b):
+    A, B = exact(A), exact(B)
+    if not any(B.integers):  # what drives nothing moves no root
         return []
-    (ae, ao), (be, bo) = alternating(a), alternating(b)
-    across = combined(-1, product(ae, be), -1, [0, *product(ao, bo)])
-    size2 = combined(1, product(be, be), 1, [0, *product(bo, bo)])
+    (Ae, Ao), (Be, Bo) = axis_parts(A), axis_parts(B)
+    omega2 = rational([0, 1])
+    across, size2 = -(Ae * Be + omega2 * Ao * Bo), Be * Be + omega2 * Bo * Bo
     found = []
-    for x in exact_roots.positive_zeros(combined(1, product(ao, be), -1, product(ae, bo))):
-        if size := exact_roots.at(size2, x):  # else B(j omega) = 0: no K places a pole there
-            end = -1 if within_rounding(a, x) else int(within_rounding(b, x))
-            found.append((exact_roots.at(across, x) / size, square_root(x), end))
-    n = exact_roots.lowest(a)
-    if n == exact_roots.lowest(b):
-        found.append((Fraction(-a[n], b[n]), 0.0, 0))
+    for x in exact_roots.positive_roots(Ao * Be - Ae * Bo):
+        if value(size2, x):  # else B(j omega) = 0: no K places a pole there
+            end = -1 if within_rounding(A, x) else int(within_rounding(B, x))
+            found.append((value(across, x) / value(size2, x), square_root(x), end))
+    a, b, n = A.coef, B.coef, multiplicity_of_zero(A)
+    if n == multiplicity_of_zero(B):
+        found.append((-a[n] / b[n], 0.0, 0))
     if len(a) == len(b):
-        found.append((Fraction(-a[-1], b[-1]), math.inf, 0))
-    scaled = [(unit * K, *where) for K, *where in found]
-    within = [(float(K), *where) for K, *where in scaled if LEAST < K < MOST]
+        found.append((-a[-1] / b[-1], math.inf, 0))
+    within = [(float(K), *at) for K, *at in found if LEAST < K < MOST]
     return [_Crossing(*x) for x in sorted(within)]
 
 
 def first_crossing(A: Polynomial, B: Polynomial) -> tuple[float, float]:
     """Smallest K > 0 at which a root of A + K B leaves the left half plane, and its frequency."""
-    a, b, unit = _over_unit(A, B)
+    A, B = exact(A), exact(B)
 
     def stable(low: float, high: float) -> bool:
         """Whether the loop is, between two successive crossings."""
@@ -146,11 +132,9 @@ def first_crossing(A: Polynomial, B: Polynomial) -> tuple[float, float]:
             K = 2.0 * low if low else 1.0
         else:
             K = math.sqrt(low) * math.sqrt(high) if low else 0.5 * high
-        m, n = (Fraction(K) / unit).as_integer_ratio()
-        p = combined(n, a, m, b)
-        return not any(p) or exact_roots.sides(p) == (0, 0)
+        return hurwitz(A + rational([K]) * B)
 
-    found = _every_crossing(a, b, unit)
+    found = _every_crossing(A, B)
     low = max((x.K for x in found if x.end < 0), default=0.0)
     found = [x for x in found if x.end >= 0 and x.K > low]
     gains = [*(x.K for x in found), math.inf]
@@ -338,3 +322,30 @@ def first_failure(
         low = x
     assert low is not None
     return low, math.inf
+
+
+def first_failures(
+    holds: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    count: int,
+    grid: np.ndarray,
+    rtol: float = 1e-12,
+) -> tuple[np.ndarray, np.ndarray]:
+    """As `first_failure`, of many properties at once: `holds` is asked for some, a value each."""
+    low, high = np.zeros(count), np.full(count, math.inf)
+    left = np.arange(count)
+    for x in grid:
+        good = holds(left, np.full(len(left), x))
+        low[left[good]], high[left[~good]] = x, x
+        left = left[good]
+        if not len(left):
+            break
+    left = np.flatnonzero((low > 0.0) & (high < math.inf))
+    while True:
+        a, b = low[left], high[left]
+        middle = 0.5 * (a + b)
+        between = (b - a > rtol * b) & (middle != a) & (middle != b)
+        left, middle = left[between], middle[between]
+        if not len(left):
+            return low, high
+        good = holds(left, middle)
+        low[left[good]], high[left[~good]] = middle[good], middle[~good]

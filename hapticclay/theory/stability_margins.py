@@ -19,6 +19,7 @@ from ..display import brief, html_table
 from ..errors import Bound, ParameterError, array_of
 from . import exact_roots, gain_crossings, linear_loop, roots
 from .exact_roots import rational
+from .held_words import hand_words
 from .loops import Loop, of_loop
 
 Break = Literal["force", "compensator"]  # where a loop is opened
@@ -313,13 +314,9 @@ def coupled_stability(loop: Loop) -> Verdict:
         how = "argument principle on the loop with its delay"
     else:
         how = "roots of the closed-loop polynomial"
-    hand = "no hand at the handle"
-    if loop.operator:
-        th = loop.operator
-        th = f"{th.mass:g} s^2 + {th.damper:g} s + {th.spring:g}"
-        hand = f"the hand is {th} N/m"
+    assumptions = LINEAR, f"{hand_words(loop.operator)} at the handle"
     return Verdict(
-        good, limit / loop.gain, omega, (LINEAR, hand), f"{how}: exact", "gain limit over K"
+        good, limit / loop.gain, omega, assumptions, f"{how}: exact", "gain limit over K"
     )
 
 

@@ -426,7 +426,7 @@ def abbott_okamura_limit(wall: VirtualWall) -> float:
 def hulin_limit(wall: VirtualWall) -> float:
     """Largest stable K by the linear rule (b + B)/(Ts/2 + delay) [N/m].
 
-    Hulin, Preusche, Hirzinger (EuroHaptics, 2006); Gil, Sanchez, Hulin, Preusche, Hirzinger (J.
+    Hulin, Preusche, Hirzinger (IROS, 2006); Gil, Sanchez, Hulin, Preusche, Hirzinger (J.
     Computing and Information Science in Engineering 9, 2009). It holds for (b + B) Ts/mass and
     K Ts^2/mass far below 1: see docs/equations.md, section 7, for the ranges of 1 % and 5 %.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import math
 import os
 import shutil
@@ -156,7 +157,7 @@ def ready(out: Path, options: FilmOptions = FILM_OPTIONS) -> tuple[str, FilmOpti
         for name, n in zip(("w", "h"), options.size, strict=True)
     )
     choice("camera", options.camera, CAMERAS)
-    _check_codec(kind)
+    _check_codec(out, kind)
     gl, context = _opened(mujoco.MjSpec().compile(), 64, 64)
     context.free()
     gl.free()
@@ -164,7 +165,13 @@ def ready(out: Path, options: FilmOptions = FILM_OPTIONS) -> tuple[str, FilmOpti
     return kind, replace(options, speed=speed, size=even)
 
 
-def _check_codec(kind: str) -> None:
+def usual_file(folder: Path) -> Path:
+    """Where a film goes that has no name: an .mp4 if its codec is installed, else a .webp."""
+    found = importlib.util.find_spec("imageio_ffmpeg")
+    return folder / ("film.mp4" if found else "film.webp")
+
+
+def _check_codec(out: Path, kind: str) -> None:
     """Refuses a kind of file that nothing here can write."""
     if kind == ".mp4":
         try:
@@ -172,8 +179,8 @@ def _check_codec(kind: str) -> None:
 
             imageio_ffmpeg.get_ffmpeg_exe()
         except (ImportError, RuntimeError):
-            bound = "needs a codec: pip install 'imageio[ffmpeg]'; or use .webp, which needs none"
-            raise ParameterError("out", kind, bound) from None
+            bound = "needs a codec: pip install 'hapticclay[video]'; or use .webp, which needs none"
+            raise ParameterError("film", out.name, bound) from None
         return
     try:
         from PIL import features
@@ -182,7 +189,7 @@ def _check_codec(kind: str) -> None:
             raise ImportError
     except ImportError:
         bound = f"needs a codec: pip install --upgrade pillow, with {kind[1:]}"
-        raise ParameterError("out", kind, bound) from None
+        raise ParameterError("film", out.name, bound) from None
 
 
 class ArmReel:

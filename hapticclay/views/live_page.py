@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ParameterError
+from ..errors import needing
 from ..live.player import Player
 from ..ports.guard import LOCAL, REFUSED, Guard, listening, url_host
 from .palette import GRID, SKY, TABLE, rgb_bytes, verdict_color
@@ -42,12 +42,9 @@ class LivePage:
 
     def __init__(self, play: Any, host: str, port: int):
         """Begins to serve an empty page."""
-        try:
+        with needing("the page", "viser", "web"):
             import rich
             import viser
-        except ImportError:
-            bound = "must be installed: pip install 'hapticclay[web]'"
-            raise ParameterError("web", "viser", bound) from None
         self.player = Player(play)
         self.guard = PageGuard(host, "" if host in LOCAL else secrets.token_urlsafe(16))
         listens = listening(host, port)

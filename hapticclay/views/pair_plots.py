@@ -9,14 +9,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..theory.held_words import FREE
 from ..theory.pair_boxes import PairHands
 from ..theory.pair_maps import PairComparison, PairMap
+from ..theory.pair_onset import LATEST
 from ..theory.pair_ports import PairTransparency
 from ..theory.pair_verdict import PairLimits
 from .palette import BLACK, BLUE, CURVE_STYLES, MID_GREY, PALE_GREY, VERMILION
 from .panels import add_legend, label_axes, plain_ticks, set_title, side_by_side, single
 from .style import figure_size, figure_style, points, stroke
 
+BEYOND = f"> {LATEST:g} s"  # the largest delay that is looked for
 SAFE = (-1.2, 3.2)  # of the criterion that is shown
 PER_JOINT = 0.3  # [inch] of height
 
@@ -99,15 +102,16 @@ def comparison_plot(found: PairComparison) -> Figure:
             continue
         delay = 1e3 * limits.delay
         ax.barh(i, min(delay, top), height=0.5, color=BLUE, alpha=0.6)
-        text = "any" if math.isinf(delay) else f"{delay:.3g}"
-        ax.text(min(delay, 0.93 * top), i, f" {text}", va="center", fontsize=points(9))
+        text = BEYOND if math.isinf(delay) else f"{delay:.3g}"
+        ax.text(min(delay, 0.9 * top), i, f" {text}", va="center", fontsize=points(9))
     present = next(x.present for x in found.limits if x is not None)
     ax.axvline(1e3 * present, color=BLACK, ls="--", lw=stroke(1.2))
     ax.set_yticks(range(len(found.kinds)), found.kinds)
     ax.invert_yaxis()
     ax.set_xlim(0.0, top)
     label_axes(ax, "largest one-way delay [ms]")
-    set_title(ax, "the dashed line is the link's delay")
+    free = any(x.startswith(FREE) for x in found.assumed)
+    set_title(ax, "the dashed line is the link's delay", f"{FREE}: forces close no loop" * free)
     return figure
 
 
@@ -138,7 +142,7 @@ def transparency_plot(found: PairTransparency) -> Figure:
     for ax in (felt, follows):
         ax.legend(fontsize=points(8))
     set_title(felt, f"{found.kind}, along {found.axis}")
-    set_title(safe, "any passive hand and object: above 1", panel=True)
+    set_title(safe, "absolutely stable: above 1", panel=True)
     return figure
 
 
@@ -156,7 +160,7 @@ def hands_plot(found: PairHands) -> Figure:
         if which.any():
             ax.plot(found.hands[which, 0], late[which], ".", color=color, label=name)
     if not finite.all():
-        ax.plot(found.hands[~finite, 0], late[~finite], "^", color=BLUE, label="any delay")
+        ax.plot(found.hands[~finite, 0], late[~finite], "^", color=BLUE, label=BEYOND)
     ax.axhline(1e3 * found.present, color=BLACK, ls="--", lw=stroke(1.2), label="the link")
     ax.set_ylim(0.0, 1.05 * top)
     label_axes(ax, "mass of the hand [kg]", "largest one-way delay [ms]")

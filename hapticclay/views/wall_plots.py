@@ -36,7 +36,7 @@ LIMIT_LOOKS: dict[str, Any] = {  # by the first word of the name
     "Colgate,": dict(color=GREEN, ls="--"),
     "Hulin": dict(color=VERMILION, ls="-."),
     "Abbott,": dict(color=PURPLE, marker="D", ls="none"),
-    "any": dict(color=ORANGE, ls=(0, (1, 1))),
+    "worst": dict(color=ORANGE, ls=(0, (1, 1))),
 }
 KIND_WORDS = {"exact": "", "sufficient": " (sufficient)", "rule": " (rule)"}
 REGION_ALPHA = 0.22

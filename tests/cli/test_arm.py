@@ -7,6 +7,8 @@ import pytest
 
 from hapticclay.cli.app import main
 
+pytestmark = pytest.mark.usefixtures("no_layout")
+
 CARDS = Path(__file__).parents[2] / "mjcf" / "arms"
 TWO = str(CARDS / "planar_2r.xml")
 GAINS = ["--Kp", "100", "50", "--Kd", "1", "0.5"]
@@ -17,6 +19,8 @@ def test_limits_wall_and_poses(tmp_path, capsys):
     assert main([*words, "--poses", "3", "--out", str(tmp_path)]) == 0
     text = capsys.readouterr().out
     assert "shoulder" in text and "first to change" in text and "wall along x" in text
+    assert "no hand at the handle" in text and "the motors render the wall alone" in text
+    assert "law: PD of 2 joints in the host, rates exact" in text
     assert {x.name for x in tmp_path.iterdir()} == {
         f"{name}.{kind}" for name in ("limits", "wall", "poses") for kind in ("json", "png")
     }

@@ -1,6 +1,7 @@
 """The MJCF files compile without a warning and mean what they say."""
 
 import dataclasses
+import threading
 
 import mujoco
 import numpy as np
@@ -145,6 +146,46 @@ def test_scene_to_open_by_hand_compiles_and_steps_without_warning():
             mujoco.mj_step(model, data)
     assert caught == []
     assert model.ngeom > 0 and model.opt.timestep == 0.00036
+
+
+def diverge():
+    """A step of which the engine warns."""
+    model = hc.build(hc.free())
+    data = mujoco.MjData(model)
+    data.qvel[:] = 1e300
+    mujoco.mj_step(model, data)
+
+
+def test_threads_that_collect_warnings_get_their_own_and_leave_things_as_they_were(
+    tmp_path, monkeypatch
+):
+    """Two overlap, and the first ends first: no file is written; the user's function is back."""
+    monkeypatch.chdir(tmp_path)
+    told, both, first_over, found = [], threading.Event(), threading.Event(), {}
+    user = told.append
+
+    def second():
+        with engine.warnings_caught() as caught:
+            both.set()
+            first_over.wait(10.0)
+            diverge()
+        found["second"] = caught
+
+    mujoco.set_mju_user_warning(user)
+    try:
+        with engine.warnings_caught() as caught:
+            thread = threading.Thread(target=second)
+            thread.start()
+            both.wait(10.0)
+            diverge()
+        first_over.set()
+        thread.join()
+        assert mujoco.get_mju_user_warning() is user
+        diverge()
+    finally:
+        mujoco.set_mju_user_warning(None)
+    assert len(caught) == len(found["second"]) == len(told) > 0
+    assert list(tmp_path.iterdir()) == []
 
 
 length, inertia = st.floats(0.05, 2.0), st.floats(1e-3, 10.0)

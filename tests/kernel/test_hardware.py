@@ -594,6 +594,37 @@ def test_in_steady_motion_a_coupling_renders_the_clay_itself():
     assert b * u == pytest.approx(b * v, rel=1e-9)
 
 
+@given(
+    st.floats(0.01, 10.0),
+    st.floats(0.01, 4.0),
+    st.floats(-4.0, 6.0),
+    st.floats(0.1, 10.0),
+    st.floats(1e-5, 1e-2),
+)
+def test_a_coupling_is_stable_in_all_clay_if_its_damper_pays_for_the_hold(k, d, decades, m, Ts):
+    """k Ts/2 < d < 2 m/Ts, on a bare handle of mass m; in the hardest clay also only if."""
+    spring, damper = k * m / Ts**2, d * m / Ts
+
+    def radius(b):
+        p, v = np.eye(2)  # place of the handle from the tool, and velocity, exact between samples
+        on_tool = np.array(
+            [
+                formula.virtual_coupling(0.0, *unit, b, (spring, damper), Ts)[1]
+                for unit in np.eye(2).tolist()
+            ]
+        )
+        force = b * on_tool
+        moved = p + Ts * v - 0.5 * Ts**2 / m * force - Ts * on_tool
+        slowed = v - Ts / m * force
+        return np.abs(np.linalg.eigvals(np.array([moved, slowed]))).max()
+
+    paid = 0.5 * k < d < 2.0
+    if paid:
+        assert radius(10.0**decades * m / Ts) < 1.0 + 1e-9  # rounding of eigenvalues near 1
+    elif not 0.5 * k < 1.01 * d < 2.05:  # 1 % beyond the border, far above rounding
+        assert radius(1e9 * m / Ts) > 1.0
+
+
 def test_a_coupling_bounds_clay_of_any_stiffness_and_its_energy_is_kept():
     kw = dict(b=1e8, start=(0.06, 0.0), gain=(1.0, 0.1), t_max=0.4)
     r = hc.simulate(cut(hc.Hardware(coupling=hc.Coupling(3000.0, 300.0)), **kw))

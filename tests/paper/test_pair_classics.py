@@ -19,6 +19,7 @@ from hapticclay.paper.classics import (
 from hapticclay.paper.classics.sampled_pair import HeldArm
 from hapticclay.scene.link import KINDS
 from hapticclay.theory.pair_build import Build
+from tests.hunt import some
 
 
 def lti(*coefficients):
@@ -178,8 +179,8 @@ def test_delay_limits_by_python_control(law, K):
     _, phase, _, _, omega, _ = control.stability_margins(loop, returnall=True)
     margins = np.radians(np.asarray(phase) % 360.0) / np.asarray(omega) / 2.0
     expected = margins.min() if len(margins) else np.inf
-    # crossings of a table of 200,000 frequencies, on a line between two of them
-    assert lawrence1993.largest_delay(law, thing) == pytest.approx(expected, rel=1e-6)
+    # both are roots of polynomials of degree 8 and more
+    assert lawrence1993.largest_delay(law, thing) == pytest.approx(expected, rel=1e-8)
 
 
 @pytest.mark.parametrize("law", lawrence1993.LAWS, ids=lambda law: law.name)
@@ -300,7 +301,7 @@ def test_the_observer_counts_the_energy_of_the_motion(control, delay):
     assert np.abs(energy - motion).max() < ryu2004.BY_MOTION * np.abs(motion).max()
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", some(range(8), 4))
 def test_late_observers_keep_their_reserves(seed):
     """Any delay up to 300 ms, any wall and gain: two reserves, and what was let out unobserved.
 

@@ -17,8 +17,9 @@ from benchmarks import device_faults
 from hapticclay.ports import Inverse3, serve
 from hapticclay.ports.device import SimulatedDevice
 from hapticclay.ports.rows import CHUNK, Rows
+from hapticclay.ports.server import DeviceServer
 from hapticclay.ports.service import MOST_LOGS, Service
-from tests.ports.conftest import SCENE, tick
+from tests.ports.conftest import SCENE, Client, tick
 
 
 def limp(server, within=5.0):
@@ -261,3 +262,32 @@ def test_a_notice_holds_no_control_characters(served, caplog):
     (notice,) = server.service.notices
     assert notice.isprintable() and "next line" in notice
     assert all(r.getMessage().isprintable() for r in caplog.records)
+
+
+class Failing(SimulatedDevice):
+    """A device whose simulation fails at its third advance, as one in clay of a faulty law."""
+
+    count = 0
+
+    def advance(self, samples=None):
+        self.count += 1
+        if self.count >= 3:
+            raise FloatingPointError("the law divides by nothing")
+        super().advance(samples)
+
+
+@pytest.mark.parametrize("clock", ["tick", "wall"])
+def test_a_simulation_that_fails_ends_the_device_and_says_why(clock, caplog):
+    """Clients get its last state, as of a device that has ended; its record stays."""
+    device = Failing(SCENE)
+    with DeviceServer(Service(device, clock=clock)) as server:
+        client = Client(server.url)
+        end = time.monotonic() + 10.0
+        while not server.service.ended and time.monotonic() < end:
+            client.send(tick(x=1.0))
+        assert server.service.ended == "FloatingPointError: the law divides by nothing"
+        last = device.t
+        assert client.send(tick(x=1.0))["inverse3"] and device.t == last > 0.0
+        client.socket.close()
+        assert server.record().t[-1] <= last
+    assert [x.levelname for x in caplog.records] == ["ERROR"]

@@ -301,7 +301,11 @@ def test_a_pair_may_be_a_list_of_tables(tmp_path):
         ("experiment = 'constant'\nbb = 3", "bb = 3: no such field; did you mean 'b'?"),
         ("experiment = 'constant'\nb = -3", "b = -3: must be a finite number >= 0"),
         ("b = 3", "b = 3: no such field"),
-        ("schema = 'hapticclay-record-1'", "must be one of hapticclay-scenario-2"),
+        (
+            "schema = 'hapticclay-record-1'",
+            "must be a scenario; its schema is 'hapticclay-record-1'",
+        ),
+        ("schema = 'hapticclay-scenario-9'", "must be one of hapticclay-scenario-2"),
         ("dt.x = 3", "dt.x = 3: no such field: dt has no parts"),
         ("'' = 3", " = 3: no such field"),
         ("x.''.'y.z' = 3", "no such field"),

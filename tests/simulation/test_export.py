@@ -345,10 +345,10 @@ def test_what_cannot_be_written_is_refused(records, tmp_path):
 @pytest.mark.parametrize(
     "kind,package,told",
     [
-        ("nc", "xarray", "'xarray': must be installed: pip install 'hapticclay[data]'"),
-        ("nc", "h5netcdf", "'h5netcdf': must be installed: pip install 'hapticclay[data]'"),
+        ("nc", "xarray", "xarray, which must be installed: pip install 'hapticclay[data]'"),
+        ("nc", "h5netcdf", "h5netcdf, which must be installed: pip install 'hapticclay[data]'"),
         ("nc", "h5py", "hapticclay[data]"),
-        ("parquet", "pandas", "'pandas': must be installed: pip install 'hapticclay[data]'"),
+        ("parquet", "pandas", "pandas, which must be installed: pip install 'hapticclay[data]'"),
         ("parquet", "pyarrow", "hapticclay[data]"),
         ("mcap", "mcap", "hapticclay[data]"),
         ("rrd", "rerun", "hapticclay[rerun]"),

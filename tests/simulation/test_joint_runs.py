@@ -145,6 +145,14 @@ def test_the_joint_that_buzzes_is_named(scale):
     assert "joint_limits" in r.outcome.advice
 
 
+@pytest.mark.parametrize("other", [HAND, hc.Operator(0.1, 2.0, 6.0)])
+@pytest.mark.parametrize(("scale", "code"), [(1.2, "time limit"), (2.0, "diverged")])
+def test_a_driven_arm_is_judged_where_theory_says_that_it_is_unstable(scale, code, other):
+    swing = hc.Multisine((1.0, 1.0))
+    given = replace(leader(scale), operator=(HAND, other), muscle=swing, t_max=2.0)
+    assert hc.simulate(given).outcome.code == code
+
+
 def test_a_stable_arm_comes_to_rest_without_a_verdict():
     r = hc.simulate(leader(1.2))
     assert r.outcome.code == "time limit" and np.abs(r.qd[-100:]).max() < 1e-6

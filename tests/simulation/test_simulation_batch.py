@@ -185,6 +185,19 @@ def test_bad_arguments_are_refused_at_the_door(field, call):
     assert error.value.field == field
 
 
+@pytest.mark.parametrize("bad", [{"b": [1e4, -1.0]}, {"operator": [hc.Operator(0.5), "none"]}])
+def test_a_set_that_refuses_one_run_changes_none(bad):
+    scenario = replace(CUT, operator=hc.Operator(0.25, 2.0, 6.0), clay=hc.slab(9.0, 0.0, 0.2))
+    batch, other = (hc.SimulationBatch([scenario] * 2, engine="python") for _ in range(2))
+    for runs in (batch, other):
+        runs.advance(300)
+    with pytest.raises(ParameterError):
+        batch.set(**bad)
+    for runs in (batch, other):
+        runs.advance(300)
+    np.testing.assert_array_equal(batch.numbers(), other.numbers())
+
+
 def test_forces_of_runs_that_rest_are_not_looked_at():
     batch = hc.SimulationBatch([CUT] * 2, engine="python")
     batch.advance(9, force=[[np.nan, 0.0], [2.0, 0.0]], mask=[False, True])

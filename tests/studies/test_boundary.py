@@ -32,7 +32,7 @@ Loop = functools.partial(boundary.PushedLoop, operator=TH)
 def few_points():
     """Lines of theory with few points: what is tested of them is at the columns of runs."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stability_map, "LINE_POINTS", 13)
+        patch.setattr(stability_map, "LINE_POINTS", 4)
         yield
 
 

@@ -15,7 +15,8 @@ import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.errors import ParameterError
 from hapticclay.paper.comparison import SVG_COLORS, inline_svg
-from hapticclay.studies import comparison
+from hapticclay.studies import comparison, published_walls, wall_lines
+from hapticclay.views import compare_plots
 from hapticclay.views.compare_plots import parts_overlay
 
 SCENES = {
@@ -44,6 +45,12 @@ def commanded(folder, texts, *words):
     with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(said):
         # figures are drawn as they are
         patch.setattr(Figure, "get_layout_engine", lambda self: None)
+        # lines of theory with few points
+        patch.setattr(compare_plots, "CLAY_DAMPINGS", np.geomspace(1.0, 3000.0, 4))
+        patch.setattr(comparison, "RANGE_AT", np.geomspace(0.5, 30.0, 5))
+        patch.setattr(published_walls, "LIMIT_POINTS", 5)
+        for name in ("LIMIT_POINTS", "TOP_POINTS"):
+            patch.setattr(wall_lines, name, 5)
         patch.setattr(comparison, "compare_files", lambda *a: found.append(compare(*a)) or found[0])
         assert (
             app.main(["compare", *map(str, files(folder, texts)), *words, "--out", str(out)]) == 0
@@ -53,7 +60,7 @@ def commanded(folder, texts, *words):
 
 @pytest.fixture(scope="module")
 def controllers(tmp_path_factory):
-    return commanded(tmp_path_factory.mktemp("c"), SCENES)
+    return commanded(tmp_path_factory.mktemp("c"), SCENES, "--dpi", "40")
 
 
 @pytest.fixture(scope="module")

@@ -1,23 +1,35 @@
 """Labs: their runs find what theory says, and their commands and results behave."""
 
+import functools
 import json
 
 import numpy as np
 import pytest
 
 import hapticclay as hc
-from hapticclay.cli import app
+from hapticclay.cli import app, console
 from hapticclay.errors import ParameterError
 from hapticclay.results import Result, plain
 from hapticclay.studies import labs
 
 
-@pytest.fixture(scope="module", params=tuple(labs.LABS))
-def found(request):
+@functools.cache
+def made(name):
     told = []
-    made = hc.studies.lab(request.param, quick=True, tell=told.append)
-    assert told and made.name == request.param
-    return made
+    lab = hc.studies.lab(name, quick=True, tell=told.append)
+    assert told and lab.name == name
+    return lab
+
+
+@pytest.fixture(params=tuple(labs.LABS))
+def found(request):
+    return made(request.param)
+
+
+def not_again(name, monkeypatch):
+    """The command takes the lab that is there, if it asks for its quick form."""
+    lab = made(name)
+    monkeypatch.setitem(labs.LABS, name, lambda quick, tell: quick and lab)
 
 
 def test_a_lab_has_a_table_questions_figures_and_a_run(found, tmp_path):
@@ -61,7 +73,8 @@ def test_what_is_felt_is_the_stiffness_that_is_rendered():
     assert 1e-4 < np.max(np.abs(rough - exact)) < 2.0 * 0.5 * 1e-4 / 4e-3 * 1.5
 
 
-def test_command_prints_questions_and_writes_numbers_and_figures(tmp_path, capsys):
+def test_command_prints_questions_and_writes_numbers_and_figures(tmp_path, capsys, monkeypatch):
+    not_again("jnd", monkeypatch)
     assert app.main(["lab", "jnd", "--quick", "--out", str(tmp_path)]) == 0
     out = capsys.readouterr().out
     assert "1 up, 2 down" in out and "3. An encoder" in out
@@ -79,6 +92,8 @@ def test_an_unknown_lab_is_refused(capsys):
 def test_view_shows_the_run_of_the_lab(tmp_path, monkeypatch):
     from hapticclay.cli import view
 
+    not_again("jnd", monkeypatch)
+    monkeypatch.setattr(console, "deliver", lambda *given: None)
     shown = []
     monkeypatch.setattr(view, "replay", lambda record, tool: shown.append((record, tool)))
     assert app.main(["lab", "jnd", "--quick", "--view", "--out", str(tmp_path)]) == 0
@@ -99,8 +114,9 @@ def test_the_rule_of_delay_is_the_limit_of_stiff_pairs(Kp, monkeypatch):
 def test_view_shows_the_pair_of_the_lab(tmp_path, monkeypatch):
     from hapticclay.cli import view
 
+    not_again("pair", monkeypatch)
+    monkeypatch.setattr(console, "deliver", lambda *given: None)
     shown = []
     monkeypatch.setattr(view, "show_pair", shown.append)
-    monkeypatch.setattr(labs, "GAINS", (1600.0,) * 2)
     assert app.main(["lab", "pair", "--quick", "--view", "--out", str(tmp_path)]) == 0
     assert shown[0].link.delay == pytest.approx(11e-3)

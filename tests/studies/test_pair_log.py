@@ -1,5 +1,6 @@
 """Logs of a leader and its follower: exact steps of an axis, gains found again, files read."""
 
+import functools
 import json
 import math
 import os
@@ -13,7 +14,7 @@ from scipy.io import savemat
 import hapticclay as hc
 from benchmarks import recordings
 from hapticclay.cli.app import main
-from hapticclay.studies.coulomb_axis import Axis
+from hapticclay.studies.coulomb_axis import Axis, stepper
 
 TRUE = {"P": 12.0, "D": 0.11, "J": 1.6e-3, "b": 4e-3, "friction": 0.03, "offset": -0.008}
 RIG = Path(os.environ.get("HAPTICCLAY_TUE", "nowhere"))  # a folder of the rig's public logs
@@ -46,35 +47,35 @@ def test_a_step_with_stops_and_turns_is_that_of_scipy(b):
     rng, axis = np.random.default_rng(1), Axis(1.5e-3, b, 0.03, 0.005)
     for _ in range(40):
         v, torque, h = rng.normal(0.0, 0.3), rng.normal(0.0, 0.08), rng.uniform(1e-4, 0.02)
+        found = axis.step(0.1, v, torque, h)
         # integrator and event are good to 1e-11 of the ranges, 0.05 rad and 1 rad/s
-        np.testing.assert_allclose(
-            axis.step(0.1, v, torque, h), slid(axis, 0.1, v, torque, h), rtol=0.0, atol=5e-11
-        )
+        np.testing.assert_allclose(found, slid(axis, 0.1, v, torque, h), rtol=0.0, atol=5e-11)
+        assert stepper(axis, h)(0.1, v, torque) == found
 
 
 def test_an_axis_that_friction_holds_stays():
     assert Axis(1.0, 0.1, 0.5, 0.1).step(0.3, 0.0, 0.55, 1.0) == (0.3, 0.0)
 
 
+@functools.cache
 def synthetic(*, force_scale=None, late=0, link=0, T=5e-4, n=8000, k=0.0, noise=3e-4, seed=0):
     """A log of a known pair: fine steps of Euler, filter and delays by hand."""
     rng, t = np.random.default_rng(seed), T * np.arange(n)
     waves = [(0.09, 0.7, 0.0), (0.05, 1.9, 1.0), (0.02, 4.3, 2.0), (0.006, 9.0, 0.5)]
     leader = sum(a * np.sin(2.0 * np.pi * f * t + p) for a, f, p in waves)
-    p = 0.6 if not late else 0.0
-    q, v, x, torques = leader[0], 0.0, 0.0, [0.0] * (late + 1)
+    p, led = 0.6 if not late else 0.0, leader.tolist()
+    q, v, x, torques = led[0], 0.0, 0.0, [0.0] * (late + 1)
     follower, u_f, force = np.zeros(n), np.zeros(n), np.zeros(n)
+    b, J, h, dry = TRUE["b"], TRUE["J"], T / 20, TRUE["friction"] * T / 20 / TRUE["J"]
     for i in range(n):
         follower[i], force[i] = q, k * q
-        before, x = x, p * x + (1.0 - p) * (leader[max(i - link, 0)] - q)
+        before, x = x, p * x + (1.0 - p) * (led[max(i - link, 0)] - q)
         torques.append(TRUE["P"] * x + TRUE["D"] * (x - before) / T)
-        u_f[i] = torques[-1 - late]
+        u_f[i] = pushed = torques[-1 - late]
         for _ in range(20):
-            drive = u_f[i] - TRUE["offset"] - k * q
-            dry = TRUE["friction"] * T / 20 / TRUE["J"]
-            free = v + T / 20 * (drive - TRUE["b"] * v) / TRUE["J"]
+            free = v + h * (pushed - TRUE["offset"] - k * q - b * v) / J
             v = math.copysign(max(abs(free) - dry, 0.0), free)
-            q += T / 20 * v
+            q += h * v
     u_l = -u_f if force_scale is None else -force_scale * force
     u_l, u_f = (u + rng.normal(0.0, noise, n) for u in (u_l, u_f))
     return hc.studies.PairLog(t, leader, follower, u_f, u_l, force, "made")

@@ -123,6 +123,9 @@ def test_continuous_runs_have_no_controller():
 
 def test_the_command_writes_all_figures(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)
+    few = {"INDEX_TURNS": ((1, 4), (1, 1)), "INDEX_POINTS": 50, "REGION_POINTS": 5}
+    for name, value in {**few, "INDEX_LINES": 3, "ARM_BAND": (3.0, 30.0)}.items():
+        monkeypatch.setattr(study, name, value)
     words = ["passivity", "--quick", "--delays", "0", "--K", "800", "--damper", "1.5",
              "--delay", "0", "--format", "svg", "--data", "--out", str(tmp_path)]  # fmt: skip
     assert app.main(words) == 0

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import hapticclay as hc
 from hapticclay.cli.app import main
 from hapticclay.studies import comparison
+from hapticclay.views import compare_plots
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +80,7 @@ def test_an_arm_from_a_file_begins_at_its_pose():
     scenario = hc.Scenario(
         arm=hc.MjcfArm("haptic_3"), controller=hc.JointPD((4.0,) * 3, (0.1,) * 3),
         control="sampled", muscle=hc.Multisine((0.6, 0.4), low=0.5, high=3.0, period=2.0, lines=5),
-        force=(0.0, 0.0), length=None, t_max=1.0, dt=1e-3,
+        force=(0.0, 0.0), length=None, t_max=0.4, dt=1e-3,
     )  # fmt: skip
     record = hc.simulate(scenario)
     recording = hc.studies.Recording(record.t, record.p[:, :2] + 0.3, record.fh[:, :2])
@@ -145,10 +147,15 @@ def test_files_side_by_side_under_a_recording(made, tmp_path, capsys, monkeypatc
         str(hc.with_fields(scenario, {"clay": hc.slab(40.0)}).save(tmp_path / "soft.toml")),
     ]
     out, found, compare = tmp_path / "out", [], comparison.compare_files
+    monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)
+    # what does not depend on a recording
+    monkeypatch.setattr(comparison, "worst_limit", lambda loop: np.nan)
+    monkeypatch.setattr(compare_plots, "CLAY_DAMPINGS", np.geomspace(1.0, 3000.0, 4))
     monkeypatch.setattr(
         comparison, "compare_files", lambda *a, **kw: found.append(compare(*a, **kw)) or found[0]
     )
-    assert main(["compare", *files, "--recording", str(file), "--out", str(out)]) == 0
+    words = ["--recording", str(file), "--dpi", "40", "--out", str(out)]
+    assert main(["compare", *files, *words]) == 0
     assert "off the recorded motion" in capsys.readouterr().out
     assert (out / "recording.png").is_file()
     same, soft = (x.replayed.off for x in found[0])

@@ -10,7 +10,7 @@ import pytest
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.model.operator import Operator
-from hapticclay.studies import boundary, wall_lines, wall_runs
+from hapticclay.studies import boundary, published_walls, wall_lines, wall_runs
 from hapticclay.studies import zwidth as study
 from hapticclay.studies.wall import KINDS, DeviceWall, as_wall
 from hapticclay.studies.wall_lines import theoretical_damping, worst_hand
@@ -28,7 +28,9 @@ ROUGH = replace(BARE, device=hc.Device(0.1, 0.5, friction=0.02, quantum=5e-5))
 @pytest.fixture
 def few_points(monkeypatch):
     """Lines of theory with few points between the dampings that are tried."""
-    monkeypatch.setattr(wall_lines, "LIMIT_POINTS", 5)
+    for module, name in ((wall_lines, "LIMIT_POINTS"), (wall_lines, "TOP_POINTS")):
+        monkeypatch.setattr(module, name, 5)
+    monkeypatch.setattr(published_walls, "LIMIT_POINTS", 5)
 
 
 def stable(wall):

@@ -1,5 +1,6 @@
 """Leaders and followers: against runs from event to event, and closed forms."""
 
+import functools
 import math
 import os
 from dataclasses import replace
@@ -15,7 +16,7 @@ import hapticclay as hc
 from hapticclay.scene.link import KINDS
 from hapticclay.theory.pair_build import Build
 from hapticclay.theory.pair_delays import Delays
-from tests.hunt import examples, some
+from tests.hunt import HUNTS, examples, some
 from tests.oracles import pairs
 
 CARDS = Path(__file__).parents[2] / "mjcf" / "arms"
@@ -173,7 +174,7 @@ def numbers_of(pair, i):
 
 
 @given(seed=st.integers(0, 10**6))
-@settings(max_examples=60, deadline=None)
+@examples(30)
 def test_the_map_is_a_run_from_event_to_event(seed):
     """40 samples from a random state, torques and messages as they arrive."""
     pair = drawn(seed)
@@ -293,7 +294,7 @@ def test_a_measured_force_makes_stability_come_and_go():
 @examples(8)
 @given(seed=st.integers(0, 10**6), kind=st.sampled_from(KINDS))
 def test_no_delay_below_the_limit_is_unstable(seed, kind):
-    """Tenths of a sample, and switches at samples, by eigenvalues of the map; and just beyond."""
+    """Parts of a sample, and switches at samples, by eigenvalues of the map; and just beyond."""
     pair = drawn(seed, kind)
     build, limit = Build(pair), hc.theory.pair_limits(pair).delay
     if math.isinf(limit):
@@ -301,7 +302,9 @@ def test_no_delay_below_the_limit_is_unstable(seed, kind):
     else:
         samples = np.arange(min(40.0, limit / pair.Ts))
         switches = samples + (-pair.delay / pair.Ts) % 1.0
-        below = pair.Ts * np.concatenate([switches, np.arange(0.0, len(samples), 0.1)])
+        below = pair.Ts * np.concatenate(
+            [switches, np.arange(0.0, len(samples), 0.1 if HUNTS else 0.25)]
+        )
         below = below[below < (1.0 - 1e-7) * limit]
         beyond = [limit + x * pair.Ts for x in (1e-9, 1e-6, 1e-3, 1e-2)]
         assert max(build.loop((x, x)).radius() for x in beyond) > 1.0
@@ -369,6 +372,17 @@ def test_a_long_delay_is_judged_without_states(monkeypatch):
         assert (counted.radius < 1.0) is counted.stable
 
 
+def test_a_force_that_is_never_met_goes_around_at_no_delay():
+    """A free follower: the leader decays by its damper alone, at 2000 samples as at none."""
+    device = hc.Device(0.5, 1.0)
+    pair = hc.Pair(device, device, hc.JointPD((400.0,), (20.0,)), hc.Link("position-force", 1.0))
+    found = hc.theory.pair_limits(pair)
+    assert found.stable and found.delay == math.inf
+    assert found.radius == pytest.approx(math.exp(-pair.Ts * 1.0 / 0.5), abs=1e-12)
+    soon = hc.theory.pair_limits(replace(pair, link=hc.Link("position-force", 1e-3)))
+    assert soon.radius == pytest.approx(found.radius, abs=1e-12)
+
+
 # ---- rest, and friction that is fed forward ------------------------------------------------------
 
 
@@ -407,16 +421,22 @@ def test_friction_of_a_seven_joint_pair():
             assert loop.stable() is stable
 
 
+@functools.cache
+def with_friction():
+    law = replace(DRIVE, friction=FRICTION)
+    return hc.theory.pair_limits(seven(Ts=1e-3, delay=1e-3, law=law))
+
+
 def test_less_stiffness_and_more_damping_do_not_help():
     """An undamped common motion: half the Kp and 1.5 times the Kd leave its growth."""
     law = replace(DRIVE, friction=FRICTION)
     soft = replace(law, Kp=tuple(0.5 * x for x in KP), Kd=tuple(1.5 * x for x in KD))
-    full = hc.theory.pair_limits(seven(Ts=1e-3, delay=1e-3, law=law))
-    less = hc.theory.pair_limits(seven(Ts=1e-3, delay=1e-3, law=soft))
+    full = with_friction()
+    less = Build(seven(Ts=1e-3, delay=1e-3, law=soft)).loop().radius()
     # the card has four digits of the published model, for which 1.07326, 70.7 and 71.5 were found
     assert full.radius == pytest.approx(1.07326, abs=2e-4)
     assert math.log(full.radius) / 1e-3 == pytest.approx(70.7, abs=0.2)
-    assert math.log(less.radius) / 1e-3 == pytest.approx(71.5, abs=0.2)
+    assert math.log(less) / 1e-3 == pytest.approx(71.5, abs=0.2)
     assert full.mode.startswith("common motion") and 0.0 < full.friction_fraction < 1.0
     assert "friction feed-forward" in full.advice()
 
@@ -424,7 +444,7 @@ def test_less_stiffness_and_more_damping_do_not_help():
 def test_the_share_of_friction_flips_the_map():
     law = replace(DRIVE, friction=FRICTION)
     pair = seven(Ts=1e-3, delay=1e-3, law=law)
-    share = hc.theory.pair_limits(pair).friction_fraction
+    share = with_friction().friction_fraction
     for factor, stable in ((0.9999, True), (1.0001, False)):
         slopes = factor * share * np.array(law.slopes)
         assert Build(pair).loop(friction=(slopes, slopes)).stable() is stable
@@ -432,13 +452,11 @@ def test_the_share_of_friction_flips_the_map():
 
 def test_a_seven_joint_pair():
     """Arms opposed at 13 Hz, joint 7, beyond 14.3 ms at 500 Hz where all torques are as late."""
-    for late, stable in ((14.2e-3, True), (14.4e-3, False)):
-        found = hc.theory.pair_limits(seven(Ts=2e-3, delay=late))
-        assert found.stable is stable
-        if not stable:
-            assert found.mode == "arms opposed, 13 Hz, joint7"
+    assert Build(seven(Ts=2e-3, delay=14.2e-3)).loop().stable()
+    found = hc.theory.pair_limits(seven(Ts=2e-3, delay=14.4e-3))
+    assert not found.stable and found.mode == "arms opposed, 13 Hz, joint7"
     by_link = hc.theory.pair_limits(seven(Ts=2e-3))
-    assert by_link.delay == pytest.approx(14.15e-3, abs=0.02e-3)
+    assert by_link.stable and by_link.delay == pytest.approx(14.15e-3, abs=0.02e-3)
     assert by_link.mode == "arms opposed, 13 Hz, joint7"
 
 
@@ -504,13 +522,53 @@ def test_absolutely_stable_pairs_are_stable_in_any_hand():
     assert fails
 
 
+def test_forces_both_ways_leave_a_wall_rigid_but_for_the_delay():
+    """(z + C + C e)/(1 - e), e = exp(-2 s T), at 100 kHz: f_h reaches the wall and comes back."""
+    pair = replace(one(kind="four-channel", Ts=1e-5), link=hc.Link("four-channel", delay=4e-3))
+    found = hc.theory.pair_transparency(pair, frequency=(5.0, 0.1))
+    s = 2j * math.pi * found.frequency
+    z, C, late = 6.0 * s + 0.1, 400.0 / s + 50.0, np.exp(-2.0 * s * 4e-3)
+    np.testing.assert_allclose(found.rigid, (z + C + C * late) / (1.0 - late), rtol=5e-3)  # hold
+    assert found.stiffness == pytest.approx(abs(s[0] * found.rigid[0]), rel=1e-12)
+    assert found.stiffness > 400.0 * 100.0  # Kp sees 2/(2 omega T) = 400 of it at 0.1 Hz
+    assert f"{found.stiffness:.4g} N/m at 0.1 Hz" in found.headline()
+
+
+def test_what_resonates_near_the_nyquist_frequency_is_beside_the_criterion():
+    """Kd above b, seen once a sample: stiff springs at both handles, passive, are unstable."""
+    device, law = hc.Device(0.2, 7.0), hc.JointPD((40.0,), (24.0,))
+    pair = hc.Pair(device, device, law, hc.Link("position-position"), Ts=1e-3)
+    found = hc.theory.pair_transparency(pair)
+    assert found.absolutely_stable and "absolutely stable" in found.headline()
+    assert any("Nyquist frequency of 500 Hz" in x for x in found.assumed)
+    spring = hc.Operator(0.0, 0.0, 0.2 * (0.97 * math.pi / 1e-3) ** 2)
+    held = replace(pair, leader_operator=spring, follower_operator=spring)
+    assert not Build(held).loop().stable()
+
+
+def test_a_verdict_says_what_holds_and_touches_the_arms():
+    free = hc.theory.pair_limits(one(kind="position-force"))
+    assert free.assumed[0].startswith("free motion: no hand") and "close no loop" in free.assumed[0]
+    held = hc.theory.pair_limits(one(kind="position-force", **HELD))
+    assert "leader: a hand of 2 kg, 2 N.s/m, 10 N/m" in held.assumed[0]
+    assert "follower: no hand, at an object of 3 kg, 1 N.s/m, 50 N/m" in held.assumed[0]
+    late = hc.JointPD((400.0,), (50.0,), velocity="filter", cutoff=300.0)
+    words = hc.theory.pair_limits(one(law=late)).assumed
+    assert "both laws: PD of 1 joints in the host, rates filtered at 300.0 rad/s" in words
+    assert any("the leader's gains take no part" in x for x in free.assumed)
+    compared = hc.theory.compare_links(one())
+    assert any("close no loop" in x for x in compared.remarks())
+    waves = hc.theory.pair_limits(one(kind="waves"))
+    assert "any delay of the link up to 2 s" in waves.headline()
+
+
 def test_hands_of_a_box():
     pair = replace(one(Ts=4e-3), link=hc.Link(delay=0.16))
-    hands = hc.theory.Box((0.2, 4.0), (0.5, 10.0), (0.0, 40.0))
+    hands = hc.theory.Box((0.2, 4.0), (0.5, 10.0), (20.0, 20.0))
     contacts = hc.theory.Box((0.0, 3.0), (0.0, 20.0), (0.0, 1000.0))
     found = hc.theory.pair_hands(pair, hands, contacts, samples=4)
-    assert len(found.stable) == 8 * 8 + 4
-    for i in (0, 17, found.worst, 66):
+    assert len(found.stable) == 4 * 8 + 4
+    for i in (0, 17, found.worst, 34):
         mass, damper, spring = found.contacts[i]
         held = {
             "leader_operator": hc.Operator(*found.hands[i]),
@@ -548,6 +606,24 @@ def test_no_pair_is_without_an_answer(start):
         numbers = [found.radius, found.delay, found.frequency, found.gain, found.friction_fraction]
         assert not np.isnan([*numbers, *found.slope]).any()
         assert found.text() and found.tables()
+
+
+@pytest.mark.parametrize("kind", KINDS[:3])
+@pytest.mark.parametrize("runs", ["host", "drive"])
+def test_a_pair_without_gains_rests_anywhere_at_any_delay(kind, runs):
+    """Nothing is left but rest, twice for each arm, whose motion nothing ends."""
+    device, law = hc.Device(0.1, 0.0), hc.JointPD((0.0,), (0.0,), runs=runs)
+    pair = hc.Pair(device, device, law, hc.Link(kind, (4e-3, 0.0)), Ts=2e-3)
+    found = hc.theory.pair_limits(pair)
+    assert found.stable and found.radius == 0.0 and found.delay == math.inf
+    assert "rest alone" in found.headline()
+
+
+def test_gains_at_their_bound_are_judged():
+    """Factors of 2 and more lie beyond what may be given, and are tried all the same."""
+    device, law = hc.Device(0.1, 1.0), hc.JointPD((1e9,), (1e9,), runs="drive")
+    found = hc.theory.pair_limits(hc.Pair(device, device, law, hc.Link("position-force")))
+    assert found.stable and found.gain == math.inf
 
 
 def test_a_pair_from_a_file(tmp_path):

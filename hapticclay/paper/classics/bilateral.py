@@ -102,11 +102,11 @@ class Bilateral:
         whole[5, 6], whole[6, 5] = -push.omega, push.omega
         step = matrix_exponential(whole * (times[1] - times[0]))
         z = np.concatenate([np.zeros(4) if start is None else start, [1.0, 1.0, 0.0]])
-        rows = []
-        for _ in times:
-            rows.append(z[:4])
-            z = step @ z
-        return self.shown(times, np.array(rows), push.at(times))
+        rows, n = z[None], len(times)
+        while len(rows) < n:  # as many samples again, moved on by all of them
+            rows = np.concatenate([rows, rows[: n - len(rows)] @ step.T])
+            step = step @ step
+        return self.shown(times, rows[:, :4], push.at(times))
 
     def shown(self, times: np.ndarray, states: np.ndarray, u: np.ndarray) -> Motion:
         """Motion and forces of states under a push."""

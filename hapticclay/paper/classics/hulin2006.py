@@ -142,9 +142,10 @@ CLASSIC = Classic(
     "hulin2006",
     "Stability with delay, damping and a hand",
     "T. Hulin, C. Preusche, G. Hirzinger, Stability boundary for haptic rendering: influence of "
-    "physical damping (2006); J. J. Gil, E. Sanchez, T. Hulin, C. Preusche, "
-    "G. Hirzinger, Stability boundary for haptic rendering: influence of damping and delay, "
-    "J. Computing and Information Science in Engineering 9 (2009) 011005",
+    "physical damping, IEEE/RSJ Int. Conf. Intelligent Robots and Systems (2006) 1570-1575; "
+    "J. J. Gil, E. Sanchez, T. Hulin, C. Preusche, G. Hirzinger, Stability boundary for haptic "
+    "rendering: influence of damping and delay, J. Computing and Information Science in "
+    "Engineering 9 (2009) 011005",
     "The abstract of 2009 could be read (asmedigitalcollection.asme.org): boundaries of quite "
     "complex shape, and a new linear condition for short delays, fast sampling and relatively low "
     "damping. The figures of both and their numbers could not; the condition "

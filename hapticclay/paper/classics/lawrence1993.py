@@ -7,9 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from ...scene.pair import Contact
 from ...studies.chart import Chart, curve
+from ...theory.roots import positive_roots, squared_magnitude
 from ..ledger import Row, row
 from .bilateral import Bilateral, Push, Signals
 from .classic import BESIDE, FORMULA, QUOTED, Classic, Found, Progress, holds
@@ -23,8 +25,8 @@ OMEGAS = np.array([1.0, 3.0, 10.0, 30.0])  # rad/s at which runs are felt
 SWEPT = np.geomspace(0.3, 100.0, 241)  # rad/s of the figure
 SETTLES, SHOWN = 300.0, 20  # [s] of a run before it is felt, and periods felt
 BY_FIT = 1e-6  # share: what is left of the start, e^-30, and the fit
-CROSSINGS = np.geomspace(0.05, 5e3, 200_001)  # rad/s
 SAMPLES = (1e-3, 5e-4)  # [s] of runs whose limits are extrapolated to none
+QUICK_SAMPLES = (4e-3, 2e-3)  # [s]
 BY_RUNS = 2e-3  # share: the limit at no sample, of the first order, from two samples
 STIFF, FINE, SOON = 1000.0, (2e-4, 1e-4), 20.0  # N/m, s, s
 STIFFNESSES = np.geomspace(10.0, 1e5, 81)  # N/m of the object, in the figure
@@ -92,12 +94,8 @@ def largest_delay(law: Channels, thing: Contact = OBJECT) -> float:
     above, below = around(law, thing)
     if np.roots((above + below).coeffs).real.max() >= 0.0:
         return 0.0
-    s = 1j * CROSSINGS
-    L = -above(s) / below(s)
-    size = np.log(np.abs(L))
-    at = np.nonzero(size[:-1] * size[1:] < 0.0)[0]
-    share = size[at] / (size[at] - size[at + 1])
-    omega = CROSSINGS[at] + share * (CROSSINGS[at + 1] - CROSSINGS[at])
+    sizes = [squared_magnitude(Polynomial(p.coeffs[::-1])) for p in (above, below)]
+    omega = np.sqrt(positive_roots(sizes[0] - sizes[1]))
     turned = np.angle(-above(1j * omega) / below(1j * omega)) % (2.0 * math.pi)
     return float(min(turned / (2.0 * omega), default=math.inf))
 
@@ -118,19 +116,18 @@ def continuous_law(law: Channels) -> Callable[[Signals], tuple[np.ndarray, np.nd
 def sampled_ends(law: Channels):
     """The law at samples, each host with what it saw and what arrived."""
 
-    def of(poly: np.poly1d, seen: Seen) -> float:
-        c0, c1, c2 = coefficients[id(poly)]
-        return c2 * seen.a + c1 * seen.v + c0 * seen.x
+    def of(c: tuple[float, ...], seen: Seen) -> float:
+        return c[2] * seen.a + c[1] * seen.v + c[0] * seen.x
 
     polys = (law.C1, law.C4, law.Cm, law.Cs)
-    coefficients = {id(poly): tuple(float(poly[k]) for k in range(3)) for poly in polys}
+    C1, C4, Cm, Cs = (tuple(float(poly[k]) for k in range(3)) for poly in polys)
 
     def leader(own: Seen, other: Seen) -> tuple[float, Seen]:
-        return -of(law.Cm, own) - of(law.C4, other) - law.C2 * other.F, own
+        return -of(Cm, own) - of(C4, other) - law.C2 * other.F, own
 
     def follower(own: Seen, other: Seen) -> tuple[float, Seen]:
         pushed = -law.C3 * other.F  # the arm pushes the hand with F, the hand the arm with -F
-        return -of(law.Cs, own) + of(law.C1, other) + pushed, own
+        return -of(Cs, own) + of(C1, other) + pushed, own
 
     return leader, follower
 
@@ -145,11 +142,12 @@ def felt_in_run(law: Channels, omega: float) -> complex:
     return complex(np.sum(run.f[first:, 0] * wave) / np.sum(run.x[first:, 0] * wave))
 
 
-def _felt(progress: Progress) -> list[Row]:
-    rows = []
+def _felt(progress: Progress) -> tuple[list[Row], list[np.ndarray]]:
+    rows, runs = [], []
     for law in LAWS:
         progress(f"felt impedance, {law.name}")
         ours = np.array([felt_in_run(law, omega) for omega in OMEGAS])
+        runs.append(ours)
         transparent = law is TRANSPARENT
         expected = (
             impedance(OBJECT)(1j * OMEGAS) if transparent else felt_impedance(law, 1j * OMEGAS)
@@ -165,7 +163,7 @@ def _felt(progress: Progress) -> list[Row]:
                 + ", ".join(f"{x:.3g}" for x in np.abs(ours / impedance(OBJECT)(1j * OMEGAS))),
             )
         )
-    return rows
+    return rows, runs
 
 
 def limit_in_runs(law: Channels, thing: Contact, near: float, samples, settled: float) -> float:
@@ -182,8 +180,8 @@ Marks = list[tuple[Channels, Contact, float]]  # limits that runs have found
 
 def _delays(quick: bool, progress: Progress) -> tuple[list[Row], Marks]:
     rows, marks = [], []
-    laws = (LAWS[0], TRANSPARENT) if quick else LAWS
-    cases = [(law, OBJECT, SAMPLES, 60.0) for law in laws]
+    laws, samples = ((LAWS[0], TRANSPARENT), QUICK_SAMPLES) if quick else (LAWS, SAMPLES)
+    cases = [(law, OBJECT, samples, 60.0) for law in laws]
     if not quick:
         cases.append((TRANSPARENT, replace(OBJECT, K=STIFF), FINE, SOON))
     for law, thing, samples, settled in cases:
@@ -277,12 +275,11 @@ def _robustness(progress: Progress) -> list[Row]:
     ]
 
 
-def _felt_chart() -> Chart:
+def _felt_chart(runs: list[np.ndarray]) -> Chart:
     s, curves = 1j * SWEPT, []
-    for law in LAWS:
+    for law, found in zip(LAWS, runs, strict=True):
         curves.append(curve(law.name, SWEPT, np.abs(felt_impedance(law, s) / s)))
-        runs = [abs(felt_in_run(law, omega)) / omega for omega in OMEGAS]
-        curves.append(curve("", OMEGAS, runs, "marks"))
+        curves.append(curve("", OMEGAS, np.abs(found) / OMEGAS, "marks"))
     return Chart(
         "felt",
         "What the hand feels of an object",
@@ -320,8 +317,9 @@ def _delay_chart(marks: Marks) -> Chart:
 
 def make(quick: bool, progress: Progress) -> Found:
     delays, marks = _delays(quick, progress)
-    rows = (*_felt(progress), *delays, *_robustness(progress))
-    return Found(rows, (_felt_chart(), _delay_chart(marks)))
+    felt, runs = _felt(progress)
+    rows = (*felt, *delays, *_robustness(progress))
+    return Found(rows, (_felt_chart(runs), _delay_chart(marks)))
 
 
 CLASSIC = Classic(

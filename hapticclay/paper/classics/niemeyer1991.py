@@ -277,7 +277,7 @@ def make(quick: bool, progress: Progress) -> Found:
 
 CLASSIC = Classic(
     "niemeyer1991",
-    "Wave variables: a link that no delay makes active",
+    "Wave variables: a link that no constant delay makes active",
     "R. J. Anderson, M. W. Spong, Bilateral control of teleoperators with time delay, IEEE Trans. "
     "Automatic Control 34 (1989) 494-501; G. Niemeyer, J.-J. E. Slotine, Stable adaptive "
     "teleoperation, IEEE J. Oceanic Engineering 16 (1991) 152-162; the same, Telemanipulation with "

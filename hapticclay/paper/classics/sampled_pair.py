@@ -137,20 +137,21 @@ def free_run(
     delay: one way, in samples, one at least. ends: other ones than those of the pair's link, with
     messages of what was seen.
     """
-    arms = arms_of(pair)
+    leader, follower = arms_of(pair)
     waves = ends is None and pair.link.kind == "waves"
-    ends = ends or ends_of(pair)
+    lead, follow = ends or ends_of(pair)
     first: Any = 0.0 if waves else Seen(0.0, 0.0, 0.0, 0.0)
     there, back = deque([first] * delay), deque([first] * delay)
-    arms[0].let_go(1.0)
+    leader.let_go(1.0)
     out = []
     for _ in range(samples):
-        out.append((arms[0].x, arms[1].x))
-        arrived = back.popleft(), there.popleft()
-        for arm, end, message, line in zip(arms, ends, arrived, (there, back), strict=True):
-            force, sent = end(arm.seen(), message)
-            line.append(sent)
-            arm.step(force)
+        out.append((leader.x, follower.x))
+        force, sent = lead(leader.seen(), back.popleft())
+        pushed, answer = follow(follower.seen(), there.popleft())
+        there.append(sent)
+        back.append(answer)
+        leader.step(force)
+        follower.step(pushed)
     return np.array(out)
 
 

@@ -1,4 +1,4 @@
-"""Wave variables: what goes through the link is a wave, so no delay makes the link active.
+"""Wave variables: what goes through the link is a wave, so no constant delay makes it active.
 
     u = (b v + F)/sqrt(2 b) to the follower,  w = (b v - F)/sqrt(2 b) to the leader
 
