@@ -559,7 +559,9 @@ def test_a_verdict_says_what_holds_and_touches_the_arms():
     compared = hc.theory.compare_links(one())
     assert any("close no loop" in x for x in compared.remarks())
     waves = hc.theory.pair_limits(one(kind="waves"))
-    assert "any delay of the link up to 2 s" in waves.headline()
+    assert "any delay of the link up to 2 s; least damped: " in waves.headline()
+    first = dict(zip(compared.kinds, compared.tables()["architectures"]["first"], strict=True))
+    assert first["waves"] == "" and first["position-position"].startswith("arms opposed")
 
 
 def test_hands_of_a_box():
