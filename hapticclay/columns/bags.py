@@ -78,15 +78,25 @@ def bag(field: str, path: Path, table: str = "") -> ArrayTable:
         from rosbags.typesys import Stores, get_typestore
 
     topics: dict[str, Topic] = {}
+    received: dict[str, list[float]] = {}
     with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
         start = reader.start_time
         for connection, stamp, raw in reader.messages():
             message = reader.deserialize(raw, connection.msgtype)
             row = dict(_numbers(message, start=start))
-            received = 1e-9 * (stamp - start)
-            row = {"t": received} | row if "stamp" not in row else row | {"received": received}
             topics.setdefault(connection.topic, Topic()).rows.append(row)
+            received.setdefault(connection.topic, []).append(1e-9 * (stamp - start))
+    for name, topic in topics.items():
+        topic.rows = _timed(topic.rows, received[name])
     return _table(field, path, "ROS", topics, table)
+
+
+def _timed(rows: list[Row], received: list[float]) -> list[Row]:
+    """Messages on their stamps; on when they were received where one has no stamp."""
+    timed = zip(received, rows, strict=True)
+    if all("stamp" in row for row in rows):
+        return [row | {"received": t} for t, row in timed]
+    return [{"t": t} | row for t, row in timed]
 
 
 def _numbers(x: Any, name: str = "", start: int = 0) -> Iterator[tuple[str, float]]:
