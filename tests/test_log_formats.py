@@ -12,6 +12,7 @@ import pytest
 from scipy.io import netcdf_file, savemat
 
 import hapticclay as hc
+from hapticclay.columns import parquet_files, workbooks
 
 N = 150
 T = 0.25 * np.arange(N)  # exact in any format below
@@ -218,6 +219,37 @@ def test_lerobots_layout(tmp_path):
     with pytest.raises(hc.ParameterError, match="4, 7"):
         hc.Log.read(file, where={"episode_index": 1})
     assert hc.studies.log_report(hc.Log.read(file)).stamps.backward.tolist() == [75]
+
+
+@pytest.mark.parametrize("size", [4, -1])  # -1: of any length
+def test_rows_without_a_list_are_empty_and_the_others_stay_whole(size, tmp_path):
+    """Two lists of four in four rows are not four lists of two."""
+    lists = [[1.0, 2.0, 3.0, 4.0], None, [5.0, 6.0, 7.0, 8.0], None]
+    q = pa.array(lists, pa.list_(pa.float64(), size))
+    pq.write_table(pa.table({"t": [0.0, 0.1, 0.2, 0.3], "q": q}), tmp_path / "log.parquet")
+    table = parquet_files.parquet("log", tmp_path / "log.parquet")
+    assert [x.text for x in table.heads] == ["t", *(f"q[{i}]" for i in range(4))]
+    nan = np.nan
+    for i in range(4):
+        np.testing.assert_array_equal(table.loose_numbers(1 + i), [1.0 + i, nan, 5.0 + i, nan])
+    with pytest.raises(hc.ParameterError, match=r"row 1, column 'q\[0\]'"):
+        table.numbers(1)
+
+
+def test_a_workbook_is_closed_when_it_is_read(tmp_path, monkeypatch):
+    book = openpyxl.Workbook()
+    for row in (["t", "x"], [0.0, 1.0], [0.1, 2.0]):
+        book.active.append(row)
+    book.save(tmp_path / "log.xlsx")
+    load, opened = openpyxl.load_workbook, []
+
+    def keeping(*args, **how):
+        opened.append(load(*args, **how))
+        return opened[-1]
+
+    monkeypatch.setattr(openpyxl, "load_workbook", keeping)
+    workbooks.excel("log", tmp_path / "log.xlsx")
+    assert opened[0]._archive.fp is None
 
 
 @pytest.mark.parametrize("ros1", [True, False])
