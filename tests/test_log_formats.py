@@ -331,6 +331,23 @@ def test_a_topic_with_a_message_without_stamp_is_on_the_times_of_its_receipt(wit
     np.testing.assert_array_equal(log.values("point.x"), at**2)
 
 
+def test_json_messages_of_which_some_have_a_clock_are_on_the_times_of_the_log(tmp_path):
+    from mcap.writer import Writer
+
+    with open(tmp_path / "a.mcap", "wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("Row", "jsonschema", b"{}")
+        way = writer.register_channel("/tip", "json", schema)
+        for i in range(8):
+            row = {"x": 2.0 * i} | ({"t": 100.0 + i} if i > 2 else {})
+            writer.add_message(way, 250_000_000 * i, json.dumps(row).encode(), 250_000_000 * i)
+        writer.finish()
+    log = hc.Log.read(tmp_path / "a.mcap")
+    np.testing.assert_allclose(log.values("t"), 0.25 * np.arange(8), rtol=1e-15)
+    np.testing.assert_array_equal(log.values("x"), 2.0 * np.arange(8))
+
+
 def test_our_own_exports_are_read_with_their_units(tmp_path):
     record = hc.simulate(hc.constant_cut(t_max=0.05))
     for kind in ("nc", "parquet", "csv", "mcap", "mat"):

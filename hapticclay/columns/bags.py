@@ -48,15 +48,24 @@ def mcap(field: str, path: Path, table: str = "") -> ArrayTable:
         if channels and any(x.message_encoding != "json" for x in channels):
             return bag(field, path, table)
         topics: dict[str, Topic] = {}
+        logged: dict[str, list[float]] = {}
         start = None
         for schema, channel, message in reader.iter_messages():
             topic = topics.setdefault(channel.topic, Topic(units=_schema_units(schema)))
             start = message.log_time if start is None else start
-            row = dict(_numbers(json.loads(message.data)))
-            own = next((x for x in ("t", "time", "timestamp") if x in row), None)
-            row = row if own else {"t": 1e-9 * (message.log_time - start), **row}
-            topic.rows.append(row)
+            topic.rows.append(dict(_numbers(json.loads(message.data))))
+            logged.setdefault(channel.topic, []).append(1e-9 * (message.log_time - start))
+    for name, topic in topics.items():
+        topic.rows = _clocked(topic.rows, logged[name])
     return _table(field, path, "MCAP", topics, table)
+
+
+def _clocked(rows: list[Row], logged: list[float]) -> list[Row]:
+    """Messages on a clock that each of them has; else on when they were logged."""
+    if any(all(clock in row for row in rows) for clock in ("t", "time", "timestamp")):
+        return rows
+    timed = zip(logged, rows, strict=True)
+    return [{"t": t} | {k: x for k, x in row.items() if k != "t"} for t, row in timed]
 
 
 def _schema_units(schema: Any) -> dict[str, str]:
