@@ -285,7 +285,7 @@ def gain_band(
     """
     parts = Loop(**{f: getattr(loop, f) for f in Loop.__dataclass_fields__})
     return _limit_band(
-        ("clay b [N.s/m]", "gain limit K"),
+        ("clay b [N.s/m]", "gain limit K [1/kg]"),
         lambda x, hand: gain_limit(replace(parts, b=x, operator=hand)),
         b,
         hands_of(hands),

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
+from ..scene.virtual_wall import VirtualWall
 from ..studies.population import Band
 from ..studies.robustness import Instability, RiskMap
 from .palette import BLACK, BLUE, GREY, MID_GREY, SKY_BLUE, VERMILION, WHITE
@@ -32,7 +33,6 @@ MOST_RATIO = 100.0  # largest ratio of limits shown in a band
 MOST_PANELS = 4
 PANEL_BINS = 10  # of a panel
 PARAMETER_NAMES = {
-    "K": "gain K",
     "b": "clay b [N.s/m]",
     "B": "virtual damping B [N.s/m]",
     "delay": "delay [s]",
@@ -90,7 +90,7 @@ def _risk_curves(result: Instability) -> Figure:
     figure = Figure(figsize=figure_size(columns, 0.6 + 2.9 * rows))
     axes = figure.subplots(rows, columns, squeeze=False, sharey=True)
     for ax, chart in zip(axes.flat, charts, strict=False):
-        _risk_curve(ax, chart)
+        _risk_curve(ax, chart, _quantity(result, chart.x_name))
     for ax in axes.flat[len(charts) :]:
         ax.remove()
     for row in axes:
@@ -108,7 +108,15 @@ def _influences(result: Instability) -> list[RiskMap]:
     return charts[:MOST_PANELS]
 
 
-def _risk_curve(ax: Axes, chart: RiskMap) -> None:
+def _quantity(result: Instability, name: str) -> str:
+    """A parameter with its unit; K is that of the loop or of the wall."""
+    if name == "K":
+        wall = isinstance(result.trials.base, VirtualWall)
+        return "virtual stiffness K [N/m]" if wall else "gain K [1/kg]"
+    return PARAMETER_NAMES.get(name, name)
+
+
+def _risk_curve(ax: Axes, chart: RiskMap, quantity: str) -> None:
     share = chart.probability[:, 0]
     low, high = (x[:, 0] for x in chart.interval())
     look: Any = dict(ms=stroke(4.5), elinewidth=stroke(1.2), capsize=stroke(2.5))
@@ -119,7 +127,7 @@ def _risk_curve(ax: Axes, chart: RiskMap) -> None:
     elif narrow():
         ax.xaxis.set_major_locator(MaxNLocator(4))
     ax.yaxis.set_major_formatter(PercentFormatter(1.0))
-    label_axes(ax, PARAMETER_NAMES.get(chart.x_name, chart.x_name))
+    label_axes(ax, quantity)
     ax.set_ylim(bottom=0.0)
 
 
@@ -151,7 +159,7 @@ def _risk_plane(result: Instability) -> Figure:
     if (line := result.boundary()) is not None:
         ax.plot(*line, color=WHITE, lw=stroke(3.4))
         ax.plot(*line, color=BLACK, lw=stroke(1.6), label="exact, middle hand")
-    label_axes(ax, *(PARAMETER_NAMES.get(name, name) for name in names))
+    label_axes(ax, *(_quantity(result, name) for name in names))
     plain_ticks(ax)
     bar = figure.colorbar(mesh, ax=ax, pad=0.02, format=PercentFormatter(1.0))
     bar.set_label("probability of instability")

@@ -18,12 +18,13 @@ import numpy as np
 import pytest
 
 import hapticclay as hc
+from hapticclay.cli import app
 from hapticclay.live.clock import FRAME_TIME
 from hapticclay.live.replay import Replay
 from hapticclay.live.session import Session
 from hapticclay.views import window
 from hapticclay.views.viewer import Pane
-from tests.hunt import some
+from tests.hunt import HUNTS
 
 missing = [tool for tool in ("Xvfb", "xdotool") if not shutil.which(tool)]
 pytestmark = pytest.mark.skipif(
@@ -211,7 +212,10 @@ def test_closing_while_clay_is_cut_ends_it_and_the_record_is_there(screen, tmp_p
     assert record.outcome.code == "finished"
 
 
-@pytest.mark.parametrize("how", some(["message", "destroyed", "Ctrl-Q", "Ctrl-C"], 2))
+ENDS = ["message", "destroyed", "Ctrl-Q", "Ctrl-C"]
+
+
+@pytest.mark.parametrize("how", ENDS if HUNTS else ENDS[:1])  # the others end a session above
 def test_closing_a_replay_before_its_end_ends_it(screen, tmp_path, how):
     """It begins in the clay, so that clay is cut from the first picture on."""
     hc.simulate(hc.constant_cut(clay=(-0.05, 0.15)), every=10).save(tmp_path / "r")
@@ -221,8 +225,8 @@ def test_closing_a_replay_before_its_end_ends_it(screen, tmp_path, how):
 
 def test_mouse_cuts_through_the_clay(screen, tmp_path):
     mouse = Mouse(screen, tmp_path, "view", "--out", "o")
-    mouse.drag(192, 12, 2)
-    mouse.until(lambda now: now["x"] > 0.17 and now["frames"] > 100)
+    mouse.drag(192, 6)
+    mouse.until(lambda now: now["x"] > 0.17 and now["frames"] > 50)
     code, out, err = mouse.close()
     assert (code, err) == (0, ""), (out, err)
     record = hc.Record.load(tmp_path / "o")
@@ -241,7 +245,7 @@ def test_mouse_cuts_through_the_clay(screen, tmp_path):
         "summary.json",
         "velocity.png",
     ]
-    assert sum(record.notes["late_ms"]["frames"]) == record.notes["frames"] > 100
+    assert sum(record.notes["late_ms"]["frames"]) == record.notes["frames"] > 50
 
 
 def test_keys_change_what_runs_and_switch_the_scenario(screen, tmp_path):
@@ -380,18 +384,13 @@ def test_a_replay_offers_the_keys_that_act_on_it():
     assert dict(window._writing().rows)["state"] == "replaying"
 
 
-def test_without_a_display_it_says_what_to_do(tmp_path):
-    env = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    out = subprocess.run(
-        [sys.executable, "-m", "hapticclay", "view"],
-        cwd=tmp_path,
-        env=env,
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    assert out.returncode == 2 and out.stderr.count("\n") == 1
-    assert "--web" in out.stderr and "hapticclay video" in out.stderr
+def test_without_a_display_it_says_what_to_do(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert app.main(["view"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "--web" in said and "hapticclay video" in said
     assert os.listdir(tmp_path) == []
 
 
@@ -423,17 +422,12 @@ def test_a_window_that_fails_leaves_the_record(monkeypatch):
 
 
 @pytest.mark.parametrize("lack,said", [("display", "does not answer"), ("OpenGL", "libgl1")])
-def test_a_display_that_does_not_answer_or_draw_is_named(lack, said, tmp_path):
+def test_a_display_that_does_not_answer_or_draw_is_named(lack, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
     with contextlib.ExitStack() as stack:
         name = ":4711" if lack == "display" else stack.enter_context(x_server("-extension", "GLX"))
-        out = subprocess.run(
-            [sys.executable, "-m", "hapticclay", "view"],
-            cwd=tmp_path,
-            env={**os.environ, "DISPLAY": name},
-            capture_output=True,
-            text=True,
-            timeout=60,
-        )
-    assert out.returncode == 2 and out.stderr.count("\n") == 1
-    assert all(part in out.stderr for part in (name, said, "--web"))
+        monkeypatch.setenv("DISPLAY", name)
+        assert app.main(["view"]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1 and all(part in told for part in (name, said, "--web"))
     assert os.listdir(tmp_path) == []  # no MUJOCO_LOG.TXT

@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+from tests.hunt import some
+
 STUDIES = {
     "sweep": """
 hc.studies.run_sweep(hc.studies.Sweep(
@@ -51,7 +53,7 @@ def last_line(done):
     return done.stderr.splitlines()[-1]
 
 
-@pytest.mark.parametrize("study", STUDIES)
+@pytest.mark.parametrize("study", some(STUDIES, 2))  # all by the same pool
 def test_a_script_without_main_guard_is_told_of_it(tmp_path, study):
     said = last_line(run_script(HEAD + STUDIES[study], tmp_path))
     assert said.startswith("ChildProcessError: the study must stand below")

@@ -140,8 +140,8 @@ def test_links_of_a_stick_figure_keep_their_lengths():
 
 @needs_gl
 def test_films_of_arms(record):
-    shots = [x.copy() for x in film.frames(record, FilmOptions(size=(480, 320), speed=0.5))]
-    assert shots[0].shape == (320, 480, 3) and len(shots) >= 5
+    shots = [x.copy() for x in film.frames(record, FilmOptions(size=(480, 320), speed=1.0))]
+    assert shots[0].shape == (320, 480, 3) and len(shots) >= 3
     assert (shots[0] != shots[-1]).any(axis=-1).sum() > 100
     assert (shots[0].astype(int) @ [1, 0, -1] > 90).sum() > 20  # the handle is orange
 

@@ -36,7 +36,8 @@ def test_the_dent_stays_because_the_block_yields(yields):
     while scene.data.time < 1.1:
         scene.step()
     assert (0.012 if yields else 0.005) < scene.dent() < 0.021
-    while scene.data.time < flex_block.PATH[-1, 0]:
+    end = flex_block.PATH[-1 if yields else -2, 0]  # it is whole again once the tool has left
+    while scene.data.time < end:
         scene.step()
     assert 0.008 < scene.dent() < 0.015 if yields else scene.dent() < 0.001
     assert scene.model.nv == 2 + 3 * 7 * 7 * 2  # the lowest layer of nodes is pinned

@@ -15,7 +15,7 @@ from hapticclay.views import captions, path_plots, run_figures, run_plots
 
 @pytest.fixture(scope="module")
 def run():
-    return hc.simulate(hc.constant_cut(dt=1e-3))
+    return hc.simulate(hc.constant_cut(dt=2e-3))
 
 
 def lines(figure):

@@ -37,11 +37,11 @@ def hostile():
             continue
         for other in others(name, value):
             try:
-                with matplotlib.rc_context({name: other}):
-                    changed[name] = other
-                break
+                matplotlib.rcParams.validate[name](other)
             except (ValueError, TypeError, KeyError, RuntimeError):
                 continue
+            changed[name] = other
+            break
     return changed
 
 
