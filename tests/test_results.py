@@ -33,7 +33,9 @@ def pair():
     return hc.studies.PairLog(t, leader, follower, 12.0 * (leader - follower))
 
 
+@functools.cache
 def result(name):
+    """A result, made once: no test changes it."""
     loop = hc.studies.PushedLoop("x", b=0.0, operator=HAND, Ts=3.6e-4)
     trials = hc.studies.Trials(WALL, {"K": hc.studies.Distribution("uniform", 1.0, 9e3)}, runs=20)
     return {

@@ -157,7 +157,8 @@ class SimulationBatch:
             b: as in `Simulation.set`, one for all of these runs or shape (n,).
 
         Raises:
-            ParameterError: a value is out of its bounds, or an operator would be added or removed.
+            ParameterError: a value is out of its bounds, or an operator would be added or removed;
+                no run is changed then.
         """
         which = self._indices("runs", runs)
         n = len(which)
@@ -166,16 +167,11 @@ class SimulationBatch:
         gains = None if gain is None else self._gains(gain, n)
         factors = _each("b", b, n, is_series(b))
         with Alone(self) as all_:
-            for k, hand, factor in zip(which, operators, factors, strict=True):
-                changes: dict[str, Any] = {}
-                if hand is not None:
-                    started_with_operator(all_.given[k], hand)
-                    changes["operator"] = hand
-                if factor is not None:
-                    factor, clay = number(f"b[{k}]", factor, 0.0, 1e6), all_.given[k].clay
-                    changes["clay"] = clay and clay.scaled(factor)
-                if changes:
-                    all_.change(k, lambda s, changes=changes: replace(s, **changes))
+            each = zip(which, operators, factors, strict=True)
+            changes = [_changes(k, all_.given[k], hand, b) for k, hand, b in each]
+            for k, change in zip(which, changes, strict=True):
+                if change:
+                    all_.change(k, lambda s, change=change: replace(s, **change))
             if gains is not None:
                 all_.set_gain(np.array(which, np.int64), gains)
 
@@ -281,6 +277,18 @@ def _array_or_none(value: Any) -> np.ndarray | None:
         return np.asarray(value)
     except ValueError:
         return None
+
+
+def _changes(k: int, given: Scenario, hand: Any, factor: Any) -> dict[str, Any]:
+    """Checked fields of the scenario of run k that an operator and a factor b change."""
+    changes: dict[str, Any] = {}
+    if hand is not None:
+        started_with_operator(given, hand)
+        changes["operator"] = replace(given, operator=hand).operator
+    if factor is not None:
+        factor = number(f"b[{k}]", factor, 0.0, 1e6)
+        changes["clay"] = given.clay and given.clay.scaled(factor)
+    return changes
 
 
 def _each(field: str, value: Any, n: int, several: bool) -> Sequence[Any]:

@@ -6,6 +6,7 @@ Biometrika 73, 1986, 13-22), which holds whatever correlation there is within a 
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -80,8 +81,12 @@ def block_fit(
 
     start, low, high, size = (np.array(x) for x in zip(*unknowns, strict=True))
 
+    @functools.lru_cache(maxsize=1)  # slopes begin with the last residuals
+    def kept(x: bytes) -> np.ndarray:
+        return residuals(np.frombuffer(x) * size)
+
     def of(x: np.ndarray) -> np.ndarray:
-        return residuals(x * size)
+        return kept(x.tobytes()).copy()
 
     def slopes_at(x: np.ndarray) -> Any:
         return _slopes(of, x, step, high / size)

@@ -54,13 +54,36 @@ def _stop(v: float, a: float, r: float) -> float:
 
 def _slid(q: float, v: float, a: float, r: float, h: float) -> tuple[float, float]:
     """Position and velocity after a time without a stop: v' = a - r v."""
+    phi, psi = _weights(r, h)
+    return q + v * phi + a * psi, v * (1.0 - r * phi) + a * phi
+
+
+def _weights(r: float, h: float) -> tuple[float, float]:
+    """Integrals of exp(-r t) over a time, once and twice."""
     x = r * h
     phi = -math.expm1(-x) / r if x > 1e-12 else h
     if x < SERIES:
         psi = h * h * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x / 720.0))))
     else:
         psi = (h - phi) / r
-    return q + v * phi + a * psi, v * (1.0 - r * phi) + a * phi
+    return phi, psi
+
+
+def stepper(axis: Axis, h: float) -> Callable[[float, float, float], tuple[float, float]]:
+    """`Axis.step` over a time, position, velocity and torque given; quicker where it slides."""
+    J, b, friction, offset = axis
+    r = b / J
+    phi, psi = _weights(r, h)
+    fade = 1.0 - r * phi
+
+    def step(q: float, v: float, torque: float) -> tuple[float, float]:
+        a = (torque - offset - math.copysign(friction, v)) / J
+        after = v * fade + a * phi
+        if v * after > 0.0:  # it has not stopped
+            return q + v * phi + a * psi, after
+        return axis.step(q, v, torque, h)
+
+    return step
 
 
 def follow(
@@ -84,6 +107,7 @@ def follow(
     torque, (q, v) = law(), start
     whole = math.floor(late / Ts)
     part = late - whole * Ts
+    begin, end = (stepper(axis, h) for h in (part, Ts - part))
     queue = [torque(target[0] - q)] * (whole + 1)
     out = np.empty(len(target))
     for k, aim in enumerate(target):
@@ -94,6 +118,6 @@ def follow(
         queue.append(torque(aim - q))
         before = queue.pop(0)
         if part > 0.0:
-            q, v = axis.step(q, v, before, part)
-        q, v = axis.step(q, v, queue[0], Ts - part)
+            q, v = begin(q, v, before)
+        q, v = end(q, v, queue[0])
     return out

@@ -116,20 +116,35 @@ def _local_deviation(off: np.ndarray) -> np.ndarray:
 def _gaps(x: np.ndarray, at: np.ndarray) -> list[tuple[int, int]]:
     """(start, stop) of samples between a jump away and a jump back, or frozen before a jump."""
     out, end = [], -1
-    for k, i in enumerate(at.tolist()):
+    for i, found in zip(at.tolist(), _jumps_back(x, at).tolist(), strict=True):
         if i <= end:
             continue
         if i < SIDES[0] or i >= len(x) - 1 - SIDES[0]:  # the end of the column
             out.append((0, i + 1) if i < SIDES[0] else (i + 1, len(x)))
             continue
-        back = at[k + 1 : np.searchsorted(at, i + LONGEST, "right")].tolist()
-        found = next((j for j in back if _stands_out(x, i + 1, j + 1).all()), None)
-        if found is not None:
+        if found >= 0:
             out.append((i + 1, found + 1))
             end = found
-        elif (first := _first_repeat(x, i)) < i and _stands_out(x, first + 1, i + 1).any():
+            continue
+        first = _first_repeat(x, i)
+        if first < i and _stand_out(x, np.array([first + 1]), i - first).any():
             out.append((first + 1, i + 1))
     return out
+
+
+def _jumps_back(x: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """For each jump the next one after which the samples between stand out; -1 for none, (n,)."""
+    more = np.searchsorted(at, at + LONGEST, "right") - np.arange(len(at)) - 1
+    away = np.repeat(np.arange(len(at)), more)
+    back = at[away + 1 + np.arange(len(away)) - np.repeat(np.cumsum(more) - more, more)]
+    length, found = back - at[away], np.full(len(at), -1)
+    out = np.zeros(len(away), dtype=bool)
+    for gap in np.unique(length):
+        mine = length == gap
+        out[mine] = _stand_out(x, at[away[mine]] + 1, int(gap)).all(axis=1)
+    first, which = np.unique(away[out], return_index=True)
+    found[first] = back[out][which]
+    return found
 
 
 def _first_repeat(x: np.ndarray, i: int) -> int:
@@ -140,19 +155,22 @@ def _first_repeat(x: np.ndarray, i: int) -> int:
     return first
 
 
-def _stands_out(x: np.ndarray, first: int, stop: int) -> np.ndarray:
-    """Whether first and last of some samples lie far from a curve that both sides follow, (2,)."""
-    ends = x[[first, stop - 1]] - x[first]
+def _stand_out(x: np.ndarray, first: np.ndarray, gap: int) -> np.ndarray:
+    """Whether gaps of a length have ends far from a curve that both sides follow, (n, 2)."""
+    far, zero = np.zeros((len(first), 2), dtype=bool), x[first, None]
+    ends = x[first[:, None] + [0, gap - 1]] - zero
     for side in SIDES:
-        left, right = min(side, first), min(side, len(x) - stop)
-        around = np.concatenate((x[first - left : first], x[stop : stop + right])) - x[first]
-        if len(around) < 2 * SIDES[-1]:
-            break
-        rest, bridge = _bridge(left, stop - first, right, 3 if side > SIDES[-1] else 2)
-        deviation = np.max(np.abs(rest @ around))
-        if (far := np.abs(ends - bridge @ around) > FAR * deviation).any():
-            return far
-    return np.zeros(2, dtype=bool)
+        left, right = np.minimum(side, first), np.minimum(side, len(x) - gap - first)
+        for sides in set(zip(left.tolist(), right.tolist(), strict=True)):
+            mine = (left == sides[0]) & (right == sides[1]) & ~far.any(axis=1)
+            if sum(sides) < 2 * SIDES[-1] or not mine.any():
+                continue
+            places = np.concatenate((np.arange(-sides[0], 0), gap + np.arange(sides[1])))
+            around = x[first[mine, None] + places] - zero[mine]
+            rest, bridge = _bridge(sides[0], gap, sides[1], 3 if side > SIDES[-1] else 2)
+            deviation = np.abs(around @ rest.T).max(axis=1, keepdims=True)
+            far[mine] = np.abs(ends[mine] - around @ bridge.T) > FAR * deviation
+    return far
 
 
 @functools.lru_cache(maxsize=1000)  # a gap is short, and only near the ends has fewer samples

@@ -191,10 +191,10 @@ def yield_map(
             expected: PushClass = "sticks"
             if loop.push >= Fy * push:
                 expected = "grows" if push_outcomes(at, flow=flow)[1] == "grows" else "limit cycle"
-            buzzes = expected == "limit cycle"
-            kept = [x.speed for x in limit_cycles(at, flow=flow) if x.kind == "limit cycle"]
-            predicted = kept[-1] if buzzes and kept else math.nan
-            exact = Fy * peak if buzzes else math.nan
+            predicted = exact = math.nan
+            if expected == "limit cycle":
+                kept = [x.speed for x in limit_cycles(at, flow=flow) if x.kind == expected]
+                predicted, exact = kept[-1] if kept else math.nan, Fy * peak
             found = classify_push(replace(loop, K=gain), flow)
             cells.append(YieldCell(Fy, gain, expected, predicted, exact, *found))
     return YieldMap(loop, least, limit, tuple(K), tuple(critical), tuple(speed), tuple(cells))

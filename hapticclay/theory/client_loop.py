@@ -170,12 +170,14 @@ def client_map(handle: AnyHandle, K: float, B: float, Ts: float, delay: float) -
 
 def holds(handle: AnyHandle, K: float, B: float, Ts: float, delay: float) -> bool:
     """Whether the loop is stable: all modes but rigid motion lie within the unit circle."""
-    return _stable(client_map(handle, K, B, Ts, delay))
+    return bool(_stable(client_map(handle, K, B, Ts, delay)))
 
 
-def _stable(loop: np.ndarray) -> bool:
-    z = np.linalg.eigvals(loop)
-    return bool(np.abs(z[np.abs(z - 1.0) > AT_REST]).max(initial=0.0) < 1.0 + ROUNDING)
+def _stable(loops: np.ndarray) -> np.ndarray:
+    """Whether maps of shape (..., n, n) are stable."""
+    z = np.linalg.eigvals(loops)
+    moving = np.where(np.abs(z - 1.0) > AT_REST, np.abs(z), 0.0)
+    return moving.max(axis=-1) < 1.0 + ROUNDING
 
 
 Sample = Annotated[float, Bound(1e-6, 1.0, "s")]
@@ -194,18 +196,18 @@ def rendered_stiffness_limits(
     handle: AnyHandle, B: Sequence[float], Ts: Sample, delay: Delay = 0.0
 ) -> tuple[float, ...]:
     """Largest stable stiffness by damping of the wall: the Z-width of a program's loop."""
-    dampings = [number("B", b, -1e6, 1e6) for b in B]
+    dampings = np.array([number("B", b, -1e6, 1e6) for b in B])[:, None, None]
     free = client_map(handle, 0.0, 0.0, Ts, delay)  # the loop is linear in K and B
     by_K = client_map(handle, 1.0, 0.0, Ts, delay) - free
     by_B = client_map(handle, 0.0, 1.0, Ts, delay) - free
-    grid = np.geomspace(SOFTEST, STIFFEST, SCANNED).tolist()
+    soft = free + dampings * by_B
 
-    def limit(B: float) -> float:
-        soft = free + B * by_B
-        low, high = roots.first_failure(lambda K: _stable(soft + K * by_K), grid, rtol=1e-9)
-        return low if high < math.inf else math.inf
+    def stable(which: np.ndarray, K: np.ndarray) -> np.ndarray:
+        return _stable(soft[which] + K[:, None, None] * by_K)
 
-    return tuple(map(limit, dampings))
+    grid = np.geomspace(SOFTEST, STIFFEST, SCANNED)
+    low, high = roots.first_failures(stable, len(soft), grid, 1e-9)
+    return tuple(np.where(high < math.inf, low, math.inf).tolist())
 
 
 @checked

@@ -22,29 +22,90 @@ BITS = 160  # of a real root
 NEAR = 1e-4  # of their size: closer real roots are separated by their common parabola
 
 
-def exact(p: Polynomial) -> Polynomial:
+class Rational(Polynomial):
+    """A polynomial of rational coefficients, kept as integers over one denominator.
+
+    Attributes:
+        integers: lowest power first.
+        common: the denominator, above 0.
+    """
+
+    integers: list[int]
+    common: int
+    symbol = "x"  # type: ignore[assignment]  # `of` does not call the parent's constructor
+
+    @classmethod
+    def of(cls, integers: Sequence[int], common: int = 1) -> Rational:
+        """The polynomial of these integers over a denominator."""
+        n = len(integers)
+        while n > 1 and not integers[n - 1]:
+            n -= 1
+        made = cls.__new__(cls)
+        made.integers, made.common = list(integers[:n]) or [0], common
+        return made
+
+    @property
+    def coef(self) -> np.ndarray:
+        """Coefficients of type `Fraction`, lowest power first."""
+        return np.array([Fraction(x, self.common) for x in self.integers], dtype=object)
+
+    @coef.setter
+    def coef(self, values: Iterable[Any]) -> None:  # pyright: ignore
+        ratios = [Fraction(x).as_integer_ratio() for x in values]
+        self.common = math.lcm(*(below for _, below in ratios))
+        self.integers = [above * (self.common // below) for above, below in ratios]
+
+    def __neg__(self) -> Rational:
+        return self.of([-x for x in self.integers], self.common)
+
+    def __add__(self, other: Any) -> Polynomial:
+        if not isinstance(other, Rational):
+            return Polynomial(self.coef) + other
+        common = math.lcm(self.common, other.common)
+        mine, theirs = common // self.common, common // other.common
+        both = itertools.zip_longest(self.integers, other.integers, fillvalue=0)
+        return self.of([mine * a + theirs * b for a, b in both], common)
+
+    def __sub__(self, other: Any) -> Polynomial:
+        return self + -other
+
+    def __mul__(self, other: Any) -> Polynomial:
+        if not isinstance(other, Rational):
+            return Polynomial(self.coef) * other
+        out = [0] * (len(self.integers) + len(other.integers) - 1)
+        for i, a in enumerate(self.integers):
+            for j, b in enumerate(other.integers):
+                out[i + j] += a * b
+        return self.of(out, self.common * other.common)
+
+
+def exact(p: Polynomial) -> Rational:
     """The polynomial with rational coefficients."""
-    return rational(p.coef.tolist())
+    return p if isinstance(p, Rational) else rational(p.coef.tolist())
 
 
-def rational(c: Iterable[Any]) -> Polynomial:
+def rational(c: Iterable[Any]) -> Rational:
     """The polynomial of these coefficients as rational numbers."""
-    return Polynomial(np.array([Fraction(x) for x in c] or [Fraction(0)], dtype=object))
+    ratios = [x.as_integer_ratio() for x in c]
+    common = math.lcm(*(below for _, below in ratios))
+    return Rational.of([above * (common // below) for above, below in ratios], common)
 
 
 def value(p: Polynomial, x: Fraction) -> Fraction:
     """p(x) in exact arithmetic, which `Polynomial` leaves where it maps its domain."""
-    common = math.lcm(*(c.denominator for c in p.coef))
+    p = exact(p)
+    above, below = x.as_integer_ratio()
     out, power = 0, 1  # of integers: one division at the end
-    for c in p.coef[::-1]:
-        out = out * x.numerator + c.numerator * (common // c.denominator) * power
-        power *= x.denominator
-    return Fraction(out * x.denominator, common * power)
+    for c in reversed(p.integers):
+        out = out * above + c * power
+        power *= below
+    return Fraction(out * below, p.common * power)
 
 
-def derivative(p: Polynomial) -> Polynomial:
+def derivative(p: Polynomial) -> Rational:
     """p' in exact arithmetic."""
-    return rational([i * c for i, c in enumerate(p.coef)][1:])
+    p = exact(p)
+    return Rational.of(_derivative(p.integers), p.common)
 
 
 def approximate(p: Polynomial) -> Polynomial:
@@ -80,9 +141,7 @@ def roots_right(p: Polynomial) -> tuple[int, int]:
 
 def _integers(p: Polynomial) -> list[int]:
     """Coefficients, lowest power first, over a common denominator and without common factors."""
-    c = [Fraction(x) for x in p.coef.tolist()]
-    common = math.lcm(*(x.denominator for x in c))
-    return _primitive([x.numerator * (common // x.denominator) for x in c])
+    return _primitive(exact(p).integers)
 
 
 def _primitive(c: Sequence[int]) -> list[int]:
@@ -126,17 +185,18 @@ def _real_index(chain: Sequence[Sequence[int]]) -> int:
 # ---- values on the axis --------------------------------------------------------------------------
 
 
-def axis_parts(p: Polynomial) -> tuple[Polynomial, Polynomial]:
+def axis_parts(p: Polynomial) -> tuple[Rational, Rational]:
     """p(j omega) = even + j omega odd, both polynomials in omega^2."""
-    c = exact(p).coef
+    p = exact(p)
+    c = p.integers
     even, odd = ([x if i % 2 == 0 else -x for i, x in enumerate(c[j::2])] for j in (0, 1))
-    return rational(even), rational(odd)
+    return Rational.of(even, p.common), Rational.of(odd, p.common)
 
 
 def within_rounding(p: Polynomial, x: Fraction) -> bool:
     """Whether a change of its coefficients in their last digits makes p zero at omega^2 = x."""
     even, odd = axis_parts(p)
-    sizes = (rational(map(abs, part.coef)) for part in (even, odd))
+    sizes = (Rational.of([abs(x) for x in part.integers], part.common) for part in (even, odd))
     least, most = (value(e, x) ** 2 + x * value(o, x) ** 2 for e, o in ((even, odd), sizes))
     return least <= Fraction(ROUNDING) ** 2 * most
 
@@ -179,13 +239,13 @@ def unit_crossings(n: Polynomial, d: Polynomial) -> tuple[np.ndarray, np.ndarray
 
 def positive_roots(p: Polynomial) -> list[Fraction]:
     """Positive real roots of p to `BITS` bits, ascending, each once."""
-    f, found = rational(_trimmed(p)), set()
+    f, found = Rational.of(_trimmed(p)), set()
     for group in _groups(_rough_roots(f)):
         found.update(_separated(f, group))
     return sorted(found)
 
 
-def _rough_roots(p: Polynomial) -> list[Fraction]:
+def _rough_roots(p: Rational) -> list[Fraction]:
     """Real positive roots in floats; imaginary parts up to 1e-6 count as rounding."""
     y, scale = _scaled_roots(p)
     y = y[(np.abs(y.imag) <= 1e-6 * np.abs(y)) & (y.real > 0.0)].real
@@ -197,16 +257,17 @@ def _scaled_roots(p: Polynomial) -> tuple[np.ndarray, Fraction]:
     c = _trimmed(p)
     if len(c) < 2:
         return np.empty(0), Fraction(1)
-    low, high = (x.numerator.bit_length() - x.denominator.bit_length() for x in (c[0], c[-1]))
-    scale = Fraction(2) ** round((low - high) / (len(c) - 1))
-    scaled = [x * scale**i for i, x in enumerate(c)]
+    last = len(c) - 1
+    bits = round((c[0].bit_length() - c[-1].bit_length()) / last)
+    shifts = (bits * i if bits > 0 else -bits * (last - i) for i in range(last + 1))
+    scaled = [x << shift for x, shift in zip(c, shifts, strict=True)]
     most = max(map(abs, scaled))
-    return np.roots([float(x / most) for x in scaled[::-1]]), scale
+    return np.roots([x / most for x in scaled[::-1]]), Fraction(2) ** bits
 
 
-def _trimmed(p: Polynomial) -> list[Fraction]:
-    """Coefficients without the zeros at both ends."""
-    c = [Fraction(x) for x in p.coef.tolist()]
+def _trimmed(p: Polynomial) -> list[int]:
+    """Coefficients over a common denominator, without the zeros at both ends."""
+    c = exact(p).integers
     kept = [i for i, x in enumerate(c) if x]
     return c[kept[0] : kept[-1] + 1] if kept else []
 
@@ -223,7 +284,8 @@ def root_sizes(p: Polynomial) -> tuple[float, float]:
     Fujiwara's bounds, which no rounding of roots loses.
     """
     c = _trimmed(p)
-    logs = [math.log(abs(x.numerator)) - math.log(x.denominator) if x else -math.inf for x in c]
+    ratios = (Fraction(abs(x), exact(p).common).as_integer_ratio() for x in c)
+    logs = [math.log(x) - math.log(below) if x else -math.inf for x, below in ratios]
     last = len(c) - 1
     small = min((logs[0] - x) / i for i, x in enumerate(logs) if i)
     large = max((x - logs[-1]) / (last - i) for i, x in enumerate(logs[:-1]))
@@ -241,7 +303,7 @@ def _groups(x: Sequence[Fraction]) -> list[list[Fraction]]:
     return out
 
 
-def _separated(f: Polynomial, group: Sequence[Fraction]) -> list[Fraction]:
+def _separated(f: Rational, group: Sequence[Fraction]) -> list[Fraction]:
     """The roots of f from approximate ones, which lie close together."""
     if len(group) == 2:
         middle = _shortened((group[0] + group[1]) / 2)
@@ -257,7 +319,7 @@ def _separated(f: Polynomial, group: Sequence[Fraction]) -> list[Fraction]:
     return [_polished(f, x) for x in group] if len(group) < 3 else list(group)
 
 
-def _polished(f: Polynomial, x: Fraction) -> Fraction:
+def _polished(f: Rational, x: Fraction) -> Fraction:
     """The root of f near x, by Newton's method; x where that leaves its neighbourhood."""
     slope, start = derivative(f), x
     for _ in range(8):

@@ -68,11 +68,18 @@ class Circle:
 
     @cached_property
     def _found(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.loop.responses(self.angles)
+        return self._computed(self.angles)
+
+    def _computed(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.loop.responses(angles)
 
     def responses(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Position and rate per torque, those of the grid from memory."""
-        return self._found if angles is self.angles else self.loop.responses(angles)
+        return self._found if angles is self.angles else self._computed(angles)
+
+    def at_rest(self) -> np.ndarray:
+        """Position per constant torque."""
+        return self.loop.at_rest()
 
     @cached_property
     def stable(self) -> bool:
@@ -120,7 +127,7 @@ class Family:
         """Changes on the circle, and at rest where the stiffness of a motion vanishes."""
         found = joint_crossings.crossings(self.response, self.circle.angles)
         if self.of == "position":
-            at_rest = self.right.T @ self.circle.loop.at_rest() @ self.left
+            at_rest = self.right.T @ self.circle.at_rest() @ self.left
             values = np.linalg.eigvals(at_rest)
             real = values[(np.abs(values.imag) <= NEAR * np.abs(values)) & (values.real != 0.0)]
             found += [Crossing(-1.0 / x, 0.0) for x in real.real.tolist()]

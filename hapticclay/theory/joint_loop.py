@@ -237,12 +237,21 @@ def timing_words(Ts: float, delay: float) -> str:
 
 def grid(loop: Any) -> np.ndarray:
     """Angles of a search, > 0 and <= pi: even, by factors, and dense at resonances."""
+    return np.unique(np.concatenate([even_grid(loop), resonant_grid(loop)]))
+
+
+def even_grid(loop: Any) -> np.ndarray:
+    """Angles of a search that depend on whole samples of delay alone, > 0 and <= pi."""
     even = np.linspace(0.0, math.pi, 400 * (1 + loop.samples_late // 8) + 1)[1:]
-    found: list[Any] = [even, np.geomspace(1e-6, 1.0, 400)]
-    if loop.states <= MOST_STATES // 3:
-        found.append(near_resonances(np.linalg.eigvals(loop.map())))
-    every = np.concatenate(found)
-    return np.unique(every[(every > 0.0) & (every <= math.pi)])
+    return np.concatenate([even, np.geomspace(1e-6, 1.0, 400)])
+
+
+def resonant_grid(loop: Any) -> np.ndarray:
+    """Angles of a search around eigenvalues near the unit circle, > 0 and <= pi."""
+    if loop.states > MOST_STATES // 3:
+        return np.empty(0)
+    near = near_resonances(np.linalg.eigvals(loop.map()))
+    return near[(near > 0.0) & (near <= math.pi)]
 
 
 def near_resonances(z: np.ndarray) -> np.ndarray:

@@ -28,12 +28,13 @@ class OverPoses(Result):
 
     Attributes:
         names: joints, shape (n,).
-        q: poses [rad or m], shape (m, n), drawn evenly within the ranges of the joints.
+        q: poses [rad or m], shape (m, n), as `over_poses` draws them.
         p: positions of the handle [m], shape (m, 3); NaN without handle.
         radius: largest eigenvalue at each pose, shape (m,).
         scale: largest factor of all Kp at each pose, shape (m,); NaN where none is stable.
         buzz: frequency at that factor [Hz], shape (m,).
         first: number of the joint that buzzes first at each pose, shape (m,).
+        units: of the positions of the joints, rad or m, shape (n,).
         Ts: control sample [s].
         delay: from a sample to its torque [s].
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
@@ -49,6 +50,7 @@ class OverPoses(Result):
     scale: np.ndarray
     buzz: np.ndarray
     first: np.ndarray
+    units: tuple[str, ...]
     Ts: float
     delay: float
     assumed: tuple[str, ...] = ()
@@ -86,7 +88,8 @@ class OverPoses(Result):
 
     def tables(self) -> Tables:
         """Every pose, and how often each joint buzzes first."""
-        poses: dict[str, Any] = {f"{name} [rad]": self.q[:, j] for j, name in enumerate(self.names)}
+        joints = zip(self.names, self.units, self.q.T, strict=True)
+        poses: dict[str, Any] = {f"{name} [{unit}]": q for name, unit, q in joints}
         poses |= {f"{axis} [m]": self.p[:, i] for i, axis in enumerate("xyz")}
         poses |= {
             "radius": self.radius,
@@ -110,7 +113,8 @@ def over_poses(
     """The largest factor of all Kp over poses drawn evenly within the ranges of the joints.
 
     Args:
-        arm: the arm; joints without a range turn once around.
+        arm: the arm; hinges without a range turn once around, slides without one stay where they
+            are in its pose.
         law: gains of the joints, and where they act.
         Ts: control sample [s], 1e-6 to 1.
         delay: from a sample to the torque computed from it [s], 0 to 10.
@@ -120,8 +124,9 @@ def over_poses(
     Raises:
         ParameterError: as `joint_limits`, or no drawn pose closes the arm's chain.
     """
-    random, bounds = np.random.default_rng(seed), arm.ranges
-    bounds = np.where(np.isfinite(bounds), bounds, [-math.pi, math.pi])
+    random, turning = np.random.default_rng(seed), np.array(arm.mechanism.turning)
+    unlimited = np.where(turning, [[-math.pi], [math.pi]], arm.q).T
+    bounds = np.where(np.isfinite(arm.ranges), arm.ranges, unlimited)
     rows, assumed = [], ()
     for _ in range(TRIES * poses):
         q = random.uniform(*bounds.T)
@@ -138,7 +143,8 @@ def over_poses(
     if not rows:
         raise ParameterError("poses", poses, "must be some at which the arm's chain can be closed")
     q, p, radius, scale, buzz, first = (np.array(column) for column in zip(*rows, strict=True))
-    return OverPoses(arm.names, q, p, radius, scale, buzz, first, Ts, delay, assumed)
+    units = tuple(np.where(turning, "rad", "m").tolist())
+    return OverPoses(arm.names, q, p, radius, scale, buzz, first, units, Ts, delay, assumed)
 
 
 def _handle(arm: MjcfArm, q: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -22,7 +23,7 @@ from .held_words import hand_words
 from .joint_changes import Edge, slopes
 from .joint_families import Circle, Family, Limit
 from .joint_gains import IGNORED, SMALL, gravity_words, joint_loop
-from .joint_loop import JointLoop, timing_words
+from .joint_loop import JointLoop, even_grid, resonant_grid, timing_words
 
 AXES = ("x", "y", "z")
 LINE = 40  # dampings of the line of limits
@@ -153,11 +154,12 @@ def wall_limit(
 
     loop = joint_loop(linear, law, Ts, delay, feeds)
     mass = float(1.0 / (along @ np.linalg.solve(linear.inertia, along)))
-    limit = _limit(loop, along, B)
+    walls = Line(loop, along)
+    limit = walls.limit(B)
     over = [x for numbers in joint_changes.numbers(linear, delay, Ts) for x in numbers]
     *by_arm, by_delay = slopes(Edge(rendered, *limit.upper, 1.0), over).tolist()
     line_B = np.linspace(0.0, max(MOST_B * mass / (Ts + delay), 1.2 * B), LINE)
-    line_K = np.array([_limit(loop, along, b).high for b in line_B.tolist()])
+    line_K = np.array([walls.limit(b).high for b in line_B.tolist()])
     return WallLimit(
         arm.names,
         axis,
@@ -182,12 +184,63 @@ def wall_limit(
     )
 
 
-def _limit(loop: JointLoop, along: np.ndarray, B: float) -> Limit:
-    """Stable stiffness of a wall with damping B [N/m]."""
-    square, column = np.outer(along, along), along[:, None]
-    damped = loop.feeding(0.0 * square, B * square)
+class Line:
+    """Walls of any damping along a line at the handle of an arm.
 
-    def stiffer(K: float) -> JointLoop:
-        return damped.feeding(K * square, 0.0 * square)
+    Attributes:
+        loop: the arm without a wall.
+        along: the Jacobian's row along the line, shape (n,).
+    """
 
-    return Family(Circle(damped), "position", column, column, 0.0, stiffer).limit()
+    def __init__(self, loop: JointLoop, along: np.ndarray):
+        self.loop, self.along = loop, along
+        self._square, self._even = np.outer(along, along), even_grid(loop)
+        self._at_even = self.felt(self._even)
+
+    def felt(self, angles: np.ndarray) -> np.ndarray:
+        """Position and measured rate per force, all along the line, without a wall: (2, m)."""
+        return np.array([self.along @ x @ self.along for x in self.loop.responses(angles)])
+
+    def felt_near(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Angles of a search, those given among them, and what is felt there."""
+        every, first = np.unique(np.concatenate([self._even, angles]), return_index=True)
+        return every, np.hstack([self._at_even, self.felt(angles)])[:, first]
+
+    def limit(self, B: float) -> Limit:
+        """Stable stiffness of a wall with damping B [N/m]."""
+        nothing = 0.0 * self._square
+        damped = self.loop.feeding(nothing, B * self._square)
+
+        def stiffer(K: float) -> JointLoop:
+            return damped.feeding(K * self._square, nothing)
+
+        one = np.ones((1, 1))
+        return Family(_Damped(self, damped, B), "position", one, one, 0.0, stiffer).limit()
+
+
+class _Damped(Circle):
+    """Responses along a line to forces along it, with a damping there.
+
+    The damping closes a loop of rank one: a response h becomes h/(1 + B v), v the rate's.
+    """
+
+    def __init__(self, line: Line, loop: JointLoop, B: float):
+        super().__init__(loop)
+        self._line, self._B = line, B
+
+    @cached_property
+    def _near(self) -> tuple[np.ndarray, np.ndarray]:
+        return self._line.felt_near(resonant_grid(self.loop))
+
+    @cached_property
+    def angles(self) -> np.ndarray:
+        return self._near[0]
+
+    def _computed(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        q, v = self._near[1] if angles is self.angles else self._line.felt(angles)
+        closed = 1.0 / (1.0 + self._B * v)
+        return (q * closed)[:, None, None], (v * closed)[:, None, None]
+
+    def at_rest(self) -> np.ndarray:
+        along = self._line.along
+        return np.array([[along @ self.loop.at_rest() @ along]])

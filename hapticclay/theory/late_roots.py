@@ -20,7 +20,7 @@ from .exact_roots import axis_parts, value
 
 def roots_right(now: Polynomial, later: Polynomial, delay: float) -> int:
     """Number of roots right of the axis (argument principle)."""
-    now, later = exact_roots.exact(now).trim(), exact_roots.exact(later).trim()
+    now, later = exact_roots.exact(now), exact_roots.exact(later)
     while not now.coef[0] and not later.coef[0]:  # roots at zero count on neither side
         now, later = (exact_roots.rational(p.coef[1:]) for p in (now, later))
     omega, ahead = exact_roots.unit_crossings(later, now)

@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from . import exact_roots
-from .exact_roots import axis_parts, exact, square_root, value, within_rounding
+from .exact_roots import axis_parts, exact, rational, square_root, value, within_rounding
 
 VARIABLE = Polynomial([0.0, 1.0])  # s itself
 ROUNDED = 1e-14  # a sum below this share of its terms is their rounding
@@ -51,7 +50,8 @@ def hurwitz(p: Polynomial) -> bool:
 
     The answer is exact.
     """
-    return not np.any(p.coef) or exact_roots.roots_right(p) == (0, 0)
+    p = exact(p)
+    return not any(p.integers) or exact_roots.roots_right(p) == (0, 0)
 
 
 def multiplicity_of_zero(p: Polynomial) -> int:
@@ -102,20 +102,22 @@ class _Crossing:
 
 def _every_crossing(A: Polynomial, B: Polynomial) -> list[_Crossing]:
     """The crossings with K > 0 at a root of A, between, and at a root of B, K ascending."""
-    A, B = exact(A).trim(), exact(B).trim()
+    A, B = exact(A), exact(B)
+    if not any(B.integers):  # what drives nothing moves no root
+        return []
     (Ae, Ao), (Be, Bo) = axis_parts(A), axis_parts(B)
-    across = -(Ae * Be + Polynomial([Fraction(0), Fraction(1)]) * Ao * Bo)
-    size2 = Be * Be + Polynomial([Fraction(0), Fraction(1)]) * Bo * Bo
+    omega2 = rational([0, 1])
+    across, size2 = -(Ae * Be + omega2 * Ao * Bo), Be * Be + omega2 * Bo * Bo
     found = []
     for x in exact_roots.positive_roots(Ao * Be - Ae * Bo):
         if value(size2, x):  # else B(j omega) = 0: no K places a pole there
             end = -1 if within_rounding(A, x) else int(within_rounding(B, x))
             found.append((value(across, x) / value(size2, x), square_root(x), end))
-    n = multiplicity_of_zero(A)
+    a, b, n = A.coef, B.coef, multiplicity_of_zero(A)
     if n == multiplicity_of_zero(B):
-        found.append((-A.coef[n] / B.coef[n], 0.0, 0))
-    if A.degree() == B.degree():
-        found.append((-A.coef[-1] / B.coef[-1], math.inf, 0))
+        found.append((-a[n] / b[n], 0.0, 0))
+    if len(a) == len(b):
+        found.append((-a[-1] / b[-1], math.inf, 0))
     within = [(float(K), *at) for K, *at in found if LEAST < K < MOST]
     return [_Crossing(*x) for x in sorted(within)]
 
@@ -130,7 +132,7 @@ def first_crossing(A: Polynomial, B: Polynomial) -> tuple[float, float]:
             K = 2.0 * low if low else 1.0
         else:
             K = math.sqrt(low) * math.sqrt(high) if low else 0.5 * high
-        return hurwitz(A + Fraction(K) * B)
+        return hurwitz(A + rational([K]) * B)
 
     found = _every_crossing(A, B)
     low = max((x.K for x in found if x.end < 0), default=0.0)
@@ -320,3 +322,30 @@ def first_failure(
         low = x
     assert low is not None
     return low, math.inf
+
+
+def first_failures(
+    holds: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    count: int,
+    grid: np.ndarray,
+    rtol: float = 1e-12,
+) -> tuple[np.ndarray, np.ndarray]:
+    """As `first_failure`, of many properties at once: `holds` is asked for some, a value each."""
+    low, high = np.zeros(count), np.full(count, math.inf)
+    left = np.arange(count)
+    for x in grid:
+        good = holds(left, np.full(len(left), x))
+        low[left[good]], high[left[~good]] = x, x
+        left = left[good]
+        if not len(left):
+            break
+    left = np.flatnonzero((low > 0.0) & (high < math.inf))
+    while True:
+        a, b = low[left], high[left]
+        middle = 0.5 * (a + b)
+        between = (b - a > rtol * b) & (middle != a) & (middle != b)
+        left, middle = left[between], middle[between]
+        if not len(left):
+            return low, high
+        good = holds(left, middle)
+        low[left[good]], high[left[~good]] = middle[good], middle[~good]

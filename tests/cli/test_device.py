@@ -13,6 +13,8 @@ from hapticclay.cli import app
 from hapticclay.ports import Exchanges, LoopReport
 from tests.ports.conftest import Client, tick
 
+pytestmark = pytest.mark.usefixtures("no_layout")
+
 
 def session_of(words, client_of, tmp_path):
     """A session ended by Ctrl-C: its folder, output and errors."""
@@ -68,7 +70,8 @@ def test_an_arm_from_a_file_is_served_and_reported(tmp_path, monkeypatch, capsys
     assert found.headline() in capsys.readouterr().out
     # the record's scenario, whose arm is a file's, is served as it stands
     (folder / "scenario.toml").rename(tmp_path / "arm.toml")
-    session_of("arm.toml", lambda client: client.state("{}"), tmp_path)
+    words = ["device", "serve", "arm.toml", "--port", "0", "--clock", "tick", "--duration", "0"]
+    assert app.main(words) == 0 and "nothing was recorded" in capsys.readouterr().out
 
 
 def test_a_session_leaves_its_record_messages_and_report(session, tmp_path, monkeypatch, capsys):
@@ -143,9 +146,14 @@ def test_what_no_pair_serves_is_said_in_a_line(words, told, tmp_path, monkeypatc
     assert told in error and error.count("\n") == 1
 
 
-def test_nobody_came(capsys, tmp_path):
-    words = ["device", "serve", "--port", "0", "--clock", "tick", "--duration", "0"]
-    assert app.main([*words, "--out", str(tmp_path)]) == 0
+@pytest.mark.parametrize(  # with --clock tick a message is about 5 ms: whole control samples
+    "words", ["", "--pair good.toml", "--arm leader_7 --rate 300", "--arm leader_7 --rate 20"]
+)
+def test_nobody_came(words, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "good.toml").write_text(PAIR.format("4e-3"))
+    words = f"device serve --port 0 --clock tick --duration 0 --out out {words}".split()
+    assert app.main(words) == 0
     assert "nothing was recorded" in capsys.readouterr().out
 
 

@@ -26,6 +26,8 @@ from hapticclay.studies.store import read_sweep
 from hapticclay.studies.sweep import Sweep
 from hapticclay.views import sweep_plots
 
+pytestmark = pytest.mark.usefixtures("no_layout")
+
 
 @dataclasses.dataclass(frozen=True)
 class Staircase(PathExperiment):

@@ -6,7 +6,6 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import hapticclay as hc
 from hapticclay.cli import app, commands
@@ -23,12 +22,6 @@ def record(tmp_path_factory):
     muscle = hc.Multisine((1.0, 0.0), lines=20, seed=1)
     hc.simulate(hc.Scenario(clay=hc.slab(20.0), muscle=muscle, t_max=2.0, length=None)).save(folder)
     return folder
-
-
-@pytest.fixture
-def no_layout(monkeypatch):
-    """Figures are written as they are."""
-    monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)
 
 
 COMMANDS = {  # words, the figures that come of them, and formats; in a hunt all formats

@@ -41,9 +41,9 @@ def test_scores_0_and_1_are_the_best_of_all_shares_that_were_searched(family):
 
 @pytest.mark.parametrize("family, share", [("best fixed gain", 1.08), ("best oracle", 0.84)])
 def test_returns_of_the_search_are_those_of_its_episodes(family, share):
-    """Of one seed, in Python; the file holds four decimals, so half of the last."""
+    """Of one seed; the file holds four decimals, so half of the last."""
     found = SEARCHED["families"][family]
-    again = gym_scores.search(family, [share], [3], around=0, engine="python")
+    again = gym_scores.search(family, [share], [3], around=0, engine="auto")
     told = found["returns"][found["shares"].index(share)][3]
     assert again.totals == pytest.approx(told, abs=5.1e-5) and again.best == share
 
@@ -117,11 +117,11 @@ def test_the_pd_law_follows_the_line_where_random_actions_do_not(monkeypatch, ca
     """And the command prints what each earns."""
     returns = functools.cache(baselines.returns)
     found = {
-        name: returns("CutLine-v0", maker, range(2), engine="python")
+        name: returns("CutLine-v0", maker, range(2), engine="auto")
         for name, maker in baselines.BASELINES["CutLine-v0"].items()
     }
     monkeypatch.setattr(baselines, "returns", returns)
-    line = ["gym", "baselines", "CutLine-v0", "--seeds", "2", "--engine", "python"]
+    line = ["gym", "baselines", "CutLine-v0", "--seeds", "2", "--engine", "auto"]
     assert app.main(line) == 0
     rows = capsys.readouterr().out.splitlines()
     for name, seen in found.items():
@@ -133,7 +133,7 @@ def test_the_pd_law_follows_the_line_where_random_actions_do_not(monkeypatch, ca
 
 def test_least_squares_names_the_clay_within_a_tenth():
     """Finite differences of velocities that are calm; both numbers, in two episodes."""
-    found = baselines.returns("ProbeClay-v0", baselines.least_squares, range(2), engine="python")
+    found = baselines.returns("ProbeClay-v0", baselines.least_squares, range(2), engine="auto")
     assert (found.total > -0.2).all()
 
 

@@ -16,7 +16,7 @@ from hapticclay.gym import dataset
 from hapticclay.studies import store
 
 CUT, NAME = "CutLine-v0", "hapticclay/test/a-v0"
-OF_WORDS = ["gym", "dataset", CUT, "--engine", "python", "--name", NAME]
+OF_WORDS = ["gym", "dataset", CUT, "--name", NAME]
 
 
 @pytest.fixture
@@ -98,16 +98,16 @@ def test_options_of_the_other_action_are_refused(words, capsys):
 def test_an_interrupted_recording_goes_on_to_the_same_bits(folder, capsys):
     """Interrupted twice, a kept file damaged between: the data set is that of one call."""
     pytest.importorskip("minari")
-    dataset.record(CUT, "whole-v0", 3, engine="python")
+    dataset.record(CUT, "whole-v0", 3)
     for n in (1, 2):
         with pytest.raises(KeyboardInterrupt):
-            dataset.record(CUT, NAME, 3, engine="python", progress=stopped_after(n))
+            dataset.record(CUT, NAME, 3, progress=stopped_after(n))
         assert not (folder / NAME).exists()
     kept = sorted(folder.rglob("part-*.parquet"))
     assert len(kept) == 2
     kept[1].write_bytes(kept[1].read_bytes()[:100])
     counts = []
-    dataset.record(CUT, NAME, 3, engine="python", progress=counts.append)
+    dataset.record(CUT, NAME, 3, progress=counts.append)
     assert counts == [1, 2, 3]  # one was kept, two recorded
     rows, seeds, told = rows_of(folder, NAME)
     assert (rows, seeds, told) == rows_of(folder, "whole-v0")
@@ -127,7 +127,7 @@ def end(count):
     if count == 2:
         os.kill(os.getpid(), signal.SIGKILL)
 
-dataset.record("CutLine-v0", sys.argv[1], 4, engine="python", progress=end)
+dataset.record("CutLine-v0", sys.argv[1], 4, progress=end)
 """
 
 
@@ -139,9 +139,9 @@ def test_a_killed_recording_goes_on_with_any_number_of_episodes(folder, episodes
     killed = subprocess.run([sys.executable, "-c", KILLED, NAME], timeout=120)
     assert killed.returncode == -signal.SIGKILL
     counts = []
-    dataset.record(CUT, NAME, episodes, engine="python", progress=counts.append)
+    dataset.record(CUT, NAME, episodes, progress=counts.append)
     assert counts == ([1] if episodes == 1 else [2, 3])
-    dataset.record(CUT, "whole-v0", episodes, engine="python")
+    dataset.record(CUT, "whole-v0", episodes)
     assert rows_of(folder, NAME) == rows_of(folder, "whole-v0")
 
 

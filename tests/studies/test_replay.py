@@ -80,7 +80,7 @@ def test_an_arm_from_a_file_begins_at_its_pose():
     scenario = hc.Scenario(
         arm=hc.MjcfArm("haptic_3"), controller=hc.JointPD((4.0,) * 3, (0.1,) * 3),
         control="sampled", muscle=hc.Multisine((0.6, 0.4), low=0.5, high=3.0, period=2.0, lines=5),
-        force=(0.0, 0.0), length=None, t_max=1.0, dt=1e-3,
+        force=(0.0, 0.0), length=None, t_max=0.4, dt=1e-3,
     )  # fmt: skip
     record = hc.simulate(scenario)
     recording = hc.studies.Recording(record.t, record.p[:, :2] + 0.3, record.fh[:, :2])
@@ -121,7 +121,7 @@ def test_the_command(made, tmp_path, capsys):
 
 @pytest.mark.parametrize(
     "head, told",
-    [("t,a,b", "must have a motion or a force"), ("a,x,y", "did you mean|must be one of")],
+    [("t,a,b", "must have a motion or a force"), ("a,x,y", "must name the column of time")],
 )
 def test_what_is_missing_is_named(tmp_path, head, told):
     file = tmp_path / "log.csv"

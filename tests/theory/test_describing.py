@@ -214,11 +214,17 @@ def test_the_exact_threshold_parts_sticking_from_buzzing():
         start[1] = v
         return sticking.motion(A, B, flow.Fy, start, 1.2)
 
-    low, high = 1e-4, cycle.speed
-    for _ in range(18):
+    low, high = 3.9e-3, 4.0e-3
+    on_edge = pushed(high)
+    assert math.isfinite(pushed(low)[2]) and on_edge[2] == math.inf
+    for _ in range(11):
         middle = math.sqrt(low * high)
-        low, high = (middle, high) if math.isfinite(pushed(middle)[2]) else (low, middle)
-    t, z, _ = pushed(high)
+        found = pushed(middle)
+        if math.isfinite(found[2]):
+            low = middle
+        else:
+            high, on_edge = middle, found
+    t, z, _ = on_edge
     # The motion on the edge is drawn to the threshold before it leaves: there it is read, from
     # one passage of half the speed to the next.
     v, level = z[:, 1], 0.5 * threshold.speed
@@ -227,7 +233,7 @@ def test_the_exact_threshold_parts_sticking_from_buzzing():
         (v[(t >= a) & (t < c)].max() / threshold.speed, 2.0 * math.pi / (c - a) / threshold.omega)
         for a, c in zip(ups[:-1], ups[1:], strict=True)
     ]
-    # 18 bisections leave 1e-5 of the push, of which a growth of 2.8 a period makes 1e-3
+    # 11 bisections leave 1e-5 of the push, of which a growth of 2.8 a period makes 1e-3
     assert min(abs(x - 1.0) + abs(y - 1.0) for x, y in periods) < 5e-3
 
 

@@ -97,7 +97,7 @@ def test_sampled_impedance_is_that_of_a_march_in_time(operator, render, delay):
     omega = 2.0 * np.pi * np.array([2.0, 8.0, 20.0])
     found = loop_response(loop, omega)
     for i, w in enumerate(omega.tolist()):
-        p, v, u = fundamental(mass, damper, spring, law, Ts, delay, w, 6000, 40)
+        p, v, u = fundamental(mass, damper, spring, law, Ts, delay, w, 3000, 20)
         s = 1j * w
         fh = 1.0 - (hand.mass * s + hand.damper + hand.spring / s) * v
         # the transient has faded to 1e-9; the march loses a few digits more
@@ -137,7 +137,7 @@ def test_wall_impedance_is_that_of_a_march_in_time(wall):
     omega = 2.0 * np.pi * np.array([2.0, 10.0, 25.0])
     found = wall_response(wall, omega)
     for i, w in enumerate(omega.tolist()):
-        p, v, u = fundamental(mass, damper, hand.spring, law, Ts, wall.delay, w, 8000, 40)
+        p, v, u = fundamental(mass, damper, hand.spring, law, Ts, wall.delay, w, 4000, 20)
         s = 1j * w
         fh = 1.0 - (hand.mass * s + hand.damper + hand.spring / s) * v
         assert found.Z[i] == pytest.approx(fh / v, rel=1e-7)  # as above

@@ -24,10 +24,10 @@ def plain(card):
 
 # arm, law, Ts, delay, steps in a sample, seconds, and how many limits, Kp first
 LOOPS = {
-    "seven joints": ("leader_7", LEADER, 2e-3, 2e-3, 2, 5.0, 19),
-    "seven joints, 2.6 samples late": ("leader_7", LEADER, 1e-3, 2.6e-3, 2, 6.0, 7),
+    "seven joints": ("leader_7", LEADER, 2e-3, 2e-3, 2, 2.0, 19),
+    "seven joints, 2.6 samples late": ("leader_7", LEADER, 1e-3, 2.6e-3, 2, 2.4, 7),
     "planar": ("planar_2r", PLANAR, 1e-3, 1e-3, 4, 6.0, 7),
-    "five-bar, exact rates": ("five_bar", SMALL, 1e-3, 0.0, 4, 0.4, 2),
+    "five-bar, exact rates": ("five_bar", SMALL, 1e-3, 0.0, 4, 0.16, 2),
 }
 
 
@@ -50,7 +50,7 @@ def test_runs_turn_at_the_limits_of_gains_and_delay(name):
 def test_one_step_a_sample_finds_limits_of_Kp_to_a_percent(monkeypatch):
     """A step of second order: (omega Ts)^2/12 is 0.9 % where joint 5 buzzes."""
     monkeypatch.setattr(arm_flips, "SHARE", 0.01)
-    rows = arm_flips.flips(plain("leader_7"), LEADER, 2e-3, 2e-3, t_max=6.0)
+    rows = arm_flips.flips(plain("leader_7"), LEADER, 2e-3, 2e-3, t_max=2.4)
     good, bad = turned(itertools.islice(rows, 7))
     assert len(good) == 7 and not bad, bad
 
@@ -58,7 +58,7 @@ def test_one_step_a_sample_finds_limits_of_Kp_to_a_percent(monkeypatch):
 def test_runs_turn_at_the_limits_of_walls():
     """Along all axes of seven joints."""
     rows = arm_flips.wall_flips(
-        plain("leader_7"), 5.0, arm_flips.HAND, 2e-3, 2e-3, "difference", t_max=20.0
+        plain("leader_7"), 5.0, arm_flips.HAND, 2e-3, 2e-3, "difference", t_max=8.0
     )
     good, bad = turned(rows)
     assert [x[0] for x in good] == [f"wall along {c}" for c in "xyz"], bad
@@ -67,7 +67,7 @@ def test_runs_turn_at_the_limits_of_walls():
 def test_runs_turn_at_the_limit_of_a_wall_of_a_closed_chain():
     """The engine's soft constraints lose a tenth of it; here they hold exactly."""
     rows = arm_flips.wall_flips(
-        plain("five_bar"), 1.0, hc.Operator(0.05, 5.0, 6.0), 1e-3, 1e-3, t_max=0.6
+        plain("five_bar"), 1.0, hc.Operator(0.05, 5.0, 6.0), 1e-3, 1e-3, t_max=0.4
     )
     good, bad = turned(rows)
     assert len(good) == 2 and not bad, bad

@@ -1,9 +1,11 @@
 """Limits of joint loops: against another map, other theory, and the engine's own runs."""
 
+import functools
 import math
 from dataclasses import replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,6 +17,7 @@ from hapticclay.arms.mechanism import Linear
 from hapticclay.theory.joint_families import Circle, Family
 from hapticclay.theory.joint_gains import Study, delay_crossing, joint_loop
 from hapticclay.theory.wall_limits import stiffness_band
+from tests.hunt import examples
 from tests.oracles import joints
 
 CARDS = Path(__file__).parents[2] / "mjcf" / "arms"
@@ -25,6 +28,11 @@ LEADER_LAW = hc.JointPD(LEADER_KP, LEADER_KD, velocity="filter", cutoff=90.0)
 
 def leader(**kw):
     return hc.MjcfArm(CARDS / "leader_7.xml", **kw)
+
+
+@functools.cache
+def limits_at(Ts=2e-3, delay=2e-3, **numbers):
+    return hc.theory.joint_limits(leader(**numbers), LEADER_LAW, Ts, delay)
 
 
 def drawn(seed):
@@ -66,7 +74,7 @@ def test_the_map_is_that_of_pieces_of_motion(seed):
 
 
 @given(seed=st.integers(0, 10**6))
-@settings(max_examples=40, deadline=None)
+@examples(20)
 def test_the_other_map_turns_unstable_at_each_limit(seed):
     """The upper end of each interval: the radius passes 1 within 1e-5 of the gain."""
     linear, law, Ts, delay = drawn(seed)
@@ -117,7 +125,7 @@ def test_one_joint_is_the_wall_on_a_bare_device(B, delay):
 def test_the_engine_flips_at_the_limit(joint):
     """Half a percent on each side of the largest Kp of a joint, seven joints coupled."""
     arm, Ts = leader(), arm_integrators.TS
-    high = hc.theory.joint_limits(arm, LEADER_LAW, Ts, Ts).Kp[joint, 1]
+    high = limits_at(Ts, Ts).Kp[joint, 1]
     verdicts = []
     for share in (0.995, 1.005):
         Kp = np.array(LEADER_KP)
@@ -140,7 +148,7 @@ def test_steps_that_move_by_the_rates_at_their_end_are_off_alike(method):
 
 def test_published_gains_of_a_leader():
     """Limits to the digits to which an independent program found them."""
-    found = hc.theory.joint_limits(leader(), LEADER_LAW, "2 ms", "2 ms")
+    found = limits_at()
     for j, (high, buzz) in enumerate(
         [
             (1334, 12.0),
@@ -181,15 +189,17 @@ LIMITS = {  # of joint 7 and of the whole arm, and the attribute with their slop
 }
 
 
-def around(arm, kind, share):
+def around(kind, share):
     """Values of a number of joint 7 or of the delay, and weights of a derivative."""
     if kind == "delay":
         h = share * 2e-3
-        return [(arm, 2e-3 + i * h) for i in (0, 1, 2)], np.array([-1.5, 2.0, -0.5]) / h
-    values = np.array(getattr(arm, kind))
+        late = [{}, {"delay": 2e-3 + h}, {"delay": 2e-3 + 2.0 * h}]
+        return late, np.array([-1.5, 2.0, -0.5]) / h
+    values = np.array(getattr(leader(), kind))
     h = share * values[6]
-    sides = [tuple(values + s * h * np.eye(7)[6]) for s in (1, -1)]
-    return [(replace(arm, **{kind: x}), 2e-3) for x in sides], np.array([0.5, -0.5]) / h
+    return [{kind: tuple(values + s * h * np.eye(7)[6])} for s in (1, -1)], np.array(
+        [0.5, -0.5]
+    ) / h
 
 
 @pytest.mark.parametrize("column, kind", [(0, "armature"), (1, "damping"), (2, "delay")])
@@ -198,12 +208,10 @@ def test_sensitivities_are_slopes_of_limits(column, kind):
 
     Half of that is asked for, down to 1e-5, where the lowest rate, found to 1e-9, ends.
     """
-    arm = leader()
-    found = hc.theory.joint_limits(arm, LEADER_LAW, 2e-3, 2e-3)
-    errors = []
+    found, errors = limits_at(), []
     for share in (1e-2, 1e-3):
-        values, weights = around(arm, kind, share)
-        limits = [hc.theory.joint_limits(x, LEADER_LAW, 2e-3, delay) for x, delay in values]
+        values, weights = around(kind, share)
+        limits = [limits_at(**x) for x in values]
         errors.append(
             {
                 name: sum(w * of(x) for w, x in zip(weights, limits, strict=True))
@@ -216,16 +224,17 @@ def test_sensitivities_are_slopes_of_limits(column, kind):
         assert abs(error) < max(0.02 * abs(errors[0][name]), 1e-5), name
 
 
+@functools.cache
+def wall_at(delay=2e-3, **numbers):
+    hand = hc.Operator(0.25, 2.0, 6.0)
+    return hc.theory.wall_limit(leader(**numbers), "x", 5.0, hand, 2e-3, delay)
+
+
 @pytest.mark.parametrize("column, kind", [(0, "armature"), (1, "damping"), (2, "delay")])
 def test_sensitivities_of_a_wall(column, kind):
     """As above, to 1e-4 at a step of 1e-3."""
-    arm = leader()
-
-    def wall(arm, delay):
-        return hc.theory.wall_limit(arm, "x", 5.0, hc.Operator(0.25, 2.0, 6.0), 2e-3, delay)
-
-    found, (values, weights) = wall(arm, 2e-3), around(arm, kind, 1e-3)
-    slope = sum(w * wall(*x).K for w, x in zip(weights, values, strict=True))
+    found, (values, weights) = wall_at(), around(kind, 1e-3)
+    slope = sum(w * wall_at(**x).K for w, x in zip(weights, values, strict=True))
     assert [*found.K_change[6], found.K_per_delay][column] == pytest.approx(slope, rel=1e-4)
     assert any(x.startswith("gravity: fed forward") for x in found.assumed)
 
@@ -242,7 +251,7 @@ def test_a_crossing_on_the_grid_is_not_missed():
 
 def test_delay_and_rate_left_are_where_stability_ends():
     study = Study(leader(), LEADER_LAW, 2e-3, 2e-3)
-    found = hc.theory.joint_limits(leader(), LEADER_LAW, 2e-3, 2e-3)
+    found = limits_at()
     left = delay_crossing(study.loop).change
     assert left == found.delay_left
     for share, stable in ((1 - 1e-6, True), (1 + 1e-6, False)):
@@ -268,7 +277,7 @@ def test_a_long_delay_is_found_on_the_circle():
 def test_a_drive_hardly_limits_its_gains():
     law = replace(LEADER_LAW, runs="drive")
     found = hc.theory.joint_limits(leader(), law, 2e-3, 2e-3)
-    host = hc.theory.joint_limits(leader(), LEADER_LAW, 2e-3, 2e-3)
+    host = limits_at()
     assert found.stable and (found.Kp[:, 1] > 5.0 * host.Kp[:, 1]).all()
 
 
@@ -291,11 +300,11 @@ def test_a_drive_beyond_all_numbers_is_refused():
 
 def test_friction_fed_forward_has_a_largest_slope():
     """A slope above the limit makes the loop unstable, one below does not."""
-    plain = hc.theory.joint_limits(leader(), LEADER_LAW, 1e-3, 1e-3)
+    plain = limits_at(1e-3, 1e-3)
     for share, stable in ((0.999, True), (1.001, False)):
         rows = [(0.0, 1.0, 0.0)] * 6 + [(share * plain.friction_slope[6], 1.0, 0.0)]
         law = replace(LEADER_LAW, friction=tuple(rows))
-        assert hc.theory.joint_limits(leader(), law, 1e-3, 1e-3).stable is stable
+        assert Study(leader(), law, 1e-3, 1e-3).loop.stable() is stable
 
 
 @pytest.mark.parametrize("axis", "xyz")
@@ -324,15 +333,35 @@ def test_a_wall_at_the_handle_is_stable_below_its_limit(axis):
 
 def test_over_poses():
     arm = leader()
-    found = hc.theory.over_poses(arm, LEADER_LAW, 2e-3, 2e-3, poses=12, seed=3)
+    found = hc.theory.over_poses(arm, LEADER_LAW, 2e-3, 2e-3, poses=6, seed=3)
     ranges = arm.ranges
     assert ((ranges[:, 0] <= found.q) & (found.q <= ranges[:, 1])).all()
     at = hc.theory.joint_limits(replace(arm, pose=found.worst_pose), LEADER_LAW, 2e-3, 2e-3)
     assert at.scale == pytest.approx(found.scale.min(), rel=1e-9)
     assert at.joint == found.names[found.first[found.worst]]
     np.testing.assert_allclose(found.p[4], arm.handle(found.q[4]), atol=1e-12)
-    again = hc.theory.over_poses(arm, LEADER_LAW, 2e-3, 2e-3, poses=12, seed=3)
+    again = hc.theory.over_poses(arm, LEADER_LAW, 2e-3, 2e-3, poses=6, seed=3)
     assert (again.scale == found.scale).all()
+
+
+def test_over_poses_of_a_slide():
+    """A slide is in metres, and has no turn to be drawn from: without a range it stays."""
+    spec = mujoco.MjSpec.from_string(
+        "<mujoco><worldbody><body><joint name='lift' type='slide' axis='0 0 1'/>"
+        "<geom size='0.1' mass='2'/><body pos='0.2 0 0'><joint name='turn' axis='0 0 1'/>"
+        "<geom size='0.05' pos='0.2 0 0' mass='1'/>"
+        "<body pos='0.3 0 0'><joint name='reach' type='slide' axis='1 0 0' range='-0.1 0.2'/>"
+        "<geom size='0.03' mass='0.3'/><site name='hand'/></body></body></body>"
+        "</worldbody></mujoco>"
+    )
+    arm = hc.MjcfArm(spec, site="hand", pose={"lift": 0.25})
+    law = hc.JointPD([400.0, 20.0, 50.0], [20.0, 1.0, 2.0])
+    found = hc.theory.over_poses(arm, law, 1e-3, poses=40)
+    lift, turn, reach = found.q.T
+    assert (lift == 0.25).all()
+    assert np.ptp(turn) > 0.8 * 2.0 * np.pi
+    assert reach.min() >= -0.1 and reach.max() <= 0.2 and np.ptp(reach) > 0.2
+    assert {"lift [m]", "turn [rad]", "reach [m]"} < set(found.tables()["poses"])
 
 
 GAINS = {

@@ -1,5 +1,6 @@
 """Leaders and followers: against runs from event to event, and closed forms."""
 
+import functools
 import math
 import os
 from dataclasses import replace
@@ -15,7 +16,7 @@ import hapticclay as hc
 from hapticclay.scene.link import KINDS
 from hapticclay.theory.pair_build import Build
 from hapticclay.theory.pair_delays import Delays
-from tests.hunt import examples, some
+from tests.hunt import HUNTS, examples, some
 from tests.oracles import pairs
 
 CARDS = Path(__file__).parents[2] / "mjcf" / "arms"
@@ -173,7 +174,7 @@ def numbers_of(pair, i):
 
 
 @given(seed=st.integers(0, 10**6))
-@settings(max_examples=60, deadline=None)
+@examples(30)
 def test_the_map_is_a_run_from_event_to_event(seed):
     """40 samples from a random state, torques and messages as they arrive."""
     pair = drawn(seed)
@@ -293,7 +294,7 @@ def test_a_measured_force_makes_stability_come_and_go():
 @examples(8)
 @given(seed=st.integers(0, 10**6), kind=st.sampled_from(KINDS))
 def test_no_delay_below_the_limit_is_unstable(seed, kind):
-    """Tenths of a sample, and switches at samples, by eigenvalues of the map; and just beyond."""
+    """Parts of a sample, and switches at samples, by eigenvalues of the map; and just beyond."""
     pair = drawn(seed, kind)
     build, limit = Build(pair), hc.theory.pair_limits(pair).delay
     if math.isinf(limit):
@@ -301,7 +302,9 @@ def test_no_delay_below_the_limit_is_unstable(seed, kind):
     else:
         samples = np.arange(min(40.0, limit / pair.Ts))
         switches = samples + (-pair.delay / pair.Ts) % 1.0
-        below = pair.Ts * np.concatenate([switches, np.arange(0.0, len(samples), 0.1)])
+        below = pair.Ts * np.concatenate(
+            [switches, np.arange(0.0, len(samples), 0.1 if HUNTS else 0.25)]
+        )
         below = below[below < (1.0 - 1e-7) * limit]
         beyond = [limit + x * pair.Ts for x in (1e-9, 1e-6, 1e-3, 1e-2)]
         assert max(build.loop((x, x)).radius() for x in beyond) > 1.0
@@ -418,16 +421,30 @@ def test_friction_of_a_seven_joint_pair():
             assert loop.stable() is stable
 
 
+@functools.cache
+def with_friction():
+    law = replace(DRIVE, friction=FRICTION)
+    return hc.theory.pair_limits(seven(Ts=1e-3, delay=1e-3, law=law))
+
+
+@pytest.mark.parametrize("runs, lag, ripple", [("drive", 6e-3, 1e-3), ("host", 4e-3, 1e-6)])
+def test_friction_is_held_by_the_lag_of_the_reference(runs, lag, ripple):
+    """b + Kp (delay + link + Ts/2) in drives, whose rate ripples between samples; b + Kp link."""
+    law = hc.JointPD((400.0,), (50.0,), runs=runs)
+    pair = replace(one(law=law, Ts=2e-3, delay=1e-3), link=hc.Link(delay=4e-3))
+    assert hc.theory.pair_limits(pair).slope[0] == pytest.approx(0.1 + 400.0 * lag, rel=ripple)
+
+
 def test_less_stiffness_and_more_damping_do_not_help():
     """An undamped common motion: half the Kp and 1.5 times the Kd leave its growth."""
     law = replace(DRIVE, friction=FRICTION)
     soft = replace(law, Kp=tuple(0.5 * x for x in KP), Kd=tuple(1.5 * x for x in KD))
-    full = hc.theory.pair_limits(seven(Ts=1e-3, delay=1e-3, law=law))
-    less = hc.theory.pair_limits(seven(Ts=1e-3, delay=1e-3, law=soft))
+    full = with_friction()
+    less = Build(seven(Ts=1e-3, delay=1e-3, law=soft)).loop().radius()
     # the card has four digits of the published model, for which 1.07326, 70.7 and 71.5 were found
     assert full.radius == pytest.approx(1.07326, abs=2e-4)
     assert math.log(full.radius) / 1e-3 == pytest.approx(70.7, abs=0.2)
-    assert math.log(less.radius) / 1e-3 == pytest.approx(71.5, abs=0.2)
+    assert math.log(less) / 1e-3 == pytest.approx(71.5, abs=0.2)
     assert full.mode.startswith("common motion") and 0.0 < full.friction_fraction < 1.0
     assert "friction feed-forward" in full.advice()
 
@@ -435,7 +452,7 @@ def test_less_stiffness_and_more_damping_do_not_help():
 def test_the_share_of_friction_flips_the_map():
     law = replace(DRIVE, friction=FRICTION)
     pair = seven(Ts=1e-3, delay=1e-3, law=law)
-    share = hc.theory.pair_limits(pair).friction_fraction
+    share = with_friction().friction_fraction
     for factor, stable in ((0.9999, True), (1.0001, False)):
         slopes = factor * share * np.array(law.slopes)
         assert Build(pair).loop(friction=(slopes, slopes)).stable() is stable
@@ -443,13 +460,11 @@ def test_the_share_of_friction_flips_the_map():
 
 def test_a_seven_joint_pair():
     """Arms opposed at 13 Hz, joint 7, beyond 14.3 ms at 500 Hz where all torques are as late."""
-    for late, stable in ((14.2e-3, True), (14.4e-3, False)):
-        found = hc.theory.pair_limits(seven(Ts=2e-3, delay=late))
-        assert found.stable is stable
-        if not stable:
-            assert found.mode == "arms opposed, 13 Hz, joint7"
+    assert Build(seven(Ts=2e-3, delay=14.2e-3)).loop().stable()
+    found = hc.theory.pair_limits(seven(Ts=2e-3, delay=14.4e-3))
+    assert not found.stable and found.mode == "arms opposed, 13 Hz, joint7"
     by_link = hc.theory.pair_limits(seven(Ts=2e-3))
-    assert by_link.delay == pytest.approx(14.15e-3, abs=0.02e-3)
+    assert by_link.stable and by_link.delay == pytest.approx(14.15e-3, abs=0.02e-3)
     assert by_link.mode == "arms opposed, 13 Hz, joint7"
 
 
@@ -552,16 +567,18 @@ def test_a_verdict_says_what_holds_and_touches_the_arms():
     compared = hc.theory.compare_links(one())
     assert any("close no loop" in x for x in compared.remarks())
     waves = hc.theory.pair_limits(one(kind="waves"))
-    assert "any delay of the link up to 2 s" in waves.headline()
+    assert "any delay of the link up to 2 s; least damped: " in waves.headline()
+    first = dict(zip(compared.kinds, compared.tables()["architectures"]["first"], strict=True))
+    assert first["waves"] == "" and first["position-position"].startswith("arms opposed")
 
 
 def test_hands_of_a_box():
     pair = replace(one(Ts=4e-3), link=hc.Link(delay=0.16))
-    hands = hc.theory.Box((0.2, 4.0), (0.5, 10.0), (0.0, 40.0))
+    hands = hc.theory.Box((0.2, 4.0), (0.5, 10.0), (20.0, 20.0))
     contacts = hc.theory.Box((0.0, 3.0), (0.0, 20.0), (0.0, 1000.0))
     found = hc.theory.pair_hands(pair, hands, contacts, samples=4)
-    assert len(found.stable) == 8 * 8 + 4
-    for i in (0, 17, found.worst, 66):
+    assert len(found.stable) == 4 * 8 + 4
+    for i in (0, 17, found.worst, 34):
         mass, damper, spring = found.contacts[i]
         held = {
             "leader_operator": hc.Operator(*found.hands[i]),
