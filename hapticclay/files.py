@@ -216,12 +216,11 @@ class atomic:
             raise ParameterError("out", str(self.path), bound)
         try:
             self.target.parent.mkdir(parents=True, exist_ok=True)
-            folder, prefix = self.target.parent, f".{self.target.name}."
-            handle, name = tempfile.mkstemp(dir=folder, prefix=prefix)
+            name = f".{self.target.name}.{os.urandom(4).hex()}"
+            self.temporary = self.target.parent / name
+            self.file = self.temporary.open("xb")
         except OSError as error:
             raise self._refusal(error) from None
-        self.temporary = Path(name)
-        self.file = os.fdopen(handle, "wb")
         return self.file
 
     def __exit__(self, kind, error, trace):
@@ -230,9 +229,6 @@ class atomic:
                 if kind is None:
                     self.file.flush()
                     os.fsync(self.file.fileno())
-                    umask = os.umask(0)
-                    os.umask(umask)
-                    os.fchmod(self.file.fileno(), 0o666 & ~umask)
             if kind is None:
                 return os.replace(self.temporary, self.target)
         except OSError as late:

@@ -95,3 +95,18 @@ def test_a_scenario_is_saved_over_the_file_it_came_from(tmp_path):
     hc.constant_cut().save(tmp_path / "a.toml")
     hc.Scenario.load(tmp_path / "a.toml").save(tmp_path / "a.toml")
     assert hc.Scenario.load(tmp_path / "a.toml") == hc.constant_cut()
+
+
+def test_files_have_the_rights_of_new_files_and_the_process_keeps_its_mask(tmp_path, monkeypatch):
+    """The mask is the whole process's: set for an instant, it is every thread's."""
+    set_mask, asked = os.umask, []
+    monkeypatch.setattr(os, "umask", lambda mask: asked.append(mask) or set_mask(mask))
+    before = set_mask(0o027)
+    try:
+        with atomic(tmp_path / "a") as file:
+            file.write(b"whole")
+    finally:
+        assert set_mask(before) == 0o027
+    assert asked == []
+    assert stat.S_IMODE((tmp_path / "a").stat().st_mode) == 0o640
+    assert [x.name for x in tmp_path.iterdir()] == ["a"]

@@ -66,7 +66,7 @@ class DeviceCommand:
         clock: wall moves the arm in real time; tick moves it by --period at each message, so the
             same messages give the same run.
         period: Simulated time that one message advances the arm, with --clock tick [s]; by default
-            5 ms.
+            5 ms, or the whole control samples nearest to it.
         hand: Target of the hand from the start: x y, or x y z [m]; or two such points and a speed
             [m/s] for a line; or a CSV file with the columns t, x, y, and perhaps z. By default the
             hand rests at the start.
@@ -152,9 +152,9 @@ class DeviceCommand:
         from ..ports.pair_ends import serve_pair
         from ..scene.pair import Pair
 
-        given = self._how()
-        every = EVERY if self.clock == "wall" else 1
         pair = Pair.load(file)
+        given = self._how(pair.Ts)
+        every = EVERY if self.clock == "wall" else 1
         with serve_pair(pair, end=self.end, every=every, **given) as ends, console.ctrl_c() as stop:
             for name, server in ends.served.items():
                 print(f"{name}: {self._shown} listens at {server.url}", flush=True)
@@ -175,10 +175,10 @@ class DeviceCommand:
     def _server(self) -> Any:
         from ..ports.server import serve
 
-        hand = trajectory_of(self.hand)
-        return serve(self._scenario(), hand=hand, clay=self.clay, **self._how())
+        hand, scenario = trajectory_of(self.hand), self._scenario()
+        return serve(scenario, hand=hand, clay=self.clay, **self._how(scenario.Ts))
 
-    def _how(self) -> dict[str, Any]:
+    def _how(self, Ts: float | None) -> dict[str, Any]:
         """Where to listen, the clock, and what the device says that it is."""
         from ..ports.buttons import ButtonScript
         from ..ports.sessions import PORTS, Inverse3
@@ -193,14 +193,19 @@ class DeviceCommand:
             self.protocol,
             self.origin,
         )
-        period = PERIOD if self.period is None else self.period
         return {
             "host": self.host,
             "port": PORTS[self.protocol] if self.port is None else self.port,
             "clock": self.clock,
-            "period": period if self.clock == "tick" else None,
+            "period": self._period(Ts) if self.clock == "tick" else None,
             "inverse3": shown,
         }
+
+    def _period(self, Ts: float | None) -> float:
+        """Simulated time of a message [s]: by default whole control samples, if they are given."""
+        if self.period is not None or Ts is None:
+            return PERIOD if self.period is None else self.period
+        return max(1, round(PERIOD / Ts)) * Ts
 
     def _scenario(self) -> Scenario:
         """What is served: a scenario file, an arm from a file, or the paper's arm and hand."""

@@ -166,7 +166,13 @@ class PairComparison(Result):
         rows = [
             ("refused", math.nan, math.nan, "", math.nan)
             if x is None
-            else ("yes" if x.stable else "no", x.radius, 1e3 * x.delay, x.mode, x.gain)
+            else (
+                "yes" if x.stable else "no",
+                x.radius,
+                1e3 * x.delay,
+                x.mode * x.has_onset,
+                x.gain,
+            )
             for x in self.limits
         ]
         verdict, radius, delay, mode, gain = zip(*rows, strict=True)

@@ -49,7 +49,8 @@ class PairLimits(Result):
             below it all are stable; 0 if it is unstable without delay; inf for more than 2 s. Waves
             are read at samples: the largest whole one that is stable.
         present: one-way delay of the link, the mean of both ways, with jitter and loss [s].
-        frequency: of the motion that turns unstable first, or is unstable now [Hz].
+        frequency: of the motion that turns unstable first, or is unstable now; of the least damped
+            one if no delay that was looked at is unstable [Hz].
         joint: joint that moves most in it.
         mode: that motion in words.
         gain: largest factor of all Kp of both arms, from the present ones on, found by doubling;
@@ -96,7 +97,13 @@ class PairLimits(Result):
         """The verdict in one line."""
         at = f"{self.kind}, {1.0 / self.Ts:.4g} Hz, link {time_words(self.present)}"
         verdict = "stable" if self.stable else f"unstable (radius {self.radius:.6g})"
-        return f"{verdict} at {at}: {self._delay_words()}; {self.mode}"
+        least = "" if self.has_onset else "least damped: "
+        return f"{verdict} at {at}: {self._delay_words()}; {least}{self.mode}"
+
+    @property
+    def has_onset(self) -> bool:
+        """Whether the pair is unstable, or is at a delay that was looked at."""
+        return not (self.stable and math.isinf(self.delay))
 
     def _delay_words(self) -> str:
         if math.isinf(self.delay):

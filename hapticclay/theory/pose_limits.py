@@ -71,23 +71,27 @@ class PoseLimits:
         self._coupled = not scenario.inertia_shaping or scenario.rotated
         self._loops: dict[tuple[int, float], _CoupledLoop] = {}
         self.known: tuple[Known, Known] = {}, {}
+        self._tables: list[np.ndarray | None] = [None, None]  # of the keys of known
 
     def at(self, i: int, p: tuple[float, float], b: tuple[float, float]) -> float:
         """The gain limit with the handle at a place [1/kg]; inf for none."""
         s, known = self.scenario, self.known[i]
         if s.controller is not None:
             return math.inf
+        if not (any(b) or any(s.operators)):
+            p = s.start  # free: the same everywhere
         key = (*b, *p) if self._coupled else (b[i],)
         if key not in known:
+            self._tables[i] = None
             if len(known) >= MOST_KNOWN:
                 del known[next(iter(known))]
             if not self._coupled:
                 known[key] = continuous_limit(s, AXES[i], b[i])
             else:
-                W, T = _mobility(s, p), _environment(s, b)
-                known[key] = self._coupled_loop(i, s.gain[1 - i]).limit(W, T)
+                W = _mobility(s, p)
+                known[key] = self._coupled_loop(i, s.gain[1 - i]).limit(W, b)
                 if known[key] == 0.0 and s.gain[1 - i] > 0.0:
-                    known[key] = self._coupled_loop(i, 0.0).limit(W, T)
+                    known[key] = self._coupled_loop(i, 0.0).limit(W, b)
         return known[key]
 
     def stable_if_shaped(self, i: int, b: float) -> bool:
@@ -108,7 +112,9 @@ class PoseLimits:
         if len(self.known[i]) < MOST_KNOWN:
             return self.at(i, p, b)
         here = np.array((*b, *p) if self._coupled else (b[i],))
-        keys = np.array(list(self.known[i]))
+        keys = self._tables[i]
+        if keys is None:
+            keys = self._tables[i] = np.array(list(self.known[i]))
         difference = np.abs(keys - here) / (np.ptp(keys, axis=0) + 1e-300)
         return list(self.known[i].values())[int(difference.sum(axis=1).argmin())]
 
@@ -181,23 +187,38 @@ class _CoupledLoop:
     """
 
     def __init__(self, s: Scenario, i: int, other: float):
-        self.i = i
+        self.s, self.i = s, i
         (D, c, n), (Dj, cj, nj) = _parts(s, i, True), _parts(s, 1 - i, other > 0.0)
         nj = other * nj
         self._apart = D * Dj, c * Dj, cj * D, nj * D
         self._together = c * cj, c * nj
         self._driven = n * Dj, n * cj, n * nj
+        self._b: tuple[float, float] | None = None  # of the clay that _in_clay is of
+        self._in_clay: tuple[np.ndarray, np.ndarray]
 
-    def limit(self, W: np.ndarray, T: list[list[Polynomial]]) -> float:
-        """Least gain at which the loop is unstable."""
-        i, j = self.i, 1 - self.i
-        own, there, across = T[i][i], T[j][j], T[0][1]
+    def limit(self, W: np.ndarray, b: tuple[float, float]) -> float:
+        """Least gain at which the loop is unstable, in clay of damping b."""
+        wi, wj, w = W[self.i, self.i], W[1 - self.i, 1 - self.i], W[0, 1]
+        if b != self._b:  # many places have the same clay
+            self._b, self._in_clay = b, self._over_mobility(b)
+        passive, driven = self._in_clay
+        A = Polynomial([1.0, wi, wj, w, wi * wj - w * w] @ passive)
+        return roots.first_crossing(A, Polynomial([1.0, wj] @ driven))[0]
+
+    def _over_mobility(self, b: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+        """The loop without the gain and what it drives: rows times 1, W_ii, W_jj, W_ij, det W."""
+        T = _environment(self.s, b)
+        own, there, across = T[self.i][self.i], T[1 - self.i][1 - self.i], T[0][1]
         det = own * there - across * across
         (DD, cD, cDj, nD), (cc, cn), (nDj, ncj, nn) = self._apart, self._together, self._driven
-        wi, wj, w = float(W[i, i]), float(W[j, j]), float(W[0, 1])
-        A = DD + wi * (own * cD) + there * (wj * cDj + nD) + w * (across * (cD + cDj))
-        A = A + det * ((wi * wj - w * w) * cc + wi * cn)
-        return roots.first_crossing(A, own * nDj + det * (wj * ncj + nn))[0]
+        passive = DD + there * nD, own * cD + det * cn, there * cDj, across * (cD + cDj), det * cc
+        return _rows(*passive), _rows(own * nDj + det * nn, det * ncj)
+
+
+def _rows(*polynomials: Polynomial) -> np.ndarray:
+    """Coefficients, lowest power first, a row of each."""
+    n = max(len(p.coef) for p in polynomials)
+    return np.array([np.pad(p.coef, (0, n - len(p.coef))) for p in polynomials])
 
 
 def _parts(s: Scenario, i: int, gain: bool) -> tuple[Polynomial, Polynomial, Polynomial]:

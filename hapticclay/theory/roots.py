@@ -103,6 +103,8 @@ class _Crossing:
 def _every_crossing(A: Polynomial, B: Polynomial) -> list[_Crossing]:
     """The crossings with K > 0 at a root of A, between, and at a root of B, K ascending."""
     A, B = exact(A), exact(B)
+    if not any(B.integers):  # what drives nothing moves no root
+        return []
     (Ae, Ao), (Be, Bo) = axis_parts(A), axis_parts(B)
     omega2 = rational([0, 1])
     across, size2 = -(Ae * Be + omega2 * Ao * Bo), Be * Be + omega2 * Bo * Bo

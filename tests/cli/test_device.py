@@ -146,9 +146,14 @@ def test_what_no_pair_serves_is_said_in_a_line(words, told, tmp_path, monkeypatc
     assert told in error and error.count("\n") == 1
 
 
-def test_nobody_came(capsys, tmp_path):
-    words = ["device", "serve", "--port", "0", "--clock", "tick", "--duration", "0"]
-    assert app.main([*words, "--out", str(tmp_path)]) == 0
+@pytest.mark.parametrize(  # with --clock tick a message is about 5 ms: whole control samples
+    "words", ["", "--pair good.toml", "--arm leader_7 --rate 300", "--arm leader_7 --rate 20"]
+)
+def test_nobody_came(words, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "good.toml").write_text(PAIR.format("4e-3"))
+    words = f"device serve --port 0 --clock tick --duration 0 --out out {words}".split()
+    assert app.main(words) == 0
     assert "nothing was recorded" in capsys.readouterr().out
 
 

@@ -1,7 +1,6 @@
 """Clay of cells on a grid and clay with rotated axes, against solutions that are not ours."""
 
 import dataclasses
-import functools
 import math
 
 import numpy as np
@@ -14,8 +13,7 @@ from hapticclay.errors import ParameterError
 from hapticclay.kernel import native
 from hapticclay.model.constants import GAIN, TS
 from tests.hunt import HUNTS
-from tests.oracles import piecewise_linear
-from tests.oracles.cells import cells
+from tests.oracles import kept_cells, piecewise_linear, store
 
 FIELDS = ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta")
 ENGINES = ("python", "native") if native.is_there() else ("python",)
@@ -43,6 +41,12 @@ def path_through(clay, **more):
     """A slanted path through the random cells."""
     free = hc.free(force=(1.0, 0.7), gain=(1.0, 0.2), inertia_shaping=True, t_max=4.0)
     return dataclasses.replace(free, **{"clay": clay, "length": None, **more})
+
+
+def crossed(name, s, *case):
+    """The path through the random cells by SciPy, from the disk."""
+    loop = (X, Y), (FIRST, SECOND), (s.gain, s.force)
+    return store.solution(f"cells-{name}", kept_cells.of_grid, *loop, *case)
 
 
 def random_clay(angle=0.0, **more):
@@ -84,13 +88,10 @@ def test_a_grid_of_layers_is_the_layers_bit_for_bit(name):
 def test_borders_of_cells_are_passed_when_they_should_be(angle, limit):
     """As documented for layers, 1e-7 s at 0.36 ms; turned, one border is passed at 0.5 mm/s."""
     s = path_through(random_clay(angle))
-    exact = cells(
-        (X, Y), lambda i, j: (FIRST[i, j], SECOND[i, j]), s.gain, s.force, [4.0],
-        inertia_shaping=True, angle=angle,
-    )  # fmt: skip
+    exact = crossed(f"borders-{angle}", s, [4.0], (0.0,) * 3, True, angle)
     r = hc.simulate(s, engine=ENGINES[-1])
     assert len(exact.crossings) >= 8
-    assert [("xy"[i], border) for i, border, _ in exact.crossings] == [
+    assert [("xy"[int(i)], border) for i, border, _ in exact.crossings] == [
         (c.axis, c.border) for c in r.crossings
     ]
     for (_, _, time), c in zip(exact.crossings, r.crossings, strict=True):
@@ -99,14 +100,9 @@ def test_borders_of_cells_are_passed_when_they_should_be(angle, limit):
     assert abs(r.energy["residual"]) < 1e-14
 
 
-@functools.cache
 def crossings_by_hand(angle):
     """Times of the crossings of an arm that is not shaped, by a hand."""
-    s = path_through(None)
-    exact = cells(
-        (X, Y), lambda i, j: (FIRST[i, j], SECOND[i, j]), s.gain, s.force, [2.0],
-        (0.25, 2.0, 6.0), angle=angle,
-    )  # fmt: skip
+    exact = crossed(f"hand-{angle}", path_through(None), [2.0], (0.25, 2.0, 6.0), False, angle)
     return [time for _, _, time in exact.crossings]
 
 
@@ -143,11 +139,8 @@ def test_each_cell_grows_from_its_first_entry():
     rates = np.zeros((9, 12))
     rates[1:3] = 100.0
     s = path_through(random_clay(growth=rates), t_max=2.0)
-    exact = cells(
-        (X, Y), lambda i, j: (FIRST[i, j], SECOND[i, j]), s.gain, s.force, [2.0],
-        inertia_shaping=True, grows=lambda i, j: (rates[i, j], 0.0),
-    )  # fmt: skip
-    r = hc.simulate(s, engine="python")
+    exact = crossed("growth", s, [2.0], (0.0,) * 3, True, 0.0, rates)
+    r = hc.simulate(s, engine=ENGINES[-1])
     assert len(exact.crossings) >= 3
     for (_, _, time), c in zip(exact.crossings, r.crossings, strict=True):
         assert c.time == pytest.approx(time, abs=1e-7)

@@ -69,7 +69,7 @@ def same(a, b):
     assert a.crossings == b.crossings
 
 
-@pytest.mark.parametrize("angle", some([0.0, 0.3, math.pi / 4, 1.9], 3))
+@pytest.mark.parametrize("angle", some([0.3, 0.0, 1.9, math.pi / 4], 2))
 def test_a_straight_cut_presses_with_its_cross_section(angle):
     """Width x depth x pressure, whatever the direction and the place among the cells."""
     c, s = math.cos(angle), math.sin(angle)
@@ -88,7 +88,7 @@ def test_a_straight_cut_presses_with_its_cross_section(angle):
 
 def test_the_volume_is_that_of_the_disc_on_its_path():
     """Second order in the cell, from a straight path with round ends, on the skew."""
-    length, errors, cells = 0.03, [], np.array([8, 12, 16, 24, 32])
+    length, errors, cells = 0.03, [], np.array([8, 16, 32])
     exact = (WIDTH * length + math.pi * RADIUS**2) * DEPTH
     for n in cells:
         block = dataclasses.replace(BLOCK, y=(-0.05, 0.05), cells=(10 * n, 10 * n))

@@ -182,7 +182,7 @@ def some_scene(draw, law):
         inertia_shaping=draw(maybe),
     )
     dt = draw(between(3e-4, 2e-3)) if not sampled else draw(between(1e-4, 7e-4))
-    fields |= dict(dt=dt, t_max=float(f"{dt * draw(evenly(20.0, 250.0)):.5g}"))
+    fields |= dict(dt=dt, t_max=float(f"{dt * draw(evenly(20.0, 150.0)):.5g}"))
     if sampled and draw(maybe):
         fields |= dict(Ts=dt * draw(st.integers(1, 4)))
     if draw(maybe):
@@ -217,7 +217,7 @@ def made(scene, engine):
 
 @native
 @pytest.mark.parametrize("law", LAWS)
-@examples(12)
+@examples(8)
 @given(st.data())
 def test_both_engines_make_the_same_bits_of_any_scene(law, data):
     scene = data.draw(scenes(law))

@@ -1,14 +1,13 @@
 """Clay that changes smoothly with the place, against solutions that are not ours."""
 
 import dataclasses
-import functools
 
 import numpy as np
 import pytest
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
-from tests.oracles.cells import cells
+from tests.oracles import kept_cells, store
 from tests.oracles.hybrid import hybrid
 from tests.oracles.spline import even_spline
 
@@ -34,15 +33,13 @@ def path_through(clay, **more):
     return dataclasses.replace(free, **{"clay": clay, "length": None, **more})
 
 
-@functools.cache
 def exact(t_max, hand=None, shaping=True, angle=0.0):
     """The path through LAWS at half time and at the end."""
     s = path_through(None)
     th = dataclasses.astuple(hand) if hand else (0.0,) * 3
-    return cells(
-        ((), ()), None, s.gain, s.force, [0.5 * t_max, t_max], th, shaping, angle,
-        place=lambda p: [b(p) for b in SPLINES],
-    )  # fmt: skip
+    case = SPANS, VALUES, (s.gain, s.force), [0.5 * t_max, t_max], th, shaping, angle
+    name = f"smooth-{t_max}-{'hand' if hand else ''}-{angle}"
+    return store.solution(name, kept_cells.of_splines, *case)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5])

@@ -51,7 +51,7 @@ def test_runs_end_where_fine_ones_of_the_fast_method_do(name):
     """The oracle is of second order, first where it slides along a border: at dt/6 it is fine."""
     s = SCENES[name]
     r = hc.simulate(s, engine="python")
-    fine = hc.simulate(replace(s, integrator="fast", dt=s.dt / 6.0), engine="python")
+    fine = hc.simulate(replace(s, integrator="fast", dt=s.dt / 6.0))
     assert r.outcome.code == fine.outcome.code in ("time limit", "saturated")
     away = np.abs(r.p[-1] - fine.p[-1]).max()
     # 2e-7 is 40 times the largest difference measured; the fast method's own error is of this size

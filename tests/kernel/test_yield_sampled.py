@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import inspect
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from hapticclay.model.constants import TS
 from hapticclay.simulation.run import Run
 from tests.hunt import examples
 from tests.kernel.test_engines import ALL, PHYSICAL
-from tests.oracles import paper_law
+from tests.oracles import paper_law, store
 from tests.oracles.sampled_yield import yielding
 
 Ts = 2.88e-3  # of the runs beside the oracle [s]
@@ -54,9 +55,14 @@ CASES = {
 }
 
 
+CASE = inspect.signature(yielding)
+
+
 @functools.cache
 def solved(name):
-    return yielding(Ts=Ts, K=GAIN, t_end=SPAN, **CASES[name])
+    case = CASE.bind(Ts=Ts, K=GAIN, t_end=SPAN, **CASES[name])
+    case.apply_defaults()
+    return store.solution(f"yields-{name}", yielding, *case.arguments.values())
 
 
 def beside(name, ratio):
@@ -82,7 +88,8 @@ def beside(name, ratio):
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_loop_is_that_of_an_event_solver_and_second_order_in_the_step(name):
-    P, V, F, T = solved(name)
+    x = solved(name)
+    P, V, F, T = x.p, x.v, x.fe, x.tau
     errors = []
     for ratio in (4, 16):
         r, at = beside(name, ratio)

@@ -98,7 +98,7 @@ def scene_of(*names):
         kw |= PARTS.get(name, {})
     if any(x.name in names for x in support.LAWS):
         kw["clay"] = clay_of(names)
-    kw |= dict(t_max=0.003, dt=1e-4, length=None)
+    kw |= dict(t_max=0.0015, dt=1e-4, length=None)
     if "arm" in kw:
         return hc.Scenario(force=(1.0, 0.2), **(PARTS["own controller"] | kw))
     return hc.Scenario(force=(1.0, 0.2), start=(0.019, 0.0), **kw)

@@ -2,6 +2,8 @@
 between samples by SciPy, stopped at every stop and start of an axis.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
@@ -121,6 +123,15 @@ class Plant:
         return z
 
 
+class Samples(NamedTuple):
+    """At the samples, (n, 2) each."""
+
+    p: np.ndarray
+    v: np.ndarray
+    fe: np.ndarray
+    tau: np.ndarray
+
+
 def yielding(  # noqa: PLR0913  # a case, spelt out
     law, Ts, K, uh, th=(0.0, 0.0, 0.0), along=False, render="physical", t_end=0.2, v0=(0.0, 0.0)
 ):
@@ -166,4 +177,4 @@ def yielding(  # noqa: PLR0913  # a case, spelt out
             out.append(x)
         loop = np.array([(blocks[i] @ np.append(loop[i], f[i]))[:4] for i in (0, 1)])
         z = plant.hold(z, tau, Ts)
-    return np.array(P), np.array(V), np.array(F), np.array(T)
+    return Samples(*map(np.array, (P, V, F, T)))

@@ -48,7 +48,8 @@ def test_variable_cut_without_growth(axis, K, time, before, after):
         assert speeds == pytest.approx([before, after], rel=1e-3)
         assert speeds == pytest.approx([K * F / (10.0 + K * b) for b in (50.0, 100.0)], rel=1e-3)
         if shaping:
-            assert np.max(np.abs(r.p[:, axis] - position(r.t))) < 1e-7
+            # but the last, off the grid, for which the oracle would take every sample by itself
+            assert np.max(np.abs(r.p[:-1, axis] - position(r.t[:-1]))) < 1e-7
 
 
 def test_each_axis_changes_by_its_own_coordinate():

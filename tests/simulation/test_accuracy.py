@@ -96,7 +96,7 @@ def test_errors_are_as_small_as_asked_and_estimates_are_true():
     """
     if not native.is_there():
         pytest.skip("needs the compiled kernel")
-    found, n = [], 100 if HUNTS else 40
+    found, n = [], 100 if HUNTS else 24  # one of which may miss what 95 of 100 keep
 
     @settings(max_examples=n)
     @given(scenes(), st.floats(-8.0, -3.0), st.sampled_from("ssm"))

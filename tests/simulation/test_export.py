@@ -417,7 +417,7 @@ def test_fit_and_identify_read_the_csv(tmp_path):
         muscle=hc.Multisine((0.3, 0.0), low=0.2, high=8.0, period=10.0),
         inertia_shaping=True,
         length=None,
-        t_max=30.0,
+        t_max=20.0,
         dt=1e-3,
     )
     file = hc.simulate(push).export(tmp_path / "push.csv")

@@ -8,25 +8,32 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.kernel import native
-from hapticclay.simulation import record
+from hapticclay.simulation import record, run
 
+LOOK = 511  # steps between two looks at a run in Python; compiled runs take those of a user
 HARDWARE = dataclasses.replace(
-    hc.constant_cut(control="sampled", t_max=1.5),
+    hc.constant_cut(control="sampled", t_max=0.3, start=(0.045, 0.0)),
     hardware=hc.Hardware(jitter=2e-5, delay=1e-4, friction=(0.01, 0.01)),
 )
-CUT = hc.constant_cut(t_max=3.0)  # some steps longer than two looks; others than one
+SHORT = hc.constant_cut(t_max=0.4, start=(0.045, 0.0))  # some steps longer than two looks
+CUT = hc.constant_cut(t_max=3.0)
 SCENES = {  # name: scenario, engine, every, looks
-    "fast": (CUT, "python", 1, 2),
-    "fast, some samples": (CUT, "python", 7, 1),
-    "driven": (hc.stability_test(3.0, t_max=1.5), "python", 1, 1),
-    "growing": (hc.variable_cut(t_max=1.5), "python", 1, 1),
+    "fast": (SHORT, "python", 1, 2),
+    "fast, some samples": (SHORT, "python", 7, 1),
+    "driven": (hc.stability_test(3.0, t_max=0.3), "python", 1, 1),
+    "growing": (
+        dataclasses.replace(hc.variable_cut(t_max=0.3), start=(0.049, 0.0)), "python", 1, 1
+    ),
     "native": (CUT, "native", 1, 2),
     "native, some samples": (CUT, "native", 7, 2),
-    "accurate": (hc.constant_cut(integrator="accurate", dt=1e-3, t_max=4.2), "python", 1, 1),
+    "accurate": (
+        hc.constant_cut(integrator="accurate", dt=1e-3, t_max=0.6, start=(0.045, 0.0)),
+        "python", 1, 1,
+    ),
     "accurate, native": (hc.constant_cut(integrator="accurate", t_max=9.5), "native", 3, 2),
-    "sampled": (hc.constant_cut(control="sampled", t_max=1.5), "python", 1, 1),
+    "sampled": (hc.constant_cut(control="sampled", t_max=0.3, start=(0.045, 0.0)), "python", 1, 1),
     "hardware": (HARDWARE, "python", 1, 1),
-}
+}  # fmt: skip
 
 
 @functools.cache
@@ -36,10 +43,12 @@ def whole_run(scenario, engine):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_an_interrupted_record_is_the_beginning_of_the_whole_one(name):
+def test_an_interrupted_record_is_the_beginning_of_the_whole_one(name, monkeypatch):
     scenario, engine, every, most = SCENES[name]
     if engine == "native" and not native.is_there():
         pytest.skip("needs the compiled kernel")
+    if engine == "python":
+        monkeypatch.setattr(run, "CHUNK", LOOK + 1)
     looks = []
 
     def enough(t, x):
@@ -50,7 +59,7 @@ def test_an_interrupted_record_is_the_beginning_of_the_whole_one(name):
     whole = whole_run(scenario, engine)
     assert len(looks) == most and r.outcome.code == "interrupted" and not r.outcome.advice
     step = r.outcome.step
-    assert 1000 < step < len(whole.t) - 1 and r.outcome.time == r.t[-1] == whole.t[step]
+    assert LOOK - 1 <= step < len(whole.t) - 1 and r.outcome.time == r.t[-1] == whole.t[step]
     index = sorted({*range(0, step, every), step})  # each every-th, and the last
     for array in record.ARRAYS:
         np.testing.assert_array_equal(

@@ -13,7 +13,7 @@ from hapticclay.simulation import memory, one_run
 
 GB = 10**9
 WIRED = dataclasses.replace(
-    hc.constant_cut(control="sampled", dt=1e-4, t_max=0.15), hardware=hc.Hardware()
+    hc.constant_cut(control="sampled", dt=1e-4, t_max=0.08), hardware=hc.Hardware()
 )
 
 
@@ -68,11 +68,11 @@ def test_there_is_less_left_than_installed():
 @pytest.mark.parametrize(
     "scenario,engine,every",
     [
-        (hc.constant_cut(dt=2e-4, t_max=0.4), "python", 1),
+        (hc.constant_cut(dt=2e-4, t_max=0.2), "python", 1),
         (hc.constant_cut(dt=2e-4, t_max=5.0), "native", 1),
         (hc.stability_test(dt=1e-3, t_max=8.0), "python", 1),
-        (hc.variable_cut(dt=1e-3, t_max=2.0), "python", 1),
-        (hc.constant_cut(control="sampled", dt=1e-4, t_max=0.15), "python", 1),
+        (hc.variable_cut(dt=1e-3, t_max=1.0), "python", 1),
+        (hc.constant_cut(control="sampled", dt=1e-4, t_max=0.08), "python", 1),
         (hc.constant_cut(integrator="accurate", dt=5e-4, t_max=10.0), "native", 1),
         (WIRED, "python", 1),
     ],

@@ -101,13 +101,13 @@ def test_yielding_clay_holds_the_follower():
     flow = hc.Profile((), (1.0,), Fy=(3.0,))
     found = hc.simulate(one(follower_clay=hc.Clay(flow, flow), t_max=0.2, muscle=None))
     assert not np.any(found.follower)
-    pushed = one(follower_clay=hc.Clay(flow, flow), muscle=hc.Step((2.0, 0.0), 0.0), t_max=1.0)
+    pushed = one(follower_clay=hc.Clay(flow, flow), muscle=hc.Step((2.0, 0.0), 0.0), t_max=0.8)
     found = hc.simulate(pushed)
     assert np.abs(found.follower).max() < 1e-16  # rounding
     assert found.leader[-1, 0] == pytest.approx(2.0 / 400.0, rel=1e-3)
-    found = hc.simulate(replace(pushed, muscle=hc.Step((5.0, 0.0), 0.0), t_max=4.0))
+    found = hc.simulate(replace(pushed, muscle=hc.Step((5.0, 0.0), 0.0), t_max=4.0, Ts=2e-3))
     # what the yield force leaves moves 2 kg behind 2 N.s/m, but for a start of some 50 ms
-    rate = np.diff(found.follower[:, 0])[-1] / 1e-3
+    rate = np.diff(found.follower[:, 0])[-1] / 2e-3
     assert rate == pytest.approx(1.0 - math.exp(-4.0), rel=1e-3)
 
 
@@ -195,9 +195,9 @@ TOUCHED = [
 @pytest.mark.parametrize("runs", ["host", "drive"])
 @pytest.mark.parametrize("touched", TOUCHED)
 def test_the_arm_in_closed_form_is_the_model_of_its_numbers(touched, runs):
-    """The full motion, 0.3 rad and more, through other formulas: rounding of 150 samples."""
+    """The full motion, 0.2 rad and more, through other formulas: rounding of 125 samples."""
     law = replace(LAW_2, runs=runs)
-    more = {"Ts": 2e-3, "t_max": 0.3, "leader_operator": HAND, "follower_clay": touched}
+    more = {"Ts": 2e-3, "t_max": 0.25, "leader_operator": HAND, "follower_clay": touched}
     pair = hc.Pair(ARM, ARM, law, hc.Link(delay=4e-3), **more)
     pair = replace(pair, muscle=hc.Pulse((5.0, 2.0), 0.0, 0.2))
     model = replace(pair, leader=planar(ARM), follower=planar(ARM))
@@ -205,8 +205,9 @@ def test_the_arm_in_closed_form_is_the_model_of_its_numbers(touched, runs):
     assert np.ptp(a.leader, axis=0).min() > 0.1
     for name in ("leader", "follower", "leader_torque", "hand", "contact", "energy"):
         np.testing.assert_allclose(getattr(a, name), getattr(b, name), atol=1e-10, err_msg=name)
-    found, other = hc.theory.pair_limits(pair), hc.theory.pair_limits(model)
-    assert found.delay == pytest.approx(other.delay, rel=1e-9)
+    if runs == "host" or touched is None:  # what is touched is the same to drives
+        found, other = hc.theory.pair_limits(pair), hc.theory.pair_limits(model)
+        assert found.delay == pytest.approx(other.delay, rel=1e-9)
 
 
 @pytest.mark.parametrize("share, grows", [(0.99, False), (1.01, True)])
@@ -271,7 +272,9 @@ def test_motors_saturate_and_converters_round():
     assert np.diff(speed).max() == pytest.approx(1.5e-3, rel=1e-9)
     # 4 bits over -8 to 8 N: a step of 1 N, below half of which nothing moves
     rough = hc.Hardware(dac_bits=4, dac_range=(8.0, 8.0))
-    found = hc.simulate(replace(pair, follower_hardware=rough, muscle=hc.Step((1.0, 0.0), 0.0)))
+    found = hc.simulate(
+        replace(pair, follower_hardware=rough, muscle=hc.Step((1.0, 0.0), 0.0), t_max=0.2)
+    )
     first = np.flatnonzero(np.abs(found.follower_torque[:, 0]) > 0.5)[0]  # held before the sample
     assert not np.any(found.follower[:first]) and found.follower[first, 0] > 0.0
 
@@ -289,7 +292,7 @@ def test_a_force_sensor_has_its_steps():
     noisy = replace(
         pair, follower_hardware=hc.Hardware(force_noise=0.1, seed=3), follower_clay=None
     )
-    torque = hc.simulate(replace(noisy, t_max=1.0)).leader_torque[1:, 0]
+    torque = hc.simulate(replace(noisy, t_max=0.5)).leader_torque[1:, 0]
     assert np.std(torque) == pytest.approx(0.1, rel=4.0 / math.sqrt(2 * len(torque)))  # 4 sigma
 
 

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.simulation import period_map
 from hapticclay.studies import growth
 from hapticclay.studies.boundary import PushedLoop, pose_matrix
-from tests.hunt import some
+from tests.hunt import examples, some
 from tests.oracles.sampled_wall import sample_map
 from tests.simulation.test_stepwise import fast
 
@@ -86,7 +86,7 @@ def test_the_eigenvalues_of_a_wall_are_those_of_its_definition(name):
     assert found.period == pytest.approx(wall.Ts)
 
 
-@settings(max_examples=25)
+@examples(12)
 @given(
     K=st.floats(0.1, 20.0),
     b=st.floats(5.0, 500.0),

@@ -8,6 +8,7 @@ import pytest
 import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.kernel import native
+from hapticclay.simulation import run, vectored
 from hapticclay.simulation.stepwise import Sample
 from tests.hunt import some
 from tests.simulation.test_stepwise import CUT, HARD, HELD, SCENES, fast
@@ -74,13 +75,15 @@ def test_compiled_runs_of_one_kind_are_those_of_simulations(name):
 @fast
 @pytest.mark.parametrize("there", [True, False])
 def test_a_batch_is_compiled_where_there_is_a_kernel(there, monkeypatch):
+    for module in (run, vectored):
+        monkeypatch.setattr(module, "CHUNK", 1024)  # rows between two looks
     if not there:
         monkeypatch.setattr(native, "why_not", lambda: "it is not built")
     scenes = KINDS["operator"]
     single = [hc.Simulation(s, engine="python") for s in scenes]
     with hc.SimulationBatch(scenes) as batch:
-        assert {run.row.engine for run in batch._run.runs} == {"native" if there else "python"}
-        go_on(batch, single, 3, 9, 1200)
+        assert {x.row.engine for x in batch._run.runs} == {"native" if there else "python"}
+        go_on(batch, single, 3, 9, 400)
 
 
 @fast
@@ -99,17 +102,19 @@ def test_more_arms_than_a_batch_keeps():
 
 
 @fast
-def test_verdicts_come_when_a_simulation_has_them():
+def test_verdicts_come_when_a_simulation_has_them(monkeypatch):
     """Over several looks of the monitor: an unstable run, one that grows slowly, one that ends."""
-    cut = replace(CUT, operator=hc.Operator(0.3, 0.0, 0.0), t_max=6.0, length=None)
+    for module in (run, vectored):
+        monkeypatch.setattr(module, "CHUNK", 1024)  # rows between two looks
+    cut = replace(CUT, operator=hc.Operator(0.3, 0.0, 0.0), t_max=6.0, length=None, dt=4 * CUT.dt)
     scenes = [replace(cut, gain=(K, K)) for K in (300.0, 55.0, 1.0)]
     scenes += [replace(scenes[0], stop_when_unstable=False), replace(cut, length=0.01)]
     single = [hc.Simulation(s, engine="python") for s in scenes]
     with hc.SimulationBatch(scenes, engine="native") as batch:
         for _ in range(4):
-            batch.advance(2100)
+            batch.advance(525)
             for sim in single:
-                sim.advance(2100)
+                sim.advance(525)
             assert_alike(batch, single)
     assert {o.code for o in batch.outcomes if o} >= {"diverged", "finished"}
 

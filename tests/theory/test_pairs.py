@@ -427,6 +427,14 @@ def with_friction():
     return hc.theory.pair_limits(seven(Ts=1e-3, delay=1e-3, law=law))
 
 
+@pytest.mark.parametrize("runs, lag, ripple", [("drive", 6e-3, 1e-3), ("host", 4e-3, 1e-6)])
+def test_friction_is_held_by_the_lag_of_the_reference(runs, lag, ripple):
+    """b + Kp (delay + link + Ts/2) in drives, whose rate ripples between samples; b + Kp link."""
+    law = hc.JointPD((400.0,), (50.0,), runs=runs)
+    pair = replace(one(law=law, Ts=2e-3, delay=1e-3), link=hc.Link(delay=4e-3))
+    assert hc.theory.pair_limits(pair).slope[0] == pytest.approx(0.1 + 400.0 * lag, rel=ripple)
+
+
 def test_less_stiffness_and_more_damping_do_not_help():
     """An undamped common motion: half the Kp and 1.5 times the Kd leave its growth."""
     law = replace(DRIVE, friction=FRICTION)
@@ -559,7 +567,9 @@ def test_a_verdict_says_what_holds_and_touches_the_arms():
     compared = hc.theory.compare_links(one())
     assert any("close no loop" in x for x in compared.remarks())
     waves = hc.theory.pair_limits(one(kind="waves"))
-    assert "any delay of the link up to 2 s" in waves.headline()
+    assert "any delay of the link up to 2 s; least damped: " in waves.headline()
+    first = dict(zip(compared.kinds, compared.tables()["architectures"]["first"], strict=True))
+    assert first["waves"] == "" and first["position-position"].startswith("arms opposed")
 
 
 def test_hands_of_a_box():

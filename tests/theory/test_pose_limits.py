@@ -106,3 +106,10 @@ def test_a_search_of_all_places_finds_the_worst_of_a_fine_grid():
         assert found.K == pytest.approx(min(every), rel=5e-3)
         assert found.K == limits.at(i, found.place, tuple(s.clay.at(*found.place).tolist()))
         assert len(limits.known[i]) <= MOST_KNOWN
+
+
+def test_in_free_space_no_gain_is_too_much_whatever_the_compensator():
+    """Te + Th = 0: the gain drives nothing. One of first order, and one with a pole at 0."""
+    for C in (hc.Compensator((1.0,), (1.0, 50.0)), hc.Compensator((1.0,), (1.0, 50.0, 0.0))):
+        limits = PoseLimits(hc.Scenario(compensator=C, length=None))
+        assert [limits.at(i, (0.05, 0.02), (0.0, 0.0)) for i in (0, 1)] == [math.inf] * 2
