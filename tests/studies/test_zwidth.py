@@ -180,7 +180,7 @@ def test_rest_is_the_verdict_of_loops_that_are_not_linear():
     # a surface that is pressed is the linear wall; 1 % is what the decay of a swing resolves
     exact = largest_stiffness(replace(BARE, B=1.0))
     walls = [replace(BARE, unilateral=True, B=1.0, K=share * exact) for share in (0.99, 1.01)]
-    assert come_to_rest(walls, Press(still=1e-4)) == [True, False]
+    assert come_to_rest(walls) == [True, False]
 
 
 def test_friction_holds_more_than_the_linear_loop():
