@@ -307,6 +307,47 @@ def test_bags_of_ros(ros1, tmp_path):
         hc.Log.read(file, table="/pose")
 
 
+@pytest.mark.parametrize("without", [(), (0,), (3,)])
+def test_a_topic_with_a_message_without_stamp_is_on_the_times_of_its_receipt(without, tmp_path):
+    """A node that starts sends a header of zeros; no column of data may be taken for the clock."""
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store, kind = get_typestore(Stores.ROS1_NOETIC), "geometry_msgs/msg/PointStamped"
+    time, header, point = (
+        store.types[x]
+        for x in ("builtin_interfaces/msg/Time", "std_msgs/msg/Header", "geometry_msgs/msg/Point")
+    )
+    start, at = 1_700_000_000, 0.25 * np.arange(8)
+    with Writer(tmp_path / "a.bag") as bag:
+        way = bag.add_connection("/tip", kind, typestore=store)
+        for i, x in enumerate(at**2):
+            nanos = int(1e9 * at[i])
+            stamp = (0, 0) if i in without else (start + nanos // 10**9, nanos % 10**9)
+            message = store.types[kind](header(0, time(*stamp), ""), point(x, 0.0, 0.0))
+            bag.write(way, start * 10**9 + nanos, store.serialize_ros1(message, kind))
+    log = hc.Log.read(tmp_path / "a.bag")
+    np.testing.assert_allclose(log.values("t" if without else "stamp"), at, atol=1e-9)
+    np.testing.assert_array_equal(log.values("point.x"), at**2)
+
+
+def test_json_messages_of_which_some_have_a_clock_are_on_the_times_of_the_log(tmp_path):
+    from mcap.writer import Writer
+
+    with open(tmp_path / "a.mcap", "wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("Row", "jsonschema", b"{}")
+        way = writer.register_channel("/tip", "json", schema)
+        for i in range(8):
+            row = {"x": 2.0 * i} | ({"t": 100.0 + i} if i > 2 else {})
+            writer.add_message(way, 250_000_000 * i, json.dumps(row).encode(), 250_000_000 * i)
+        writer.finish()
+    log = hc.Log.read(tmp_path / "a.mcap")
+    np.testing.assert_allclose(log.values("t"), 0.25 * np.arange(8), rtol=1e-15)
+    np.testing.assert_array_equal(log.values("x"), 2.0 * np.arange(8))
+
+
 def test_our_own_exports_are_read_with_their_units(tmp_path):
     record = hc.simulate(hc.constant_cut(t_max=0.05))
     for kind in ("nc", "parquet", "csv", "mcap", "mat"):
