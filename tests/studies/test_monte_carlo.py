@@ -170,7 +170,7 @@ def test_the_interval_is_that_of_clopper_and_pearson(k, n, level):
 def test_probability_agrees_with_quadrature_of_the_exact_limit():
     """One seed, 4 standard errors; benchmarks/robustness.py counts the intervals of 20 seeds.
 
-    Four nodes and six differ by a hundredth of a standard error.
+    Four nodes and six differ by 0.07 of a standard error.
     """
     trials, names, _ = next(iter(robustness.cases().values()))
     exact = robustness.quadrature(trials, names, 4, robustness.exact_limit)
