@@ -12,6 +12,7 @@ import pytest
 from scipy.io import netcdf_file, savemat
 
 import hapticclay as hc
+from hapticclay.columns import parquet_files, workbooks
 
 N = 150
 T = 0.25 * np.arange(N)  # exact in any format below
@@ -220,6 +221,37 @@ def test_lerobots_layout(tmp_path):
     assert hc.studies.log_report(hc.Log.read(file)).stamps.backward.tolist() == [75]
 
 
+@pytest.mark.parametrize("size", [4, -1])  # -1: of any length
+def test_rows_without_a_list_are_empty_and_the_others_stay_whole(size, tmp_path):
+    """Two lists of four in four rows are not four lists of two."""
+    lists = [[1.0, 2.0, 3.0, 4.0], None, [5.0, 6.0, 7.0, 8.0], None]
+    q = pa.array(lists, pa.list_(pa.float64(), size))
+    pq.write_table(pa.table({"t": [0.0, 0.1, 0.2, 0.3], "q": q}), tmp_path / "log.parquet")
+    table = parquet_files.parquet("log", tmp_path / "log.parquet")
+    assert [x.text for x in table.heads] == ["t", *(f"q[{i}]" for i in range(4))]
+    nan = np.nan
+    for i in range(4):
+        np.testing.assert_array_equal(table.loose_numbers(1 + i), [1.0 + i, nan, 5.0 + i, nan])
+    with pytest.raises(hc.ParameterError, match=r"row 1, column 'q\[0\]'"):
+        table.numbers(1)
+
+
+def test_a_workbook_is_closed_when_it_is_read(tmp_path, monkeypatch):
+    book = openpyxl.Workbook()
+    for row in (["t", "x"], [0.0, 1.0], [0.1, 2.0]):
+        book.active.append(row)
+    book.save(tmp_path / "log.xlsx")
+    load, opened = openpyxl.load_workbook, []
+
+    def keeping(*args, **how):
+        opened.append(load(*args, **how))
+        return opened[-1]
+
+    monkeypatch.setattr(openpyxl, "load_workbook", keeping)
+    workbooks.excel("log", tmp_path / "log.xlsx")
+    assert opened[0]._archive.fp is None
+
+
 @pytest.mark.parametrize("ros1", [True, False])
 def test_bags_of_ros(ros1, tmp_path):
     """Two topics with clocks of their own, and names of joints."""
@@ -273,6 +305,47 @@ def test_bags_of_ros(ros1, tmp_path):
     assert log.rows == N // 2
     with pytest.raises(hc.ParameterError, match="one of /joints, /wrench"):
         hc.Log.read(file, table="/pose")
+
+
+@pytest.mark.parametrize("without", [(), (0,), (3,)])
+def test_a_topic_with_a_message_without_stamp_is_on_the_times_of_its_receipt(without, tmp_path):
+    """A node that starts sends a header of zeros; no column of data may be taken for the clock."""
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store, kind = get_typestore(Stores.ROS1_NOETIC), "geometry_msgs/msg/PointStamped"
+    time, header, point = (
+        store.types[x]
+        for x in ("builtin_interfaces/msg/Time", "std_msgs/msg/Header", "geometry_msgs/msg/Point")
+    )
+    start, at = 1_700_000_000, 0.25 * np.arange(8)
+    with Writer(tmp_path / "a.bag") as bag:
+        way = bag.add_connection("/tip", kind, typestore=store)
+        for i, x in enumerate(at**2):
+            nanos = int(1e9 * at[i])
+            stamp = (0, 0) if i in without else (start + nanos // 10**9, nanos % 10**9)
+            message = store.types[kind](header(0, time(*stamp), ""), point(x, 0.0, 0.0))
+            bag.write(way, start * 10**9 + nanos, store.serialize_ros1(message, kind))
+    log = hc.Log.read(tmp_path / "a.bag")
+    np.testing.assert_allclose(log.values("t" if without else "stamp"), at, atol=1e-9)
+    np.testing.assert_array_equal(log.values("point.x"), at**2)
+
+
+def test_json_messages_of_which_some_have_a_clock_are_on_the_times_of_the_log(tmp_path):
+    from mcap.writer import Writer
+
+    with open(tmp_path / "a.mcap", "wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("Row", "jsonschema", b"{}")
+        way = writer.register_channel("/tip", "json", schema)
+        for i in range(8):
+            row = {"x": 2.0 * i} | ({"t": 100.0 + i} if i > 2 else {})
+            writer.add_message(way, 250_000_000 * i, json.dumps(row).encode(), 250_000_000 * i)
+        writer.finish()
+    log = hc.Log.read(tmp_path / "a.mcap")
+    np.testing.assert_allclose(log.values("t"), 0.25 * np.arange(8), rtol=1e-15)
+    np.testing.assert_array_equal(log.values("x"), 2.0 * np.arange(8))
 
 
 def test_our_own_exports_are_read_with_their_units(tmp_path):

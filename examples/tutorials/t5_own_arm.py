@@ -132,4 +132,4 @@ print(hc.simulate(dataclasses.replace(scenario, controller=buzzing, operator=Non
 
 # %%
 # More: :doc:`/arm`, :doc:`/own_arm`, :doc:`/gallery/symptoms/index`. On the command line:
-# ``hapticclay arm arm.xml --gains gains.toml --rate 500 --delay 2ms --run --film buzz.mp4``.
+# ``hapticclay arm arm.xml --gains gains.toml --rate 500 --delay 2ms --run --film buzz.webp``.

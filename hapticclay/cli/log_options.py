@@ -61,7 +61,8 @@ def hinted(given: Collection[str], example: str = EXAMPLE) -> Iterator[None]:
         yield
     except ParameterError as error:
         key = error.field.removeprefix("columns.")
-        hint = "" if key in given else f"; give --columns {example}"
+        told = key in given or (key == "columns" and given)
+        hint = "" if told else f"; give --columns {example}"
         raise ParameterError(error.field, error.value, error.bound + hint) from None
 
 

@@ -48,15 +48,24 @@ def mcap(field: str, path: Path, table: str = "") -> ArrayTable:
         if channels and any(x.message_encoding != "json" for x in channels):
             return bag(field, path, table)
         topics: dict[str, Topic] = {}
+        logged: dict[str, list[float]] = {}
         start = None
         for schema, channel, message in reader.iter_messages():
             topic = topics.setdefault(channel.topic, Topic(units=_schema_units(schema)))
             start = message.log_time if start is None else start
-            row = dict(_numbers(json.loads(message.data)))
-            own = next((x for x in ("t", "time", "timestamp") if x in row), None)
-            row = row if own else {"t": 1e-9 * (message.log_time - start), **row}
-            topic.rows.append(row)
+            topic.rows.append(dict(_numbers(json.loads(message.data))))
+            logged.setdefault(channel.topic, []).append(1e-9 * (message.log_time - start))
+    for name, topic in topics.items():
+        topic.rows = _clocked(topic.rows, logged[name])
     return _table(field, path, "MCAP", topics, table)
+
+
+def _clocked(rows: list[Row], logged: list[float]) -> list[Row]:
+    """Messages on a clock that each of them has; else on when they were logged."""
+    if any(all(clock in row for row in rows) for clock in ("t", "time", "timestamp")):
+        return rows
+    timed = zip(logged, rows, strict=True)
+    return [{"t": t} | {k: x for k, x in row.items() if k != "t"} for t, row in timed]
 
 
 def _schema_units(schema: Any) -> dict[str, str]:
@@ -78,15 +87,25 @@ def bag(field: str, path: Path, table: str = "") -> ArrayTable:
         from rosbags.typesys import Stores, get_typestore
 
     topics: dict[str, Topic] = {}
+    received: dict[str, list[float]] = {}
     with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
         start = reader.start_time
         for connection, stamp, raw in reader.messages():
             message = reader.deserialize(raw, connection.msgtype)
             row = dict(_numbers(message, start=start))
-            received = 1e-9 * (stamp - start)
-            row = {"t": received} | row if "stamp" not in row else row | {"received": received}
             topics.setdefault(connection.topic, Topic()).rows.append(row)
+            received.setdefault(connection.topic, []).append(1e-9 * (stamp - start))
+    for name, topic in topics.items():
+        topic.rows = _timed(topic.rows, received[name])
     return _table(field, path, "ROS", topics, table)
+
+
+def _timed(rows: list[Row], received: list[float]) -> list[Row]:
+    """Messages on their stamps; on when they were received where one has no stamp."""
+    timed = zip(received, rows, strict=True)
+    if all("stamp" in row for row in rows):
+        return [row | {"received": t} for t, row in timed]
+    return [{"t": t} | row for t, row in timed]
 
 
 def _numbers(x: Any, name: str = "", start: int = 0) -> Iterator[tuple[str, float]]:

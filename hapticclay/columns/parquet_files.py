@@ -54,13 +54,27 @@ def _values(column: Any) -> np.ndarray | None:
         or pa.types.is_fixed_size_list(column.type)
         or (pa.types.is_large_list(column.type))
     ):
-        chunks = [chunk.flatten() for chunk in column.chunks]
-        whole = np.concatenate([np.asarray(x) for x in chunks]) if chunks else np.zeros(0)
-        n = len(column)
-        lengths = {len(x) for x in column.to_pylist() if x is not None} if n else set()
-        return whole.reshape(n, -1) if len(lengths) == 1 and whole.dtype.kind in "biuf" else None
+        return _lists(column)
     values = column.to_numpy()
     return values if values.dtype.kind in "biufmM" else None
+
+
+def _lists(column: Any) -> np.ndarray | None:
+    """A column of lists of one length, (n, k); a row without a list is NaN."""
+    lists = column.to_pylist()
+    lengths = {len(x) for x in lists if x is not None}
+    if len(lengths) != 1:
+        return None
+    whole = np.concatenate([np.asarray(chunk.flatten()) for chunk in column.chunks])
+    if whole.dtype.kind not in "biuf":
+        return None
+    given = np.array([x is not None for x in lists])
+    rows = whole.reshape(-1, lengths.pop()) if len(whole) else np.zeros((given.sum(), 0))
+    if given.all():
+        return rows
+    out = np.full((len(lists), rows.shape[1]), np.nan)
+    out[given] = rows
+    return out
 
 
 def _feature_names(path: Path) -> dict[str, Sequence[str]]:

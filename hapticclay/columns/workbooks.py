@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,11 @@ def excel(field: str, path: Path, table: str = "") -> TextTable:
     with needing("an Excel log", "openpyxl", "logs"):
         from openpyxl import load_workbook
 
-    book = load_workbook(path, read_only=True, data_only=True)
-    names = [x.title for x in book.worksheets]
-    if table and table not in names:
-        raise ParameterError("table", table, f"must be one of {', '.join(names)}")
-    sheets = {name: _text(book[name]) for name in ([table] if table else names)}
+    with contextlib.closing(load_workbook(path, read_only=True, data_only=True)) as book:
+        names = [x.title for x in book.worksheets]
+        if table and table not in names:
+            raise ParameterError("table", table, f"must be one of {', '.join(names)}")
+        sheets = {name: _text(book[name]) for name in ([table] if table else names)}
     filled = {name: text for name, text in sheets.items() if text.strip()}
     if not filled:
         raise ParameterError(field, str(path), "must hold a table; it is empty")

@@ -167,7 +167,7 @@ def _column(name: str, given: Any) -> np.ndarray:
 
 def _check_bounds(base: Scenario, name: str, column: np.ndarray) -> None:
     """Refuses an unknown field, and a number out of bounds, with its row."""
-    (head, *rest), known = name.split("."), nodes_of(Scenario)
+    (head, *rest), known = str(name).split("."), nodes_of(Scenario)
     bounds = known[head].bounds_at(rest) if head in known else []
     if not bounds:
         with_fields(base, {name: float(column[0])})

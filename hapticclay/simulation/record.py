@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..display import html_table, one_line
-from ..errors import ParameterError
+from ..errors import ParameterError, array_of
 from ..fields import make_part, plain_data
 from ..files import DAMAGED, atomic, check_regular, parse_json, versions
 from ..model.clay import Clay
@@ -223,9 +223,16 @@ class Record:
 
         Returns:
             [N.s/m], shape (n, 2).
+
+        Raises:
+            ParameterError: force is no array of numbers of that shape.
         """
-        out = np.full(self.v.shape, np.nan)
-        return np.divide(force, self.v, out=out, where=np.abs(self.v) > 1e-12)
+        out, bound = np.full(self.v.shape, np.nan), f"must be numbers of shape {self.v.shape}"
+        numbers = array_of("force", force, bound)
+        try:
+            return np.divide(numbers, self.v, out=out, where=np.abs(self.v) > 1e-12)
+        except ValueError:
+            raise ParameterError("force", force, bound) from None
 
     def steady(self) -> np.ndarray:
         """Samples of steady speed, shape (n, 2): less than 1 % of change in 1 s, for 0.1 s."""

@@ -198,7 +198,9 @@ def named_columns(log: Log, given: Mapping[str, str], **meanings: str) -> dict[s
     for name in names.values():
         keys = [key for key in COLUMNS if names.get(key) == name]
         if len(keys) > 1:
-            raise ParameterError("columns", name, f"is {' and '.join(keys)}: give each its own")
+            raise ParameterError(
+                "columns", name, f"is {' and '.join(keys)}, which are different columns"
+            )
     return {key: names[key] for key in COLUMNS if key in names}
 
 

@@ -120,10 +120,13 @@ def leave_if_imported() -> None:
     """Ends a worker whose import of a script without main guard has reached a study.
 
     Left alone, Python would raise an error of many lines in each worker; instead the process that
-    started them gives the reason.
+    started them gives the reason. IPython's %run replaces `__main__` too, in the first process,
+    where `__mp_main__` is the `__main__` of before.
     """
     imported = sys.modules.get("__mp_main__")
-    if imported is not None and sys.modules.get("__main__") is not imported:
+    if getattr(imported, "__name__", "") != "__mp_main__":
+        return
+    if sys.modules.get("__main__") is not imported:
         raise SystemExit(UNGUARDED)
 
 

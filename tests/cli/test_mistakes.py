@@ -41,7 +41,10 @@ def folder(tmp_path, monkeypatch):
         ("lab", "lab needs source: one of wall, zwidth, delay, jnd, pair"),
         ("lab walls", "did you mean 'wall'?"),
         ("identify push.csv", "; give --columns t=time input=cmd output=pos"),
-        ("identify turn.csv", "'Pos (deg)': is input and output: give each its own; give --col"),
+        (
+            "identify turn.csv",
+            "'Pos (deg)': is input and output, which are different columns; give",
+        ),
         ("replay constant --recording push.csv", "must have a motion or a force: name its columns"),
         ("replay constant", "must be given: --recording FILE"),
         ("fit out/gone --axis x", "source = 'out/gone': must be a readable file"),

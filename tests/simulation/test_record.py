@@ -72,6 +72,12 @@ def test_record_can_be_read_without_pickle(run, tmp_path):
             assert b"|O" not in z.read(name)[:128]
 
 
+@pytest.mark.parametrize("force", ["much", [[1.0, 2.0]] * 3])
+def test_a_ratio_of_what_is_no_force_of_the_run_is_refused(force, run):
+    with pytest.raises(ParameterError, match="force = .*must be numbers of shape"):
+        run.ratio(force)
+
+
 @pytest.mark.parametrize("content", [b"", b"not a record", None])
 def test_load_refuses_what_is_no_record(content, tmp_path):
     file = tmp_path / "record.npz"

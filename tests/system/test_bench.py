@@ -506,8 +506,10 @@ def test_stiffness_sweep_tells_where_each_breaks_down(tmp_path, monkeypatch):
 def test_runs_of_an_arm_find_its_gain_limit_at_one_step_in_a_sample(tmp_path, monkeypatch):
     monkeypatch.setattr(arms, "OURS", (1,))
     monkeypatch.setattr(arm_integrators, "CASES", [("Euler", "mjINT_EULER", 1)])
-    monkeypatch.setattr(arms, "POSES", 2)
     monkeypatch.setattr(arms, "PEERS", ("no_such_peer",))
+    for name, less in (("POSES", 2), ("REPEATS", 1), ("TIMED", 100)):  # nobody reads the times
+        monkeypatch.setattr(arms, name, less)
+    monkeypatch.setattr(common, "warm", lambda: None)
     data = arms.main(tmp_path)
     ours, euler = data["rows"]
     # the bisection finds it to 0.07 %; the step is off by (omega Ts)^2/12, 0.2 % at 12 Hz

@@ -39,7 +39,7 @@ FEWER = {
     "studies/fit_law": {"t_max=8.0": "t_max=4.0"},
     "studies/identify": {"Noise())": "Noise(), realisations=3, lines=10)"},
     "studies/measured_columns": {"    t_max=30.996": "    dt=1e-3,\n    t_max=30.996"},
-    "studies/pair_log": {"arange(8000)": "arange(4000)", "[Ts / 20] * 20": "[Ts / 5] * 5"},
+    "studies/pair_log": {"arange(8000)": "arange(3000)", "[Ts / 20] * 20": "[Ts / 5] * 5"},
     "studies/stored_columns": {"0.5, 120)": "0.5, 30)", "0.7, 120)": "0.7, 30)"},
     "studies/sweep": {
         "1000:7log gain.y=0.1,0.2,0.4,0.8,1.6": "1000:2log gain.y=0.1,1.6",

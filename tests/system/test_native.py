@@ -2,7 +2,7 @@
 
 Where it lacks or is not to be trusted, runs are made by Python, one line on stderr says why and
 what helps, and the results are the same. Each test has a copy of the package, in a process of its
-own.
+own, which begins with NumPy and MuJoCo loaded.
 """
 
 import importlib.util
@@ -28,9 +28,20 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = Path(native.__file__).parents[1]
 SHORT = "hc.constant_cut(length=0.002, force=(5.0, 0.0), t_max=60.0)"  # over before it is long
 RUN = f"""
-import sys, zlib
+import os, sys, zlib
+import mujoco, numpy
+for line in sys.stdin:  # a process for each copy of the package, but on Windows: there for one
+    place, engine, *files = line.rstrip("\\n").split("\\t")
+    if not hasattr(os, "fork") or not (child := os.fork()):
+        break
+    os.waitpid(child, 0)
+    print(flush=True)
+else:
+    sys.exit()
+for i, file in enumerate(files, 1):
+    os.dup2(os.open(file, os.O_WRONLY), i)
+sys.path.insert(0, place)
 import hapticclay as hc
-engine = sys.argv[1]
 for _ in range(2):
     r = hc.simulate({SHORT}, engine=engine)
 from hapticclay.kernel import native
@@ -65,17 +76,29 @@ def place(tmp_path):
     return copy
 
 
-def run(place, engine="auto"):
-    """Lines of a run in a process of its own: of stdout and of stderr."""
-    env = os.environ | {"PYTHONPATH": str(place.parent), "PYTHONDONTWRITEBYTECODE": "1"}
-    done = subprocess.run(
-        [sys.executable, "-P", "-c", RUN, engine],
-        env=env,
-        text=True,
-        capture_output=True,
-        timeout=120,
-    )
-    return done.stdout.split(), done.stderr.splitlines()
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """Runs in a copy of the package, in a process of its own; words of stdout, lines of stderr."""
+    env = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+    env["PYTHONDONTWRITEBYTECODE"] = "1"
+    words, started = [sys.executable, "-P", "-c", RUN], []
+    files = [tmp_path_factory.mktemp("said") / name for name in ("out", "err")]
+
+    def in_a_process(place, engine="auto"):
+        if not started or started[-1].poll() is not None:
+            pipes = dict(stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+            started.append(subprocess.Popen(words, env=env, text=True, **pipes))
+        for file in files:
+            file.write_text("")
+        print(place.parent, engine, *files, sep="\t", file=started[-1].stdin, flush=True)
+        if not started[-1].stdout.readline():
+            started[-1].wait(timeout=120)
+        out, err = (file.read_text() for file in files)
+        return out.split(), err.splitlines()
+
+    yield in_a_process
+    for process in started:
+        process.communicate(timeout=120)
 
 
 def changed(place, what):
@@ -137,7 +160,7 @@ def changed(place, what):
         "other records",
     ],
 )
-def test_what_is_not_to_be_trusted_is_one_line_and_the_same_numbers(place, right, what):
+def test_what_is_not_to_be_trusted_is_one_line_and_the_same_numbers(run, place, right, what):
     if what == "two builds" and (place / f"native/kernel/loop{EXTENSION_SUFFIXES[0]}").exists():
         pytest.skip("this build has the first name that Python looks for")
     why = changed(place, what)
@@ -149,7 +172,7 @@ def test_what_is_not_to_be_trusted_is_one_line_and_the_same_numbers(place, right
 
 
 @built
-def test_a_native_run_without_the_kernel_is_refused_in_the_same_words(place):
+def test_a_native_run_without_the_kernel_is_refused_in_the_same_words(run, place):
     why = changed(place, "other sources")
     out, err = run(place, "native")
     assert not out and "ParameterError" in err[-1]
@@ -157,7 +180,7 @@ def test_a_native_run_without_the_kernel_is_refused_in_the_same_words(place):
 
 
 @built
-def test_a_whole_build_is_used_and_an_installation_is_not_written_to(place, right):
+def test_a_whole_build_is_used_and_an_installation_is_not_written_to(run, place, right):
     def files():
         return {x: x.lstat().st_mtime_ns for x in place.rglob("*")}
 
@@ -260,7 +283,7 @@ def check_contents(names):
     not Path(sysconfig.get_path("include"), "Python.h").is_file() or not shutil.which("cc"),
     reason="needs a C compiler and Python's headers",
 )
-def test_a_wheel_holds_the_kernel_for_this_python_and_later_ones(checkout, tmp_path, right):
+def test_a_wheel_holds_the_kernel_for_this_python_and_later_ones(run, checkout, tmp_path, right):
     if (ROOT / "build").is_dir():  # what `make` compiled
         shutil.copytree(ROOT / "build", checkout / "build")
     setup(checkout, "bdist_wheel")

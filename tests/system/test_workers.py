@@ -4,9 +4,12 @@ import os
 import shutil
 import subprocess
 import sys
+import types
 
 import pytest
 
+from hapticclay.errors import ParameterError
+from hapticclay.studies import Range, Sweep, run_sweep, store
 from tests.hunt import some
 
 STUDIES = {
@@ -91,6 +94,15 @@ def test_a_script_that_fails_when_it_is_imported_is_told_so(tmp_path):
     done = run_script(HEAD + fails + guarded(STUDIES["sweep"]), tmp_path)
     said = done.stderr.splitlines()[-1]
     assert done.returncode == 1 and "ended while they imported the script" in said
+
+
+def test_a_script_that_a_shell_runs_in_its_own_process_is_no_worker(tmp_path, monkeypatch):
+    """As %run of IPython: it replaces `__main__` after multiprocessing noted the first one."""
+    for name in ("__mp_main__", "__main__"):
+        monkeypatch.setitem(sys.modules, name, types.ModuleType("__main__"))
+    plan = Sweep("constant", {"b": Range(10.0, 90.0, 2)}, {"t_max": 0.01})
+    with store.claimed(plan, tmp_path), pytest.raises(ParameterError, match="is at work"):
+        run_sweep(plan, tmp_path, workers=1)
 
 
 @pytest.mark.untraced

@@ -106,9 +106,9 @@ def test_two_links_in_closed_form_are_filmed():
 
 @needs_gl
 def test_frames_move_with_the_pair(record):
-    options = FilmOptions(speed=0.02, size=(640, 480), plots=False)
+    options = FilmOptions(speed=0.05, size=(640, 480), plots=False)
     shots = [x.copy() for x in film.frames(record, options, 2)]
-    assert len(shots) == len(film.samples_shown(record, 0.02, 2))
+    assert len(shots) == len(film.samples_shown(record, 0.05, 2))
     assert all((a != b).any() for a, b in zip(shots, shots[1:], strict=False))
     blue = shots[-1].astype(int) @ [-1, 0, 1] > 60
     red = shots[-1].astype(int) @ [1, 0, -1] > 60
