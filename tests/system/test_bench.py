@@ -429,18 +429,28 @@ def test_a_page_is_stale_once_the_kernel_computes_something_else(tmp_path):
     package.mkdir(parents=True)
     file = package / "kick.py"
     file.write_text("def kick(v):\n    return 2.0 * v\n")
-    before = provenance.code_digest(tmp_path)
+    before = provenance.code_digest("hits", tmp_path)
     data = {"hits": {"made": {"code": before, "commit": "abc"}}, "parts": {}}
     assert provenance.stale(data, tmp_path) == {"parts": "unknown"}
     file.write_text('def kick(v):\n    """Twice."""\n    # as it was\n    return 2.0*v\n')
-    assert provenance.code_digest(tmp_path) == before
+    assert provenance.code_digest("hits", tmp_path) == before
     file.write_text("def kick(v):\n    return 2.5 * v\n")
     assert provenance.stale(data, tmp_path) == {"hits": "abc", "parts": "unknown"}
 
 
+def test_the_pages_of_arms_alone_are_stale_once_an_arm_is_read_otherwise(tmp_path):
+    file = tmp_path / "hapticclay" / "arms" / "loading.py"
+    file.parent.mkdir(parents=True)
+    file.write_text("def mass():\n    return 1.0\n")
+    made = {x: {"made": {"code": provenance.code_digest(x, tmp_path)}} for x in pages.PARTS}
+    assert provenance.stale(made, tmp_path) == {}
+    file.write_text("def mass():\n    return 2.0\n")
+    assert set(provenance.stale(made, tmp_path)) == {"arms", "pairs"}
+
+
 def test_the_check_names_what_is_missing_or_older_than_the_code(tmp_path, capsys):
     for name in pages.PARTS:
-        common.note(tmp_path, name, {"made": provenance.Stopwatch().stamp()})
+        common.note(tmp_path, name, {"made": provenance.Stopwatch(name).stamp()})
     assert bench.check(tmp_path) == 0
     common.note(tmp_path, "hits", {"made": {"code": "0", "commit": "abc"}})
     (tmp_path / "parts.json").unlink()
