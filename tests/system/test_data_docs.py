@@ -4,6 +4,7 @@ import json
 import re
 import shlex
 import socket
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -71,7 +72,11 @@ def test_commands_run(line, tmp_path, monkeypatch, capsys):
         assert app.main(["view", *words[1:], "--help"]) == 0
         return
     if words[0] in ("info", "export"):
-        hc.simulate(hc.constant_cut(t_max=0.1)).save("out/run/constant")
+        for folder in ("out/run/constant", "push"):
+            hc.simulate(hc.constant_cut(t_max=0.1)).save(folder)
+    if words[0] == "run":
+        (file,) = re.findall(r"scenario `push.toml`:\n\n((?:    .*\n)+)", PAGE)
+        Path("push.toml").write_text(textwrap.dedent(file))
     if words[0] == "fit":
         hc.simulate(hc.constant_cut(), every=20).export("cut.csv")
     if words[0] == "identify":
