@@ -181,8 +181,8 @@ def loop_verdicts(loop: PushedLoop, delay: float = 0.0, flow: Flow | None = None
         found = stability_margins.small_gain(linear, equation=n)
         answers.append(_answer(f"small gain, Eq. {n}", found, "right over left side"))
     found = loop_passivity.passivity(linear)
-    answers.append(_answer("passive: stable with every passive hand", found, "least Re Z [N.s/m]"))
-    held = "held clay passive" + " with the hand's damper" * bool(loop.operator)
+    answers.append(_answer("stable with every passive hand", found, "least Re Z [N.s/m]"))
+    held = "held clay passive" + ", hand's damper" * bool(loop.operator)
     for late in (0.0, delay) if delay else (0.0,):
         question = f"... {1e3 * late:g} ms late" if late else held
         found = loop_passivity.clay_passivity(loop.b, loop.Ts or TS, loop.hand.damper, delay=late)

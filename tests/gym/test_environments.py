@@ -255,10 +255,12 @@ def test_copies_and_pickles_go_on_as_the_original(id):
     actions = some_actions(env, 4)
     env.step(actions[0])
     found = []
-    for e in (pickle.loads(pickle.dumps(env)), copy.deepcopy(env), env):
+    copies = pickle.loads(pickle.dumps(env)), copy.deepcopy(env)
+    drawn = copies if id == CUT else copies[:1]
+    for e in (*copies, env):
         rows = [e.step(action)[0] for action in actions[1:]] + [e.reset()[0]]
         found.append(np.array(rows).tobytes())
-        if e is not env:
+        if e in drawn:
             assert e.render().std() > 0.0
         e.close()
     assert found[0] == found[1] == found[2]

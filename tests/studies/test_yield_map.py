@@ -127,6 +127,7 @@ def test_coulomb_clay_has_a_map_too(monkeypatch):
     monkeypatch.setattr(study, "YIELD_FORCES", (1.0, 10.0))
     monkeypatch.setattr(study, "GAINS", (0.5, 2.0))
     monkeypatch.setattr(study, "classify_push", lambda loop, flow: ("sticks", math.nan))
+    monkeypatch.setattr(study, "critical_push", lambda loop, flow: 1.0)
     chart = study.yield_map(replace(Y, b=0.0), quick=True)
     assert chart.limit == math.inf and 0.5 < chart.least < 0.65
     assert all(math.isfinite(x) for x in chart.speed)

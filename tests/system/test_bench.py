@@ -372,7 +372,13 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
     monkeypatch.setattr(arm_integrators, "CASES", ())
     monkeypatch.setattr(arm_integrators, "HALVINGS", 1)
     monkeypatch.setattr(arm_integrators, "SECONDS", 1.0)
-    for name, less in (("PEERS", ()), ("OURS", (1,)), ("POSES_QUICK", 2), ("REPEATS", 1)):
+    for name, less in (
+        ("PEERS", ()),
+        ("OURS", (1,)),
+        ("POSES_QUICK", 2),
+        ("REPEATS", 1),
+        ("TIMED", 99),
+    ):
         monkeypatch.setattr(arms, name, less)
     monkeypatch.setattr(pairs, "CASES", [])
     monkeypatch.setattr(pairs, "own_limit", lambda exact, *a: exact)  # tests of pairs run them

@@ -17,7 +17,7 @@ from hapticclay.arms.mechanism import Linear
 from hapticclay.theory.joint_families import Circle, Family
 from hapticclay.theory.joint_gains import Study, delay_crossing, joint_loop
 from hapticclay.theory.wall_limits import stiffness_band
-from tests.hunt import examples
+from tests.hunt import examples, some
 from tests.oracles import joints
 
 CARDS = Path(__file__).parents[2] / "mjcf" / "arms"
@@ -202,7 +202,10 @@ def around(kind, share):
     ) / h
 
 
-@pytest.mark.parametrize("column, kind", [(0, "armature"), (1, "damping"), (2, "delay")])
+COLUMNS = [(0, "armature"), (1, "damping"), (2, "delay")]
+
+
+@pytest.mark.parametrize("column, kind", some(COLUMNS, 2))  # of walls, all
 def test_sensitivities_are_slopes_of_limits(column, kind):
     """Differences of whole limits, of second order: a tenth of the step, a hundredth of the error.
 
@@ -230,7 +233,7 @@ def wall_at(delay=2e-3, **numbers):
     return hc.theory.wall_limit(leader(**numbers), "x", 5.0, hand, 2e-3, delay)
 
 
-@pytest.mark.parametrize("column, kind", [(0, "armature"), (1, "damping"), (2, "delay")])
+@pytest.mark.parametrize("column, kind", COLUMNS)
 def test_sensitivities_of_a_wall(column, kind):
     """As above, to 1e-4 at a step of 1e-3."""
     found, (values, weights) = wall_at(), around(kind, 1e-3)
