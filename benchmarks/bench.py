@@ -43,7 +43,7 @@ def measure(out: Path, quick: bool, anew: bool) -> None:
     with tqdm(total=len(due), unit="part", disable=None, leave=False) as bar:
         for name in due:
             bar.set_description(name.replace("_", " "))
-            watch = provenance.Stopwatch()
+            watch = provenance.Stopwatch(name)
             found = pages.PARTS[name].main(out, quick)
             common.note(out, name, {**found, "quick": quick, "made": watch.stamp()})
             bar.update()

@@ -293,7 +293,7 @@ def main(argv: Sequence[str] | None = None) -> dict[str, Any]:
     options = parser.parse_args(argv)
     pythons = {"before": options.before, "now": options.now}
     wheels = dict(zip(pythons, options.wheels or (), strict=False))
-    watch = provenance.Stopwatch()
+    watch = provenance.Stopwatch("first_results")
     found = measure(pythons, wheels, options.limit, lambda text: print(text, flush=True))
     data = common.write(options.out, "first_results", {**found, "made": watch.stamp()})
     with files.atomic(options.out / "first_results.md") as f:

@@ -174,7 +174,7 @@ def main(argv: list[str] | None = None) -> dict[str, Any]:
     parser.add_argument("--ids", nargs="*", default=list(registry.IDS))
     a = parser.parse_args(argv)
     rows, clock = [], time.process_time if a.processor else time.perf_counter
-    watch = provenance.Stopwatch()
+    watch = provenance.Stopwatch("gym_speed")
     for id in a.ids:
         row = measured(id, a.engine, a.rounds, a.seconds, a.copies, clock)
         rows.append(row)

@@ -1,8 +1,9 @@
 """Which code a page's figures were measured on, and whether that code is still the one that ships.
 
 Figures of run time and error depend on how a run advances and on what a scene is, so a page is
-stale once `formulas`, `model`, `arms`, `kernel`, runs of `simulation` or a model in `mjcf/` compute
-something else. Comments, docstrings and layout of Python files compute nothing and do not count.
+stale once `formulas`, `model`, `kernel`, runs of `simulation` or a model in `mjcf/` compute
+something else; so are those about arms from files once `arms` does, which no other runs.
+Comments, docstrings and layout of Python files compute nothing and do not count.
 """
 
 from __future__ import annotations
@@ -17,25 +18,29 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
-ROOMS = "formulas/*", "kernel/*", "model/*", "arms/*"
+ROOMS = "formulas/*", "kernel/*", "model/*"
 RUNS = "many", "monitor", "one_run", "run", "vectored"  # of simulation
 FILES = (*(f"{room}.{kind}" for room in ROOMS for kind in ("py", "pxd", "pyx")),
          *(f"simulation/{name}.py" for name in RUNS))  # fmt: skip
-MEASURED = (*(f"hapticclay/{file}" for file in FILES), "mjcf/*", "mjcf/arms/*")
+MEASURED = *(f"hapticclay/{file}" for file in FILES), "mjcf/*"
+ARMS = "hapticclay/arms/*.py", "mjcf/arms/*"
+ABOUT_ARMS = "arms", "pairs", "first_results"  # parts that read arms from files
 UNKNOWN = "unknown"  # commit of a copy without history
 
 
-def code_digest(root: Path = ROOT) -> str:
-    """Digest of the code that the figures depend on.
+def code_digest(part: str, root: Path = ROOT) -> str:
+    """Digest of the code that a part's figures depend on.
 
     Args:
+        part: name of the part.
         root: of a checkout.
 
     Returns:
         16 hexadecimal digits.
     """
     digest = hashlib.sha256()
-    for file in sorted(f for pattern in MEASURED for f in root.glob(pattern) if f.is_file()):
+    patterns = MEASURED + ARMS * (part in ABOUT_ARMS)
+    for file in sorted(f for pattern in patterns for f in root.glob(pattern) if f.is_file()):
         digest.update(str(file.relative_to(root)).encode())
         digest.update(_meaning(file.read_bytes()) if file.suffix == ".py" else file.read_bytes())
     return digest.hexdigest()[:16]
@@ -83,10 +88,14 @@ def commit(root: Path = ROOT) -> str:
 class Stopwatch:
     """Notes commit, code, date, duration and load of a measurement that begins now."""
 
-    def __init__(self) -> None:
-        """Starts the clock."""
+    def __init__(self, part: str):
+        """Starts the clock.
+
+        Args:
+            part: name of what is measured.
+        """
         self._begin, self._load = time.monotonic(), os.getloadavg()[0]
-        self._commit, self._code = commit(), code_digest()
+        self._commit, self._code = commit(), code_digest(part)
 
     def stamp(self) -> dict[str, Any]:
         """What a file of figures says of its making, at the end of the measurement.
@@ -114,6 +123,9 @@ def stale(data: dict[str, dict[str, Any]], root: Path = ROOT) -> dict[str, str]:
     Returns:
         Name of each such part and the commit that it was measured on.
     """
-    now = code_digest(root)
-    old = {name: x for name, x in data.items() if x.get("made", {}).get("code") != now}
+    old = {
+        name: x
+        for name, x in data.items()
+        if x.get("made", {}).get("code") != code_digest(name, root)
+    }
     return {name: x.get("made", {}).get("commit", UNKNOWN) for name, x in old.items()}

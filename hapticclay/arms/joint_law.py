@@ -131,7 +131,8 @@ def checked_law(law: JointPD, names: Sequence[str]) -> JointPD:
     Raises:
         ParameterError: it has gains for more or fewer joints.
     """
-    if len(law) != len(names):
-        bound = f"must have {len(names)} numbers, one for each joint ({', '.join(names)})"
+    if len(law) != (n := len(names)):
+        many = "1 number, for the" if n == 1 else f"{n} numbers, one for each"
+        bound = f"must have {many} joint ({', '.join(names)})"
         raise ParameterError("Kp", law.Kp, bound)
     return law

@@ -65,7 +65,7 @@ def load(arm: Any) -> Loaded:
     names = tuple(model.joint(j).name for j in joints)
     dofs = [int(model.jnt_dofadr[j]) for j in joints]
     fields: dict[str, Any] = {
-        "file": _plain(arm.file),
+        "file": _kept(arm.file),
         "joints": names,
         "site": None if site is None else _name(model, site),
     }
@@ -76,6 +76,7 @@ def load(arm: Any) -> Loaded:
         fields[field] = tuple(values[dofs].tolist())
     limits = _file_limits(model, joints)
     given = _per_joint(model, "torque_limit", arm.torque_limit, joints, limits)
+    _refuse_no_torque(names, given)
     fields["torque_limit"] = tuple(given)
     mechanism = Mechanism(model, dofs, site, pose)
     _check_mechanism(mechanism, names)
@@ -125,9 +126,11 @@ def spec_of(file: Any) -> tuple[Any, str]:
     return spec, spec.modelname if spec.modelname != UNNAMED else path.stem
 
 
-def _plain(file: Any) -> Any:
-    """A path as text, which files can hold."""
-    return os.fspath(file) if isinstance(file, os.PathLike) else file
+def _kept(file: Any) -> Any:
+    """A path as text, which files can hold; of a spec, which its owner may change, a copy."""
+    if isinstance(file, os.PathLike):
+        return os.fspath(file)
+    return file if isinstance(file, str) else file.copy()
 
 
 def _path(file: Any) -> Path:
@@ -137,12 +140,21 @@ def _path(file: Any) -> Path:
     if not isinstance(file, str | os.PathLike):
         raise ParameterError("file", file, "must be an MJCF or URDF file, or an mujoco.MjSpec")
     path = Path(file)
-    if isinstance(file, str) and not path.suffix and os.sep not in file:  # one of the package's
+    is_name = isinstance(file, str) and not path.suffix and os.sep not in file
+    if is_name and not path.is_dir():  # one of the package's
         own = {x.stem: x for x in sorted((mjcf_folder() / "arms").glob("*.xml"))}
         path = own[choice("file", file, tuple(own))]
     if not os.path.isfile(path):
-        raise ParameterError("file", str(path), "must be an MJCF or URDF file (there is none)")
+        bound = f"must be an MJCF or URDF file ({_lacks(path)})"
+        raise ParameterError("file", one_line(path, 200), bound)
     return path
+
+
+def _lacks(path: Path) -> str:
+    """Why a path is no file."""
+    if str(path).lstrip().startswith("<"):
+        return "this is a model's text: give mujoco.MjSpec.from_string of it"
+    return "this is a folder" if path.is_dir() else "there is none"
 
 
 def _bad_file(file: Any, why: str) -> ParameterError:
@@ -310,9 +322,18 @@ def _pose(model: Any, given: Any, joints: list[int]) -> np.ndarray:
 
 
 def _file_limits(model: Any, joints: list[int]) -> np.ndarray:
-    """Largest torque of each joint that the file allows, infinite for none."""
-    least = np.abs(model.jnt_actfrcrange[joints]).min(axis=1)
-    return np.where(model.jnt_actfrclimited[joints] > 0, least, math.inf)
+    """Largest torque of each joint to both sides that the file allows, infinite for none."""
+    low, high = model.jnt_actfrcrange[joints].T
+    limited = model.jnt_actfrclimited[joints] > 0
+    return np.where(limited, np.maximum(np.minimum(-low, high), 0.0), math.inf)
+
+
+def _refuse_no_torque(names: Sequence[str], limits: Sequence[float]) -> None:
+    """A motor pushes to both sides: a file's range (0, 5) leaves it nothing to one of them."""
+    for name, limit in zip(names, limits, strict=True):
+        if not limit > 0.0:
+            bound = "must be > 0; the range of a file (actfrcrange) counts to both sides of 0"
+            raise ParameterError(f"torque_limit[{name}]", limit, bound)
 
 
 def _ranges(model: Any, joints: list[int]) -> np.ndarray:

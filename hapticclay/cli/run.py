@@ -33,7 +33,7 @@ FORMATS = {
 }
 MISSING = {  # speeds, and why a stretch has none
     "steady v": "the speed did not settle on that stretch",
-    "expected v": "has no formula with a hand, a varying force or clay that changes on the way",
+    "expected v": "there is no formula with a hand, a varying force or varying clay",
 }
 LEAST_ENERGY = 1e-24  # [J] 1 kg at 1 pm/s has less
 CHOSEN = "is chosen by --error: leave it out"

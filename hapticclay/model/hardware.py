@@ -19,7 +19,8 @@ STIFF = 1e12  # [N/m, N.s/m] upper bound of a coupling
 class Coupling:
     """A virtual coupling: spring and damper between the handle and a massless tool in the clay.
 
-    Colgate, Stanley, Brown, Issues in the haptic display of tool use, IROS 1995.
+    Colgate, Stanley, Brown, Issues in the haptic display of tool use, IROS 1995. A bare handle of
+    mass m is stable in clay of any stiffness if and only if spring Ts/2 < damper < 2 m/Ts.
 
     Attributes:
         spring: stiffness [N/m], > 0, at most 1e12.

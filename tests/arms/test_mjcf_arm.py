@@ -1,6 +1,8 @@
 """Arms from files: their mechanics against other derivations, and what is refused."""
 
+import dataclasses
 import math
+import pickle
 import re
 from pathlib import Path
 
@@ -194,6 +196,11 @@ REFUSED = {
         )
         for name in ("armature", "damping", "frictionloss")
     },
+    "torque to one side": (
+        xml(BODY.format(SITE).replace("<joint", '<joint actuatorfrcrange="0 5"')),
+        {},
+        r"torque_limit\[j\] = 0.0: must be > 0; the range of a file",
+    ),
     "a unit of another kind": (xml(BODY.format(SITE)), {"damping": ["1 m"]}, "m"),
     "no joint": (
         xml('<body><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>' + SITE + "</body>"),
@@ -213,6 +220,36 @@ def test_refused_in_one_line(case, tmp_path):
     with pytest.raises(hc.ParameterError, match=told) as error:
         hc.MjcfArm(file if text.startswith("<") else tmp_path / text, **given)
     assert "\n" not in str(error.value)
+
+
+def test_a_torque_limit_takes_the_place_of_the_file_s(tmp_path):
+    file = tmp_path / "arm.xml"
+    file.write_text(xml(BODY.format(SITE).replace("<joint", '<joint actuatorfrcrange="-3 5"')))
+    assert hc.MjcfArm(file).torque_limit == (3.0,)
+    file.write_text(xml(BODY.format(SITE).replace("<joint", '<joint actuatorfrcrange="1 5"')))
+    assert hc.MjcfArm(file, torque_limit=[2.0]).torque_limit == (2.0,)
+
+
+def test_what_is_no_file_is_told_what_it_is(tmp_path):
+    with pytest.raises(hc.ParameterError, match="this is a folder"):
+        hc.MjcfArm(tmp_path)
+    with pytest.raises(hc.ParameterError, match="text: give mujoco.MjSpec.from_string") as error:
+        hc.MjcfArm(xml(BODY.format(SITE)) + 50 * "<!-- -->\n")
+    assert "\n" not in str(error.value) and len(str(error.value)) < 400
+    arm = hc.MjcfArm(mujoco.MjSpec.from_string(xml(BODY.format(""))))
+    with pytest.raises(hc.ParameterError, match=r"1 number, for the joint \(j\)"):
+        hc.theory.joint_limits(arm, hc.JointPD([1.0, 2.0], [0.0, 0.0]), 1e-3)
+
+
+def test_a_spec_may_be_changed_by_its_owner():
+    """Copies, stored arms and pairs of drives read the spec again."""
+    spec = mujoco.MjSpec.from_string(xml(BODY.format(SITE)))
+    arm = hc.MjcfArm(spec, armature=[0.1])
+    before = arm.mass_matrix()
+    spec.bodies[-1].mass = 30.0
+    assert arm.mass_matrix() == before
+    assert dataclasses.replace(arm).mass_matrix() == before
+    assert pickle.loads(pickle.dumps(arm)).mass_matrix() == before
 
 
 def test_an_open_chain_held_in_itself_is_refused(tmp_path):

@@ -65,7 +65,7 @@ SPLIT = tuple(sorted({*EDGES, *np.linspace(0.001, 0.199, 40)}))
 def test_a_grid_of_layers_is_the_layers_bit_for_bit(name):
     """Finer cells, alike, change nothing either: no step ends between them."""
     layers = hc.Clay(hc.Profile(EDGES, VALUES), hc.Profile((0.001,), (10.0, 90.0), "y"))
-    free = hc.free(force=(1.0, 0.3), t_max=0.45)
+    free = hc.free(force=(1.5, 0.45), t_max=0.3)
     s = dataclasses.replace(free, clay=layers, **METHODS[name])
     grid = hc.Clay(hc.Grid(EDGES, (), [[b] for b in VALUES]), hc.Grid((), (0.001,), [[10.0, 90.0]]))
     at = np.searchsorted(EDGES, (-1.0, *SPLIT), side="right")

@@ -69,7 +69,7 @@ def variants(method, clay, common, **changes):
 
 def signals(method, clay, among=SIGNALS, **common):
     """Driven by each signal, both ways."""
-    dt = {} if "Ts" in common else dict(dt=2e-3)
+    dt = {} if "Ts" in common else dict(dt=4e-3)
     common = dict(force=(0.0, 0.0), t_max=0.66) | dt | common
     return {
         name: run(method, clay, muscle=2.0 * signal, command=1e-4 * signal, **common)
@@ -271,7 +271,7 @@ KINDS = {
     ),
     "held: all hardware, signals": signals(  # which samples take from what steps do
         "held", GROWS, some(SIGNALS, 6), inertia_shaping=True, operator=HAND, hardware=ALL,
-        dt=2.88e-3, Ts=2.88e-3,
+        dt=5.76e-3, Ts=5.76e-3,
     )
     | variants(
         "held", GROWS,

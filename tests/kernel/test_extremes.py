@@ -13,7 +13,7 @@ from benchmarks import extremes, pages, reference
 from hapticclay.model.cells import Profile
 from hapticclay.model.clay import Clay
 from hapticclay.model.signals import Multisine
-from tests.oracles import piecewise_linear, store
+from tests.oracles import piecewise_linear, shaken, store
 
 CASES = extremes.cases()
 LISTED = (
@@ -47,10 +47,10 @@ def tolerance(case):
 
 
 def stored(case, s, times):
-    """The reference solution of a case, from the disk; a signal's phases are not in the case."""
-    if s.muscle or s.command:
-        return reference.solve(s, times)
+    """The reference solution of a case, from the disk."""
     name = re.sub(r"\W+", "-", f"{case.group} {case.name}")
+    if s.muscle:
+        return store.solution(f"extremes-{name}", shaken.solve, *shaken.case(s, times))
     return store.solution(f"extremes-{name}", reference.solve, s, times)
 
 
@@ -141,7 +141,7 @@ def test_reference_crosses_borders_both_ways():
         hc.free(force=(0.0, 0.0), t_max=2.0), clay=clay, muscle=muscle, length=None
     )
     t = np.linspace(0.0, 1.99, 2000)
-    x = reference.solve(s, t)
+    x = store.solution("extremes-both-ways", shaken.solve, *shaken.case(s, t))
     ways = [
         float(np.interp(u + 1e-3, t, x.p[:, 0]) - np.interp(u - 1e-3, t, x.p[:, 0]))
         for *_, u in x.crossings[1:-1]

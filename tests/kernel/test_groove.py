@@ -145,7 +145,7 @@ def test_the_removed_volume_is_that_of_the_oracle(seed):
     """Of a random path that crosses itself."""
     rng = np.random.default_rng(seed)
     stops = np.concatenate((np.zeros((1, 2)), rng.uniform(-0.02, 0.02, (5, 2))))
-    r = hc.simulate(led(BLOCK, stops.tolist(), speed=0.2))
+    r = hc.simulate(led(BLOCK, stops.tolist(), speed=0.4))
     exact = raster(EVERYWHERE, r.p, WIDTH, DEPTH)
     assert r.extra["removed"][-1] == pytest.approx(exact, rel=3e-3)
     assert (np.diff(r.extra["removed"]) >= 0.0).all()

@@ -13,7 +13,7 @@ from scipy.optimize import lsq_linear
 import hapticclay as hc
 from hapticclay.formulas import arm as arm_law
 from hapticclay.kernel import engine, joint_friction, joints, records
-from tests.oracles.joint_motion import Motion
+from tests.oracles import joint_motion, store
 
 HAND = hc.Operator(0.3, 2.0, 6.0)
 WALL = hc.Profile((0.006,), (0.0, 5.0), springs=(hc.Spring(), hc.Spring(k=800.0)))
@@ -133,8 +133,12 @@ def test_a_step_is_of_second_order(name, delay):
     aim = arm.q + np.random.default_rng(1).uniform(-away, away, n)
     law = hc.JointPD(Kp, [0.02 * x for x in Kp], velocity="difference", reference=tuple(aim))
     force = (2.0, 1.0, 0.5)[: len(arm.axes)]
-    motion = Motion(card, arm.names, arm.axes, arm.pose, (0.0, 2.0, 6.0), force)
-    exact = motion.run((law.Kp, law.Kd, aim), Ts, samples, delay)
+    of_motion = arm.names, arm.axes, arm.pose, (0.0, 2.0, 6.0), force
+    of_run = (law.Kp, law.Kd, aim), Ts, samples, delay
+    exact = store.solution(
+        f"joints-{name}-{delay}", joint_motion.positions, card, of_motion, of_run,
+        joint_motion.text_of(card),
+    ).q  # fmt: skip
     errors = []
     for ratio in (2, 4, 8):
         s = scene(

@@ -4,6 +4,7 @@ The engine gives inertia, bias and Jacobians of all coordinates; SciPy integrate
 """
 
 from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -11,6 +12,22 @@ from scipy.integrate import solve_ivp
 
 CARDS = Path(__file__).parents[2] / "mjcf" / "arms"
 TURN = 1e-6  # of the constraints' rows, by central differences: 1e-12 and rounding of 1e-10
+
+
+class Positions(NamedTuple):
+    """Of the joints at the samples."""
+
+    q: np.ndarray
+
+
+def positions(card, of_motion, of_run, _text):
+    """As `Motion(card, *of_motion).run(*of_run)`; of a text that `store` tells apart."""
+    return Positions(Motion(card, *of_motion).run(*of_run))
+
+
+def text_of(card):
+    """The model of an arm of the package."""
+    return (CARDS / f"{card}.xml").read_text()
 
 
 class Motion:

@@ -3,10 +3,10 @@
 import numpy as np
 from scipy.integrate import solve_ivp
 
-TOLERANCES = dict(method="DOP853", rtol=1e-10, atol=1e-13, max_step=1e-3)
+TOLERANCES = dict(method="DOP853", rtol=1e-10, atol=1e-13)
 
 
-def motion(A, B, Fy, z, t_max):
+def motion(A, B, Fy, z, t_max, step=1e-3):
     """Moves z' = A z + B u, u = -Fy v/|v|, v = z[1], exactly at rest while |u| <= Fy can hold it.
 
     Args:
@@ -15,6 +15,7 @@ def motion(A, B, Fy, z, t_max):
         Fy: [N].
         z: state at the start, shape (n,); v != 0.
         t_max: [s].
+        step: largest one [s], of which there are some in each half swing.
 
     Returns:
         (t, z) of all steps, the time at which it stuck for good or inf.
@@ -27,7 +28,7 @@ def motion(A, B, Fy, z, t_max):
     def until(rate, event):
         nonlocal t, z
         event.terminal = True
-        run = solve_ivp(rate, (t, t_max), z, events=event, **TOLERANCES)
+        run = solve_ivp(rate, (t, t_max), z, events=event, max_step=step, **TOLERANCES)
         ts.append(run.t)
         zs.append(run.y.T)
         t, z = run.t[-1], run.y[:, -1]

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.errors import ParameterError
+from hapticclay.simulation import run
 from tests.hunt import examples
 from tests.oracles import Linear, nonlinear, piecewise_linear, store
 
@@ -327,9 +328,10 @@ def test_speed_is_a_small_multiple_of_the_bare_engine():
 
 
 @pytest.mark.parametrize("engine", ["python", "auto"])
-def test_runs_within_and_beside_a_run_leave_it_as_it_is(engine):
+def test_runs_within_and_beside_a_run_leave_it_as_it_is(engine, monkeypatch):
     """Runs share engines one after the other, never at the same time."""
-    s = hc.constant_cut(t_max=1.5)  # one look at its progress
+    monkeypatch.setattr(run, "CHUNK", 512)  # rows between two looks
+    s = hc.constant_cut(t_max=0.3, start=(0.045, 0.0))  # one look at its progress
     alone = hc.simulate(s, engine=engine)
     inner = []
 

@@ -372,7 +372,13 @@ def test_command_writes_one_page_figures_and_data_and_renews_the_readme(
     monkeypatch.setattr(arm_integrators, "CASES", ())
     monkeypatch.setattr(arm_integrators, "HALVINGS", 1)
     monkeypatch.setattr(arm_integrators, "SECONDS", 1.0)
-    for name, less in (("PEERS", ()), ("OURS", (1,)), ("POSES_QUICK", 2), ("REPEATS", 1)):
+    for name, less in (
+        ("PEERS", ()),
+        ("OURS", (1,)),
+        ("POSES_QUICK", 2),
+        ("REPEATS", 1),
+        ("TIMED", 99),
+    ):
         monkeypatch.setattr(arms, name, less)
     monkeypatch.setattr(pairs, "CASES", [])
     monkeypatch.setattr(pairs, "own_limit", lambda exact, *a: exact)  # tests of pairs run them
@@ -429,18 +435,28 @@ def test_a_page_is_stale_once_the_kernel_computes_something_else(tmp_path):
     package.mkdir(parents=True)
     file = package / "kick.py"
     file.write_text("def kick(v):\n    return 2.0 * v\n")
-    before = provenance.code_digest(tmp_path)
+    before = provenance.code_digest("hits", tmp_path)
     data = {"hits": {"made": {"code": before, "commit": "abc"}}, "parts": {}}
     assert provenance.stale(data, tmp_path) == {"parts": "unknown"}
     file.write_text('def kick(v):\n    """Twice."""\n    # as it was\n    return 2.0*v\n')
-    assert provenance.code_digest(tmp_path) == before
+    assert provenance.code_digest("hits", tmp_path) == before
     file.write_text("def kick(v):\n    return 2.5 * v\n")
     assert provenance.stale(data, tmp_path) == {"hits": "abc", "parts": "unknown"}
 
 
+def test_the_pages_of_arms_alone_are_stale_once_an_arm_is_read_otherwise(tmp_path):
+    file = tmp_path / "hapticclay" / "arms" / "loading.py"
+    file.parent.mkdir(parents=True)
+    file.write_text("def mass():\n    return 1.0\n")
+    made = {x: {"made": {"code": provenance.code_digest(x, tmp_path)}} for x in pages.PARTS}
+    assert provenance.stale(made, tmp_path) == {}
+    file.write_text("def mass():\n    return 2.0\n")
+    assert set(provenance.stale(made, tmp_path)) == {"arms", "pairs"}
+
+
 def test_the_check_names_what_is_missing_or_older_than_the_code(tmp_path, capsys):
     for name in pages.PARTS:
-        common.note(tmp_path, name, {"made": provenance.Stopwatch().stamp()})
+        common.note(tmp_path, name, {"made": provenance.Stopwatch(name).stamp()})
     assert bench.check(tmp_path) == 0
     common.note(tmp_path, "hits", {"made": {"code": "0", "commit": "abc"}})
     (tmp_path / "parts.json").unlink()

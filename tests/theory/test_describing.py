@@ -190,7 +190,7 @@ def test_a_push_ends_in_the_exact_limit_cycle(hand):
     A, B = relay(loop, flow)
     start = np.zeros(len(A))
     start[1] = cycle.speed
-    t, z, stuck = sticking.motion(A, B, flow.Fy, start, 5.0)
+    t, z, stuck = sticking.motion(A, B, flow.Fy, start, 2.5)
     period, v, amplitude = last_period(t, z)
     assert stuck == math.inf
     # interpolation between steps of the oracle, of some 1/20 of a period
@@ -209,22 +209,18 @@ def test_the_exact_threshold_parts_sticking_from_buzzing():
     assert not threshold.stable and threshold.stuck > 0.0 and cycle.stable and cycle.stuck == 0.0
     A, B = relay(Y, flow)
 
-    def pushed(v):
+    def pushed(v, step=3e-3):
         start = np.zeros(len(A))
         start[1] = v
-        return sticking.motion(A, B, flow.Fy, start, 1.2)
+        return sticking.motion(A, B, flow.Fy, start, 1.2, step)
 
     low, high = 3.9e-3, 4.0e-3
-    on_edge = pushed(high)
-    assert math.isfinite(pushed(low)[2]) and on_edge[2] == math.inf
+    assert math.isfinite(pushed(low)[2]) and pushed(high)[2] == math.inf
     for _ in range(11):
         middle = math.sqrt(low * high)
-        found = pushed(middle)
-        if math.isfinite(found[2]):
-            low = middle
-        else:
-            high, on_edge = middle, found
-    t, z, _ = on_edge
+        low, high = (middle, high) if math.isfinite(pushed(middle)[2]) else (low, middle)
+    t, z, stuck = pushed(high, 1e-3)
+    assert stuck == math.inf
     # The motion on the edge is drawn to the threshold before it leaves: there it is read, from
     # one passage of half the speed to the next.
     v, level = z[:, 1], 0.5 * threshold.speed
@@ -278,7 +274,7 @@ def test_a_push_in_a_power_law_ends_in_the_predicted_cycle(flow):
 
     start = np.zeros(len(A))
     start[1] = cycle.speed
-    run = solve_ivp(rate, (0.0, 8.0), start, method="LSODA", rtol=1e-8, atol=1e-11, max_step=2e-3)
+    run = solve_ivp(rate, (0.0, 5.0), start, method="LSODA", rtol=1e-8, atol=1e-11, max_step=2e-3)
     period, v, _ = last_period(run.t, run.y.T)
     fundamental = 2.0 * np.abs(np.fft.rfft(v))[1] / len(v)
     assert cycle.trusted

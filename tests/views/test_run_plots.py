@@ -53,7 +53,9 @@ def test_any_record_can_be_drawn(scenario, tmp_path):
     for draw in (run_plots.velocity_plot, run_plots.force_ratio_plot):
         draw(record, "x").savefig(tmp_path / "p.png")
         assert (tmp_path / "p.png").stat().st_size > 5000
-        draw(record, "y").draw_without_rendering()
+        other = draw(record, "y")
+        other.set_layout_engine("none")  # the same room as that of x
+        other.draw_without_rendering()
 
 
 LONG = dict(operator=hc.Operator(), inertia_shaping=True, gain=(1.234, 0.5678), t_max=3.0,
