@@ -63,13 +63,13 @@ def versions() -> dict[str, str]:
 
 def writable(folder: Path) -> None:
     """Checks that a folder can be made and written, before any work is done."""
-    made = [p for p in (folder, *folder.parents) if not p.exists()]
+    made = [p for p in (folder, *folder.parents) if not os.path.lexists(p)]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        why = "it is a file" if folder.is_file() else error.strerror
+        why = "it is a file" if os.path.isfile(folder) else error.strerror
         raise ParameterError("out", str(folder), f"must be a writable folder ({why})") from None
     finally:
         for p in made:

@@ -141,7 +141,7 @@ def _path(file: Any) -> Path:
         raise ParameterError("file", file, "must be an MJCF or URDF file, or an mujoco.MjSpec")
     path = Path(file)
     is_name = isinstance(file, str) and not path.suffix and os.sep not in file
-    if is_name and not path.is_dir():  # one of the package's
+    if is_name and not os.path.isdir(path):  # one of the package's
         own = {x.stem: x for x in sorted((mjcf_folder() / "arms").glob("*.xml"))}
         path = own[choice("file", file, tuple(own))]
     if not os.path.isfile(path):
@@ -154,7 +154,7 @@ def _lacks(path: Path) -> str:
     """Why a path is no file."""
     if str(path).lstrip().startswith("<"):
         return "this is a model's text: give mujoco.MjSpec.from_string of it"
-    return "this is a folder" if path.is_dir() else "there is none"
+    return "this is a folder" if os.path.isdir(path) else "there is none"
 
 
 def _bad_file(file: Any, why: str) -> ParameterError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import os
 import sys
 import threading
 import time
@@ -242,7 +243,7 @@ class DeviceCommand:
 
         if self.source is None:
             raise ParameterError("source", "", "give the folder that a session wrote")
-        if not (self.source.is_file() or (self.source / FILE).is_file()):
+        if not (os.path.isfile(self.source) or os.path.isfile(self.source / FILE)):
             bound = f"must be the folder of a session that a program took part in (no {FILE} there)"
             raise ParameterError("source", str(self.source), bound)
         exchanges = Exchanges.load(self.source)

@@ -68,7 +68,7 @@ class FitCommand:
             words = self.columns if name == "columns" else getattr(self.log, name)
             if recorded and words:
                 raise ParameterError(name, words, "is for a log: leave it out")
-        if self.axis and not recorded and self.source.exists():
+        if self.axis and not recorded and os.path.exists(self.source):
             raise ParameterError("axis", self.axis, "is for a record: leave it out")
         fitted = fit_flow(
             self.source if recorded else self._measured(),

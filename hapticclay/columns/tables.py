@@ -113,7 +113,7 @@ def open_table(field: str, path: Path, table: str = "") -> Table:
 def _reader_of(path: Path) -> str | None:
     """The reader of a binary format; None for text."""
     if os.path.isdir(path):
-        if (path / "metadata.yaml").is_file():
+        if os.path.isfile(path / "metadata.yaml"):
             return "bags:bag"
         raise Unfit("it is a folder, not a log")
     check_regular(path)

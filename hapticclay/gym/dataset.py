@@ -155,7 +155,7 @@ def _target(name: Any) -> Path:
         bound = "must be letters, digits, - and _, with a version: as hapticclay/cut-line/pd-v0"
         raise ParameterError("name", name, bound)
     target = _folder() / name
-    if target.exists():
+    if os.path.exists(target):
         remedy = f"take another name or version, or say minari delete {name}"
         raise ParameterError("name", name, f"must be new: {target} is there; {remedy}")
     return target
@@ -235,7 +235,7 @@ def _move(beside: Path, folder: Path, name: str) -> None:
     for description in sorted(beside.rglob("namespace_metadata.json")):
         place = folder / description.relative_to(beside)
         place.parent.mkdir(parents=True, exist_ok=True)
-        if not place.exists():
+        if not os.path.exists(place):
             os.replace(description, place)
     try:
         os.rename(beside / name, folder / name)

@@ -74,7 +74,7 @@ def file_data(path: str | os.PathLike[str], name: str = "scenario") -> dict[str,
 
 def beside(name: str, folder: Path) -> str:
     """A file beside one that names it; else the name as it is, which may be one of the package."""
-    if not (folder / name).is_file():
+    if not os.path.isfile(folder / name):
         return name
     plain = os.path.normpath(folder / name)  # without a/.., unless a is a link
     return plain if os.path.isfile(plain) else str(folder / name)
@@ -83,7 +83,9 @@ def beside(name: str, folder: Path) -> str:
 def _from_folder(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Data whose arm has a relative path, which then holds from the folder of the file."""
     arm = data.get("arm")
-    name = arm.get("file") if isinstance(arm, Mapping) else None
+    if not isinstance(arm, Mapping):
+        return dict(data)
+    name = arm.get("file")
     if not isinstance(name, str) or os.path.isabs(name) or not os.path.isfile(name):
         return dict(data)
     with contextlib.suppress(ValueError):  # on another drive

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..display import html_table, one_line
-from ..errors import ParameterError, array_of
+from ..errors import ParameterError, array_of, choice
 from ..fields import make_part, plain_data
 from ..files import DAMAGED, atomic, check_regular, parse_json, versions
 from ..model.clay import Clay
@@ -247,7 +247,7 @@ class Record:
         return count[high] == count[low]
 
     @checked
-    def stretches(self, axis: Literal["x", "y"] | None = None) -> list[np.ndarray]:
+    def stretches(self, axis: str | None = None) -> list[np.ndarray]:
         """Indices of the samples, split wherever the handle entered different clay.
 
         Args:
@@ -255,7 +255,12 @@ class Record:
 
         Returns:
             Arrays of indices, in order.
+
+        Raises:
+            ParameterError: the clay has no such axis.
         """
+        if axis is not None:
+            choice("axis", axis, AXES)
         s = self.scenario
         if s.clay and not s.clay.seen_in_b:
             along = "".join(getattr(s.clay, a).along for a in ([axis] if axis else AXES))
@@ -267,7 +272,7 @@ class Record:
         return np.split(np.arange(len(self.t)), change)
 
     @checked
-    def regions(self, axis: Literal["x", "y"] | None = None) -> list[dict[str, Any]]:
+    def regions(self, axis: str | None = None) -> list[dict[str, Any]]:
         """Means over each of the `stretches`, in order of time.
 
         Each axis has fe/v against b over the stretch (mean and deviation). At steady speed it also
@@ -280,13 +285,17 @@ class Record:
 
         Returns:
             One dictionary per stretch.
+
+        Raises:
+            ParameterError: the clay has no such axis.
         """
+        pieces = self.stretches(axis)
         if not len(self.t):
             return []
         steady, fe_v, fh_v = self.steady(), self.ratio(self.fe), self.ratio(self.fh)
         still, clay = self.held(), self.scenario.clay
         out = []
-        for piece in self.stretches(axis):
+        for piece in pieces:
             entry: dict[str, Any] = {
                 "from_s": float(self.t[piece[0]]),
                 "to_s": float(self.t[piece[-1]]),
@@ -438,9 +447,9 @@ class Record:
         file = file / "record.npz" if os.path.isdir(file) else file
         try:
             check_regular(file)
-            if os.path.isdir(path) and not file.exists():
+            if os.path.isdir(path) and not os.path.exists(file):
                 raise ValueError(f"{file.name} is not in this folder")
-            if file.is_file() and not zipfile.is_zipfile(file):
+            if os.path.isfile(file) and not zipfile.is_zipfile(file):
                 raise ValueError("give its folder, or its record.npz; this is another file")
             with open(file, "rb") as f, np.load(f, allow_pickle=False) as z:
                 check_headers(z.zip)

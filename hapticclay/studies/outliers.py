@@ -158,7 +158,7 @@ def _first_repeat(x: np.ndarray, i: int) -> int:
 def _stand_out(x: np.ndarray, first: np.ndarray, gap: int) -> np.ndarray:
     """Whether gaps of a length have ends far from a curve that both sides follow, (n, 2)."""
     far, zero = np.zeros((len(first), 2), dtype=bool), x[first, None]
-    ends = x[first[:, None] + [0, gap - 1]] - zero
+    ends = x[first[:, None] + np.array([0, gap - 1])] - zero
     for side in SIDES:
         left, right = np.minimum(side, first), np.minimum(side, len(x) - gap - first)
         for sides in set(zip(left.tolist(), right.tolist(), strict=True)):
