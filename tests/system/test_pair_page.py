@@ -66,6 +66,7 @@ def test_sliders_restart_the_pair_with_a_later_link(file):
     playwright = pytest.importorskip("playwright.sync_api", reason="pip install playwright")
     troubles = []
     with shown(hc.Pair.load(file)) as page, playwright.sync_playwright() as p:
+        page.session.paused = True  # Chromium has the processor until the sliders are there
         browser = p.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         tab = browser.new_page(viewport={"width": 720, "height": 400})
         tab.set_default_timeout(150_000)
