@@ -1,6 +1,7 @@
 """Files that are opened: damaged, endless, deep or huge, they are refused in one line, in time."""
 
 import contextlib
+import gc
 import json
 import os
 import random
@@ -206,6 +207,16 @@ def deep_inline(kind, depth):
     return f"a = {tables}\n" if kind == "toml" else '{"a":[' * depth + "1" + "]}" * depth
 
 
+@pytest.fixture
+def no_collection():
+    """What other tests leave is not finalized at the bottom of a recursion, where that fails."""
+    gc.collect()
+    gc.disable()
+    yield
+    gc.enable()
+
+
+@pytest.mark.usefixtures("no_collection")
 @pytest.mark.parametrize("depth", [101, 5000, 200_000])
 @pytest.mark.parametrize("text", [deep_tables, deep_lists, deep_inline])
 @pytest.mark.parametrize(
