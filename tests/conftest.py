@@ -55,6 +55,12 @@ TOGETHER = {  # files that share a dear fixture, or the processor's time for a s
 }
 # folders with long files have the first turns, lest one be the last
 LONG = ("system", "views", "live", "kernel", "studies")
+# these wait for a browser, a window or child processes for much of their time: one at a time, while
+# the other workers compute
+WAITS = tuple(
+    f"system/test_{name}.py"
+    for name in ("page", "window", "pair_page", "sweep_faults", "native", "workers", "notebooks")
+)
 
 
 def pytest_xdist_auto_num_workers():
@@ -79,17 +85,34 @@ def pytest_collection(session):
             importlib.import_module(name)
 
 
-def folder_turn(item):
-    """When the tests of a folder have their turn."""
-    name = item.path.relative_to(HERE).parts[0]
+def file_of(item):
+    """The file of a test, from this folder."""
+    return item.path.relative_to(HERE).as_posix()
+
+
+def folder_turn(file):
+    """When the files of a folder have their turn."""
+    name = file.partition("/")[0]
     return LONG.index(name) if name in LONG else len(LONG)
+
+
+def turns(files):
+    """Files in the order of their turns: behind each that waits, two that compute."""
+    files = sorted(dict.fromkeys(files), key=folder_turn)
+    waits, rest = [x for x in files if x in WAITS], [x for x in files if x not in WAITS]
+    out = []
+    while waits or rest:
+        out += waits[:1] + rest[:2]
+        del waits[:1], rest[:2]
+    return {x: i for i, x in enumerate(out)}
 
 
 @pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(items):
-    items.sort(key=folder_turn)
+    turn = turns(map(file_of, items))
+    items.sort(key=lambda item: turn[file_of(item)])
     for item in items:
-        file = item.path.relative_to(HERE).as_posix()
+        file = file_of(item)
         group = TOGETHER.get(file, file)
         item.add_marker(pytest.mark.xdist_group(group))
         # xdist 3.8 appends the group to `_nodeid`, which pytest 9.2 no longer has
