@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import number
 from ..kernel import path
-from ..model.operator import NO_HAND, Operator
+from ..model.operator import Operator
 from ..model.signals import Multisine
 from ..scene.scenario import Scenario
 from ..simulation import monitor
@@ -70,7 +70,7 @@ class LiveRun(Run):
 
     def __init__(self, scenario: Scenario, every: int):
         super().__init__(scenario, every, engine_for("auto"))
-        x, y = (th or NO_HAND for th in scenario.operators)
+        x, y = scenario.hands
         self.pull = Pull((x.spring, y.spring), scenario.start)
         # a person moves it: growing motion is no instability while the gain is below its limit
         self.watch = monitor.StabilityMonitor(replace(scenario, muscle=Multisine()))

@@ -16,7 +16,6 @@ import numpy as np
 
 from ..arguments import checked
 from ..errors import Bound, ParameterError
-from ..model.operator import NO_HAND
 from ..scene.scenario import Scenario
 from ..simulation import monitor
 from ..simulation.record import Record
@@ -226,8 +225,7 @@ class Session:
             return
         p, v = self.handle()
         b = self.b
-        hands = [th or NO_HAND for th in self.scenario.operators]
-        spring, damper = np.array([(th.spring, th.damper) for th in hands]).T
+        spring, damper = np.array([(th.spring, th.damper) for th in self.scenario.hands]).T
         hand = self.run.pull.mean(self.t, 0.0) - spring * np.array(p) - damper * np.array(v)
         fe = b[0] * v[0], b[1] * v[1]
         if self.run.records_force and self.run.last is not None:  # at the last sample

@@ -70,8 +70,7 @@ class Handle:
         if not low < math.hypot(x, y) < high:
             raise ParameterError("place", place, "must lie within the reach of the arm")
         inertia = np.linalg.inv(linear_loop.mobility_at(scenario.planar_arm, x, y))
-        hands = [astuple(hand or NO_HAND) for hand in scenario.operators]
-        mass, damping, stiffness = np.array(hands).T
+        mass, damping, stiffness = np.array([astuple(hand) for hand in scenario.hands]).T
         return cls(inertia + np.diag(mass), damping, stiffness, np.array(normal) / size)
 
     def loop(self, K: float, B: float, Ts: float, delay: float) -> JointLoop:

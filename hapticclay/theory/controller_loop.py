@@ -21,7 +21,6 @@ from ..formulas.constants import B_MAX
 from ..model import support
 from ..model.controller import matrix_exponential
 from ..model.hardware import Hardware, butterworth
-from ..model.operator import NO_HAND
 from ..model.sampled_controller import BUFFER, TORQUE, Controller, LawCaller
 from ..model.traits import LEFT_OUT, present
 from ..results import Result
@@ -266,7 +265,7 @@ class Rest:
     """
 
     def __init__(self, scenario: Scenario, controller: Controller | None, near: Rest | None = None):
-        self.scenario, self.hands = scenario, [x or NO_HAND for x in scenario.operators]
+        self.scenario, self.hands = scenario, scenario.hands
         x, y = (a + c for a, c in zip(scenario.origin, scenario.start, strict=True))
         q1, q2 = arm_law.inverse_kinematics(x, y, scenario.arm.links)
         at = np.array([q1, q2])

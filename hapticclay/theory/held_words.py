@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from ..model.clay import Clay
 from ..model.operator import Operator
 from ..scene.link import ENDS
+from ..scene.pair_hardware import FELT
 
 if TYPE_CHECKING:
     from ..scene.contact import Contact
@@ -25,7 +26,7 @@ def hand_words(operator: Operator | None) -> str:
 def pair_words(pair: Pair) -> str:
     """What holds both arms of a pair, and what they touch."""
     if all(x is None for x in (*pair.operators, *pair.touched)):
-        felt = pair.link.kind in ("position-force", "four-channel")
+        felt = pair.link.kind in FELT
         more = ", so forces that are sent close no loop" if felt else ""
         return f"{FREE}: no hand, and nothing is touched{more}"
     return "; ".join(

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..model.constants import AXES
-from ..model.operator import NO_HAND, Operator
+from ..model.operator import Operator
 from ..scene.scenario import Scenario
 from . import linear_loop, roots
 from .gain_limits import continuous_limit
@@ -244,7 +244,6 @@ def _environment(s: Scenario, b: tuple[float, float]) -> list[list[Polynomial]]:
     angle = s.clay.angle if s.clay else 0.0
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     damping = turn @ np.diag(b) @ turn.T
-    hands = [th or NO_HAND for th in s.operators]
     return [
         [
             Polynomial([th.spring, th.damper + damping[i, i], th.mass])
@@ -252,5 +251,5 @@ def _environment(s: Scenario, b: tuple[float, float]) -> list[list[Polynomial]]:
             else Polynomial([0.0, damping[0, 1]])
             for j in (0, 1)
         ]
-        for i, th in enumerate(hands)
+        for i, th in enumerate(s.hands)
     ]
