@@ -257,8 +257,8 @@ def slowed(B, qx, qy, k, Fy, K, n):
     """
     xx, xy, yx, yy = k * B[0], k * B[1], k * B[2], k * B[3]
     most = math.sqrt(qx * qx + qy * qy)
-    if most == 0.0:
-        return 0.0, 0.0
+    if most == 0.0 or Fy == K == 0.0:
+        return qx, qy
     det = xx * yy - xy * yx
     if Fy > 0.0:
         x, y = yy * qx - xy * qy, xx * qy - yx * qx
@@ -286,13 +286,11 @@ def slowed(B, qx, qy, k, Fy, K, n):
         gx, gy = (e * px - b * py) / det, (a * py - c * px) / det
         # 1/long - 1 is nearly linear in s
         step = (long - 1.0) * long * long / (x * gx + y * gy) if long > 0.0 else 0.0
-        new = s + step
-        if not low < new < high:
-            new = 0.5 * (low + high)
-        if abs(new - s) <= CLOSE * s:
-            s = new
+        if abs(step) > CLOSE * s and not low < s + step < high:
+            step = 0.5 * (low + high) - s
+        s += step
+        if abs(step) <= CLOSE * s:
             break
-        s = new
     f = moving_force(Fy, K, n, s)
     a, b, c, e = s + f * xx, f * xy, f * yx, s + f * yy
     det = a * e - b * c

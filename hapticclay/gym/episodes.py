@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..kernel.engine import warnings_caught
+from ..kernel.scene import takes_gain
 from ..simulation.simulation_batch import SimulationBatch
 from ..simulation.stepwise import COLUMNS, Alone, Simulation, make_steps
 from .columns import Value, clipped, columns_of, observed, replaced, value_of
@@ -32,22 +33,26 @@ class Period(NamedTuple):
 class One:
     """The run of a copy, in numbers: three times as fast as columns with one value each.
 
-    Its scenario keeps the force that it began with: to make one anew takes a period 5 us.
+    Its scenario keeps the force and the gain that it began with: to make one anew takes a period
+    5 us.
     """
 
     def __init__(self, scenarios: Sequence[Any], engine: str):
         self.run = Simulation(scenarios[0], engine=engine, recorded=False, monitored=False)
+        self.gain = scenarios[0].gain
 
     def reset(self, which: Sequence[int], scenarios: Sequence[Any]) -> None:
         self.run.reset(scenarios[0])
+        self.gain = scenarios[0].gain
 
     def advance(self, n: int, command: Command, live: Any) -> None:
         """Makes n steps under a command."""
         with Alone(self.run) as run:
             if run.outcome is not None:
                 return
-            if command.gain is not None and command.gain != run.scenario.gain:
-                run.change_gain(command.gain)
+            if command.gain is not None and command.gain != self.gain:
+                self.gain = command.gain
+                run.put_gain(self.gain) if takes_gain(run.row.m) else run.change_gain(self.gain)
             run.push_evenly((0.0, *command.force, 0.0, 0.0))
             make_steps(run, n)
 

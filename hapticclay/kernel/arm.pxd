@@ -1,7 +1,7 @@
 from .records cimport Instant, Kick, Model, Point, State
 from ..formulas cimport cmath as math
 from ..formulas cimport arm as law
-from . cimport joints
+from . cimport dynamics, joints
 
 cdef (double, double) place(Model m, double q1, double q2) noexcept nogil
 cdef (double, double) here(Model m, State s) noexcept nogil

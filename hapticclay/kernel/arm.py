@@ -3,7 +3,7 @@
 import math
 
 from ..formulas import arm as law
-from . import joints
+from . import dynamics, joints
 
 
 def place(m, q1, q2):
@@ -86,7 +86,7 @@ def step_engine(m, s, k, h, even):
         ctrl[2], ctrl[3] = b0, b1
     applied[0], applied[1], timestep[0] = push1, push2, h
     w[0], w[1] = s.w[0], s.w[1]  # after a hit: the velocity after half a kick
-    e.step(e.model, e.data)
+    dynamics.step(e)
     s.q[0], s.q[1], s.w[0], s.w[1] = q[0], q[1], w[0], w[1]
 
 
@@ -105,9 +105,7 @@ def accelerations(m, z, now):
     e = m.engine
     q, w, M, bias = e.q, e.w, e.M, e.forces
     q[0], q[1], w[0], w[1] = z.q1, z.q2, z.w1, z.w2
-    e.kinematics(e.model, e.data)
-    e.com_pos(e.model, e.data)
-    e.inertia(e.model, e.data)
+    dynamics.put_inertia(e)
     e.com_vel(e.model, e.data)
     e.bias(e.model, e.data, 0, e.forces)
     n1, n2 = now.tau1 + now.push1 - bias[0], now.tau2 + now.push2 - bias[1]

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import ctypes
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ..physics import mujoco
 from ..scene.scenario import Scenario
-from . import joint_scene
+from . import joint_scene, mover
 from .mover import Mover, address, addresses_of
 
-CALLS = {
-    "factor": "mj_factorM",
+CALLS = mover.CALLS | {
+    "inertia": "mj_makeM",
     "full": "mj_fullM",
     "move": "mj_step2",
     "jacobian_rate": "mj_jacDot",
@@ -24,6 +24,8 @@ JACOBIANS = {"site": "mj_jacSite", "body": "mj_jacBody"}
 
 class JointMover(Mover):
     """An arm of the engine: models and data for the pose of a run, and for poses that are tried."""
+
+    calls: ClassVar = CALLS
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)
@@ -57,7 +59,6 @@ class JointMover(Mover):
     def fill_plain(self, made: Any) -> None:
         super().fill_plain(made)
         model = self.model
-        made.factor, made.move = mujoco.mj_factorM, mujoco.mj_step2
         made.scratch, made.site, made.body = self.scratch, self.site, self.body
         made.freedoms = model.nv
         made.pivots = memoryview(self.pivots)  # pyright: ignore[reportArgumentType]
@@ -81,8 +82,6 @@ class JointMover(Mover):
 
     def fill_row(self, made: Any) -> None:
         super().fill_row(made)
-        for name, function in CALLS.items():
-            made[name] = address(function)
         made["jacobian"] = address(JACOBIANS[self.kind])
         made["scratch"] = addresses_of(self.model, self.scratch)[1]
         made["site"], made["body"], made["freedoms"] = self.site, self.body, self.model.nv

@@ -1,7 +1,7 @@
 cimport cython
 from .records cimport Kick, Model, State
 from ..formulas cimport cmath as math
-from . cimport hand
+from . cimport dynamics, hand
 
 cdef void sense(Model m, State s) noexcept nogil
 cdef void gather(Model m, double *J, double *A) noexcept nogil

@@ -7,7 +7,7 @@ of another mobility (docs/equations.md).
 
 import math
 
-from . import hand
+from . import dynamics, hand
 
 
 def sense(m, s):
@@ -23,9 +23,7 @@ def sense(m, s):
         return
     for i in range(n):
         e.q[m.dof[i]] = s.q[i]
-    e.kinematics(e.model, e.data)
-    e.com_pos(e.model, e.data)
-    e.inertia(e.model, e.data)
+    dynamics.put_inertia(e)
     e.factor(e.model, e.data)
     e.full(e.model, e.data, e.M)
     e.jacobian(e.model, e.data, e.J, e.none, e.site)

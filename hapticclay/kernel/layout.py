@@ -27,13 +27,6 @@ class Kind:
     def __getitem__(self, n: int) -> Kind:
         return Kind(self.of, n)
 
-    def start(self) -> Any:
-        """Value of a new record in CPython."""
-        if self.is_record:
-            return [self.of() for _ in range(self.n)] if self.n else self.of()
-        one = None if self.is_place else NUMBERS[self.of][0]
-        return [one] * self.n if self.n else one
-
 
 real, whole = Kind("double"), Kind("long long")
 floats, wholes, thing = Kind("double *"), Kind("long long *"), Kind("void *")
@@ -52,16 +45,8 @@ def record(declaration: type) -> Any:
     own = declaration.__annotations__.items()
     fields = {**getattr(declaration, "kinds", {})}
     fields |= {name: x if isinstance(x, Kind) else Kind(x) for name, x in own}
-    axes = axes_of(fields)
-
-    def __init__(self):
-        for name, kind in fields.items():
-            setattr(self, name, kind.start())
-        for i, name in enumerate(axes):
-            setattr(self, name, self.axis[i])
-
-    slots = [*fields, *axes]
-    body = {"__slots__": slots, "__init__": __init__, "__doc__": declaration.__doc__}
+    slots = [*fields, *axes_of(fields)]
+    body = {"__slots__": slots, "__init__": starter_of(fields), "__doc__": declaration.__doc__}
     made: Any = type(declaration.__name__, (), body)
     made.__module__ = declaration.__module__
     made.kinds, made.copy = fields, staticmethod(copier_of(fields))
@@ -72,6 +57,22 @@ def record(declaration: type) -> Any:
 def axes_of(fields: dict[str, Kind]) -> str:
     """Names of the records of a field `axis`, a letter each."""
     return "xyz"[: fields["axis"].n] if "axis" in fields else ""
+
+
+def starter_of(fields: dict[str, Kind]) -> Any:
+    """A function that starts a record of CPython, field by field, without a loop."""
+    lines, names = ["def start(self):"], {}
+    for name, kind in fields.items():
+        if kind.is_record:
+            names[f"_{name}"] = kind.of
+            one = f"_{name}()"
+        else:
+            one = "None" if kind.is_place else repr(NUMBERS[kind.of][0])
+        value = f"[{', '.join([one] * kind.n)}]" if kind.n else one
+        lines.append(f"    self.{name} = {value}")
+    lines += [f"    self.{axis} = self.axis[{i}]" for i, axis in enumerate(axes_of(fields))]
+    exec("\n".join(lines), names)
+    return names["start"]
 
 
 def copier_of(fields: dict[str, Kind], with_places: bool = True) -> Any:

@@ -73,7 +73,9 @@ def begin(s, after, on_grid):
 
 
 def take(m, s, after, target):
-    """Takes the step tried: the state becomes that after it."""
+    """Takes the step tried: the state becomes that after it. A look ahead ends with its row."""
+    if s.looks > 0 and s.row >= s.looks:
+        return
     methods.take(m, s, after)
     s.steps += 1
     if m.hits:
@@ -306,7 +308,8 @@ def peek(m, s, spare):
     memory.copied(spare, s)
     for j in range(m.spans):
         memory.copied_row(m.span[j].kept, m.span[j].at, m.span[j].size)
-    advance(m, s, s.row + 1)
+    s.looks = s.row + 1
+    advance(m, s, s.looks)
     memory.copied(s, spare)
     for j in range(m.spans):
         memory.copied_row(m.span[j].at, m.span[j].kept, m.span[j].size)

@@ -45,12 +45,17 @@ TYPES = """\
 class Engine:
     """The physics engine that moves the arm: its functions, and the numbers that it shares."""
 
-    step: engine_step  # mj_step
-    kinematics: engine_step  # mj_kinematics, and what else gives inertia and bias
+    kinematics: engine_step  # mj_kinematics, and what else a step consists of
     com_pos: engine_step
     inertia: engine_step
+    factor: engine_step
+    transmission: engine_step
     com_vel: engine_step
-    bias: engine_bias  # mj_rne
+    bias: engine_bias
+    at_velocity: engine_step
+    actuation: engine_step
+    acceleration: engine_step
+    integrate: engine_step
     model: thing
     data: thing
     q: floats
@@ -63,7 +68,6 @@ class Engine:
     forces: floats  # of bias
     out: floats  # of the force of a user's law
     # of an arm on the engine's terms
-    factor: engine_step  # mj_factorM
     full: engine_full  # mj_fullM
     move: engine_step  # mj_step2
     jacobian: engine_jac  # mj_jacSite or mj_jacBody
@@ -594,6 +598,7 @@ class State:
     form_work: real[64]
     code: whole
     closing: whole  # why the next row is the last, OPEN where it is not
+    looks: whole  # rows with which a look ahead ends, 0 for none
     checked_steps: whole  # with event detection, since the last sample
     returns: whole  # to a region, since then
     seen: whole[4]  # regions since then: least and most index along x, then y

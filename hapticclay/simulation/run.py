@@ -372,8 +372,12 @@ class Run:
             self.change(changed)
             return
         self.scenario = self.watch.scenario = changed
-        for a, K in zip(self.row.m.axis[:2], gain, strict=True):
-            a.K = float(K)
+        self.put_gain(gain)
+
+    def put_gain(self, gain: tuple[float, float]) -> None:
+        """Continues with other numbers K, where they are all that a gain changes."""
+        axis = self.row.m.axis
+        axis[0].K, axis[1].K = gain
         self._ahead = None
 
     def push_steadily(self) -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.formulas import arm
 from hapticclay.kernel import arm as arms
-from hapticclay.kernel import engine, path, records
+from hapticclay.kernel import dynamics, engine, mover, path, records
 from hapticclay.model.signals import Multisine
 from hapticclay.views import stage
 from tests.oracles.links import Links
@@ -146,6 +146,43 @@ def test_scene_to_open_by_hand_compiles_and_steps_without_warning():
             mujoco.mj_step(model, data)
     assert caught == []
     assert model.ngeom > 0 and model.opt.timestep == 0.00036
+
+
+ANGLES, RATES, TORQUES = (st.tuples(*[st.floats(-x, x)] * 2) for x in (7.0, 50.0, 40.0))
+
+
+@given(
+    st.sampled_from([0.0, 0.4, None]), st.tuples(*[st.floats(0.02, 3.0)] * 2), ANGLES, RATES,
+    TORQUES, TORQUES, st.tuples(*[st.floats(0.0, 1e6)] * 2), st.floats(1e-5, 1e-2),
+)  # fmt: skip
+def test_pieces_of_a_step_give_the_bits_of_the_engines_own(angle, lengths, q, w, tau, push, b, dt):
+    clay = None if angle is None else dataclasses.replace(hc.slab(1.0), angle=angle)
+    mine = hc.Arm(l1=lengths[0], l2=lengths[1])
+    scenario = dataclasses.replace(
+        hc.free(), arm=mine, origin=lengths, clay=clay, start=(0, 0), length=None
+    )
+    moved = mover.Mover(scenario)
+    whole = mujoco.MjData(moved.model)
+    moved.model.opt.timestep = dt
+    for data in (whole, moved.data):
+        data.qpos[:], data.qvel[:], data.qfrc_applied[:], data.ctrl[:2] = q, w, push, tau
+        data.ctrl[2:] = b[: moved.model.nu - 2]
+    for _ in range(3):
+        mujoco.mj_step(moved.model, whole)
+        dynamics.step(moved.plain)
+        assert whole.qpos.tobytes() == moved.data.qpos.tobytes()
+        assert whole.qvel.tobytes() == moved.data.qvel.tobytes()
+
+
+def test_an_engine_that_steps_otherwise_than_by_its_pieces_is_refused(monkeypatch):
+    def other(model, data, step=mujoco.mj_step):
+        step(model, data)
+        data.qvel[1] = np.nextafter(data.qvel[1], 1.0)
+
+    mover.check_pieces(hc.build(hc.free()))
+    monkeypatch.setattr(mujoco, "mj_step", other)
+    with pytest.raises(RuntimeError, match=r"mujoco 4\..*install mujoco 4\.0"):
+        mover.check_pieces(hc.build(hc.free()))
 
 
 def diverge():

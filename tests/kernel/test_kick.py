@@ -209,14 +209,14 @@ def test_steps_that_glide_are_those_with_a_look_at_their_end(name, monkeypatch):
 def test_recorded_clay_force_is_what_changed_the_engines_momentum(name, monkeypatch):
     """M dqd/dt - tau - J' fh, from the engine's own state, is -J' fe."""
     states = []
-    step = mujoco.mj_step
+    step = mujoco.mj_implicit  # the last piece of a step
 
     def spy(model, data):
         before = (data.qpos.copy(), data.qvel.copy(), data.ctrl[:2].copy())
         step(model, data)
         states.append((*before, data.qvel.copy(), model.opt.timestep))
 
-    monkeypatch.setattr(mujoco, "mj_step", spy)
+    monkeypatch.setattr(mujoco, "mj_implicit", spy)
     monkeypatch.setattr(runs, "_idle", [])  # engines that call the plain one
     s = dataclasses.replace(CASES[name], t_max=0.7)
     r = hc.simulate(s, engine="python")
