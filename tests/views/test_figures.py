@@ -452,6 +452,7 @@ def test_figures_drawn_again_are_cases():
 
 
 @pytest.mark.parametrize("name, style", PRINTED)
+@pytest.mark.layout
 def test_text_can_be_read_in_print(name, style, monkeypatch):
     """No text is clipped, smaller than 6 pt, or over a legend or a title."""
     figure, found = texts(lambda: hc.Figure(CASES[name]).draw(style), monkeypatch)
@@ -477,10 +478,12 @@ SHOWN = [(n, "screen") for n in some(LABELLED, 2)] + [("narrow family", "print")
 
 
 @pytest.mark.parametrize("name, style", SHOWN)
+@pytest.mark.layout
 def test_each_axis_has_two_numbers(name, style):
     assert_two_numbers(hc.Figure(LABELLED[name]).draw(style))
 
 
+@pytest.mark.layout
 def test_names_of_regions_lie_beside_the_axis():
     figure = narrow_family()
     FigureCanvasAgg(figure).draw()
@@ -490,6 +493,7 @@ def test_names_of_regions_lie_beside_the_axis():
         assert text.get_window_extent().x0 >= ax.bbox.x0
 
 
+@pytest.mark.layout
 def test_walls_that_are_compared_lie_apart():
     """Also where their devices' regions would be shown on linear axes."""
     soft, stiff = (hc.VirtualWall(K, B) for K, B in ((300.0, 1.0), (900.0, 4.0)))
