@@ -569,7 +569,8 @@ def test_the_longest_delay_in_runs_is_that_of_theory(monkeypatch):
 
 def test_first_results_are_of_two_interpreters(tmp_path, monkeypatch):
     """Both are the one that runs this."""
-    monkeypatch.setattr(first_results, "FIRST", {"nothing": "pass", "too long": "import time; time.sleep(99)"})
+    long = "import time; time.sleep(99)"
+    monkeypatch.setattr(first_results, "FIRST", {"nothing": "pass", "too long": long})
     monkeypatch.setattr(first_results, "SCENES", {"gone": "no_such_name", "new": "pass"})
     monkeypatch.setattr(first_results, "NEW", ("new",))
     monkeypatch.setattr(first_results, "PRELUDE", "")
