@@ -33,8 +33,10 @@ def printable(text: object) -> str:
     return "".join(x if x.isprintable() or x == "\n" else " " for x in str(text))
 
 
-def time_words(x: float) -> str:
-    """A time given in seconds, in words of three digits: ms below a second."""
+def time_words(x: float, most: float = math.inf) -> str:
+    """A time given in seconds, in words of three digits: ms below a second; "more than most"."""
+    if x > most:
+        return f"more than {most:g} s"
     return f"{x:.3g} s" if x >= 0.9995 else f"{1e3 * x:.3g} ms"
 
 

@@ -11,6 +11,7 @@ import gc
 import importlib
 import os
 import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,10 @@ from hypothesis import Phase, settings
 
 os.environ.setdefault("MPLBACKEND", "agg")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: workers share the cores
+# what is compiled is kept, as on a user's machine: a hundred child processes import the package,
+# and each worker the tests
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 gc.set_threshold(20_000, 20, 20)  # modules and figures are many objects and little garbage
 from tests.hunt import EXAMPLES, HUNTS, MORE  # noqa: E402

@@ -61,4 +61,8 @@ def test_a_table_without_rows_has_its_head():
     [(0.0, "0 ms"), (4e-3, "4 ms"), (0.5, "500 ms"), (0.9996, "1 s"), (4.0, "4 s")],
 )
 def test_a_time_is_in_ms_below_a_second(x, words):
-    assert time_words(x) == words
+    assert time_words(x) == time_words(x, 4.0) == words
+
+
+def test_a_time_beyond_what_was_looked_for_has_no_number():
+    assert time_words(float("inf"), 2.0) == time_words(2.1, 2.0) == "more than 2 s"

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 WAIT = 0.1  # [s] between two looks at whether the session is to end
 LONGEST = 1e9  # [s] longest session
-EVERY = 10  # of the control samples of a pair by the wall clock are kept: every so many
 PERIOD = 0.005  # [s] of a message, by default
 RATE = 1000.0  # [Hz] of the control of an arm from a file, by default
 OF_ARM = tuple(x.name for x in fields(ArmOptions))  # its options
@@ -151,6 +150,7 @@ class DeviceCommand:
         """Serves one end of a pair, or both, then writes the record and the exchanges."""
         from ..ports.exchanges import FILE
         from ..ports.pair_ends import serve_pair
+        from ..ports.server import EVERY
         from ..scene.pair import Pair
 
         pair = Pair.load(file)

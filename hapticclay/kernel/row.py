@@ -22,7 +22,7 @@ SHOWN = rows.ROW + 2  # numbers of a sample shown: its row, and the force of the
 
 
 class Saved(NamedTuple):
-    """A run between two steps: its state, and copies of the arrays that steps write."""
+    """A run between two steps: bytes of its state, and copies of the arrays that steps write."""
 
     state: np.ndarray
     arrays: list[np.ndarray]
@@ -219,7 +219,7 @@ class Row:
     # ---- to return to
 
     def state(self) -> np.ndarray:
-        """A copy of the state, shape (1,)."""
+        """A copy of the state, as the bytes of a record."""
         made = one(records.State)
         layout.save(self.s, made)
         return made
@@ -307,20 +307,18 @@ class NativeRow(Row):
         return self.machine.look(*self.addresses, first, n)
 
     def state(self) -> np.ndarray:
-        made = np.empty_like(self.states)
-        bytes_of(made)[:] = bytes_of(self.states)
-        return made
+        return bytes_of(self.states).copy()
 
     def put_state(self, state: np.ndarray) -> None:
-        bytes_of(self.states)[:] = bytes_of(state)
+        bytes_of(self.states)[:] = state
 
 
 ROWS: dict[str, type[Row]] = {"python": Row, "native": NativeRow}
 
 
 def one(record: Any) -> np.ndarray:
-    """An array of one record."""
-    return np.zeros(1, layout.dtype_of(record))
+    """The bytes of a record: NumPy would look through its fields with each new array."""
+    return np.zeros(layout.dtype_of(record).itemsize, np.uint8)
 
 
 def bytes_of(rows: np.ndarray) -> np.ndarray:

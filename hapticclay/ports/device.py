@@ -116,13 +116,14 @@ class SimulatedDevice(Device):
         hand: Trajectory | None = None,
         largest_force: float = LARGEST_FORCE,
         clay: bool = False,
+        every: int = 1,
     ):
-        """Makes the device, at rest."""
+        """Makes the device, at rest; its record keeps each every-th sample."""
         self._scenario, self._samples = device_scenario(scenario, period, clay)
         self._hand = None if hand is None else _follower(hand, self.scenario)
         self._arm = driven_arm(self.scenario, largest_force)
         driven = replace(self.scenario, controller=self._arm.controller)
-        self._simulation = Simulation(driven)
+        self._simulation = Simulation(driven, every=every)
 
     @property
     def scenario(self) -> Scenario:

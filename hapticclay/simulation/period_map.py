@@ -13,7 +13,7 @@ import numpy as np
 from ..formulas import arm
 from ..kernel import layout, movers, path, records, scene
 from ..kernel.hardware import QUEUED
-from ..kernel.row import ROWS, Buffers, Row
+from ..kernel.row import ROWS, Buffers, Row, bytes_of
 from ..model.sampled_controller import BUFFER
 from ..scene.scenario import Scenario
 from .engines import engine_for
@@ -207,7 +207,7 @@ class Map:
     def _at_rest(self, n: int) -> Copies | None:
         """The run after n steps; None where it moves."""
         rings = [self.row.arrays[x.name].reshape(1, -1).copy() for x in self.rings]
-        x = Copies(self.row.state(), rings)
+        x = Copies(self.row.state().view(layout.dtype_of(records.State)), rings)
         before = x.arrays[0][0, self.moving]
         self._advance(x, n)
         moves = np.abs(x.arrays[0][0, self.moving] - before) > LINEAR * KICK
@@ -236,11 +236,11 @@ class Map:
         self._add_elbow(x, 1.0)
         arrays = [self.row.arrays[ring.name].reshape(-1) for ring in self.rings]
         for k in range(len(x.states)):
-            self.row.put_state(x.states[k : k + 1])
+            self.row.put_state(bytes_of(x.states[k : k + 1]))
             for array, ring in zip(arrays, x.rings, strict=True):
                 array[:] = ring[k]
             self.row.advance(n)
-            x.states[k : k + 1] = self.row.state()
+            bytes_of(x.states[k : k + 1])[:] = self.row.state()
             for array, ring in zip(arrays, x.rings, strict=True):
                 ring[k] = array
         self._add_elbow(x, -1.0)

@@ -7,12 +7,12 @@ import threading
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from ..arguments import checked
-from ..errors import ParameterError, integer, is_series, number, numbers_of, pair
+from ..errors import Bound, ParameterError, integer, is_series, number, numbers_of, pair
 from ..kernel.engine import warnings_caught
 from ..kernel.row import SHOWN
 from ..model.operator import Operator
@@ -80,6 +80,7 @@ class Simulation:
     Args:
         scenario: what to run.
         engine: as in `simulate`.
+        every: keep each every-th sample in the record, and the last.
         recorded: whether a record is kept; else at most the last 4095 samples, for the monitor.
         monitored: whether the run ends when an axis is judged unstable; else it ends only at its
             limits, out of reach or above 20 m/s, and `diverging` is False. For muscle forces that
@@ -96,13 +97,14 @@ class Simulation:
         scenario: Scenario,
         *,
         engine: str = "auto",
+        every: Annotated[int, Bound(1, 1_000_000)] = 1,
         recorded: bool = True,
         monitored: bool = True,
     ):
         self._engine, self._maker = engine, engine_for(engine, scenario.t_max / scenario.dt)
         self._lock, self._workspace = threading.Lock(), Workspace()
         self._closed, self._warned, self._recorded = False, (), recorded
-        self._monitored = monitored
+        self._monitored, self._every = monitored, every
         self._begin(scenario)
 
     def _begin(self, scenario: Scenario) -> None:
@@ -110,14 +112,14 @@ class Simulation:
         if place != self._warned:  # warn of clay out of reach and the like once
             warn_implausible(scenario)
             self._warned = place
-        kept = self._kept() | {"keep_for_monitor": True}
-        self._run = Run(scenario, 1, self._maker, self._workspace, **kept)
+        kept: dict[str, Any] = self._kept() | {"keep_for_monitor": True}
+        self._run = Run(scenario, engine=self._maker, workspace=self._workspace, **kept)
         self._given, self._wall = scenario, 0.0
         self._torque: tuple[float, ...] | None = None
         self._forget()
 
-    def _kept(self) -> dict[str, bool]:
-        return {"recorded": self._recorded, "monitored": self._monitored}
+    def _kept(self) -> dict[str, Any]:
+        return {"every": self._every, "recorded": self._recorded, "monitored": self._monitored}
 
     def _forget(self) -> None:
         """Discards cached results of the run, which has changed."""

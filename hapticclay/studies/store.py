@@ -438,7 +438,8 @@ def read_sweep(out: str | os.PathLike[str]):
         "descriptions": {name: text for name, (_, text) in notes.items()},
     }
     pandas = {b"pandas": json.dumps({"attributes": attrs, **NO_INDEX}).encode()}
-    return table.cast(pa.schema([_with_note(x, notes[x.name]) for x in table.schema], pandas))
+    schema = pa.schema([_with_note(x, notes[x.name]) for x in table.schema], pandas)
+    return pa.Table.from_arrays(table.columns, schema=schema)  # a cast imports pyarrow.compute
 
 
 def _note(field: Any) -> tuple[str, str]:

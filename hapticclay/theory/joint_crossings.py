@@ -54,16 +54,27 @@ def log_size(values: np.ndarray) -> np.ndarray:
 
 
 def branches(values: np.ndarray) -> np.ndarray:
-    """Eigenvalues in an order in which each follows from the one before, shape (m, k)."""
-    if values.shape[1] == 1:
-        return values
-    from scipy.optimize import linear_sum_assignment
+    """Eigenvalues in an order in which each follows from the one before, shape (m, k).
 
-    out = values.copy()
-    for a, b in zip(out[:-1], out[1:], strict=True):
-        _, order = linear_sum_assignment(np.abs(a[:, None] - b[None, :]))
-        b[:] = b[order]
-    return out
+    Those of two angles are paired so that the sum of their distances is least, as it is where the
+    nearest to each is another one.
+    """
+    m, k = values.shape
+    if k == 1:
+        return values
+    gaps = np.abs(values[:-1, :, None] - values[1:, None, :])
+    following = gaps.argmin(axis=2)
+    clash = (np.sort(following, axis=1) != np.arange(k)).any(axis=1)
+    if clash.any():
+        from scipy.optimize import linear_sum_assignment
+
+        for i in np.flatnonzero(clash):
+            following[i] = linear_sum_assignment(gaps[i])[1]
+    order = np.empty((m, k), int)
+    order[0] = np.arange(k)
+    for i in range(m - 1):
+        order[i + 1] = following[i, order[i]]
+    return np.take_along_axis(values, order, axis=1)
 
 
 def _refined(

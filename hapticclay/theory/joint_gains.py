@@ -146,9 +146,7 @@ class JointLimits(Result):
     @property
     def _left(self) -> str:
         """Delay that may be added, in words."""
-        if math.isinf(self.delay_left):
-            return f"more than {LATEST:g} s"
-        return time_words(self.delay_left)
+        return time_words(self.delay_left, LATEST)
 
     def _way_back(self) -> str:
         if math.isnan(self.scale):

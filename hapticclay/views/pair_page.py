@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 
 from ..arms.mechanism import Sticks
+from ..display import time_words
 from ..errors import ParameterError
 from ..kernel.engine import mujoco
 from ..live.pair_session import PairFrame, PairSession, Theory
 from ..scene.link import ENDS
 from ..scene.pair import joint_names, joint_unit
 from ..scene.virtual_wall import Device
+from ..theory.pair_onset import LATEST
 from .arm_sticks import COLORS, force_axes, in_space, sticks_of
 from .live_page import PLOT_TIME, LivePage, banner_html
 from .palette import BLACK, BLUE, CLAY_DEEP, PART_COLORS, VERMILION, rgb_bytes
@@ -275,7 +277,7 @@ def _left(theory: Theory) -> str:
     found = theory.found
     if found is None:
         return f"delay left: {'not known' if theory.error else 'being computed'}"
-    return f"delay left: {1e3 * found.delay_left:.3g} ms one way"
+    return f"delay left: {time_words(found.delay_left, LATEST)} one way"
 
 
 def _along(way: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ import socket
 import threading
 import time
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -110,6 +111,9 @@ def test_a_round_of_faults():
     with serve(device_faults.SCENE, clock="wall") as server:
         found = device_faults.round_of_faults(server, 10, 500)
         assert server.service.device.ended == ""
+        t = server.record().t
+    # an hour of samples would take a gigabyte
+    np.testing.assert_allclose(np.diff(t)[:-1], 10 * device_faults.SCENE.dt, rtol=1e-9)
     assert found["answers"] == 5
     # 50 ms, and what a busy computer takes for its turns
     assert max(found["limp_s"].values()) < 1.0

@@ -389,6 +389,21 @@ def test_a_thread_of_its_own_is_asked_for():
     assert found and set(found) == {"another thread uses this simulation: give each thread its own"}
 
 
+@pytest.mark.parametrize("engine", ["python", "auto"])
+def test_a_simulation_keeps_the_samples_of_simulate(engine):
+    s = replace(CUT, t_max=1.6, dt=2e-4)
+    want = hc.simulate(s, every=7)
+    with hc.Simulation(s, engine=engine, every=7) as sim:
+        sim.advance(2500, force=s.force)
+        twin = pickle.loads(pickle.dumps(sim))
+        for each in (sim, twin):
+            each.advance(10_000)
+            got = each.record()
+            for array in ("t", "p", "v", "fh", "fe", "b", "q", "qd", "tau", "delta"):
+                assert np.array_equal(getattr(want, array), getattr(got, array)), array
+            assert got.outcome == want.outcome and got.energy == want.energy
+
+
 def test_a_simulation_without_record_makes_the_same_steps_and_keeps_none():
     """Two checks of the monitor and the end lie within."""
     s = replace(CUT, t_max=1.6, dt=2e-4)

@@ -757,11 +757,12 @@ def test_files_are_few_however_long_a_run_takes(tmp_path, monkeypatch, workers):
         assert whole(free, out) and len(files_of(out)) <= most
 
 
-def test_short_runs_are_few_files_of_two_processes(tmp_path):
-    """Some ten seconds of work for two: far fewer files than runs, and none of them lost."""
-    free = Sweep("constant", parse_grid("b=5:1000:20log gain.x=0.2:8:20"), {"t_max": 0.02})
-    assert sweep.run_sweep(free, tmp_path, workers=2) == 400
-    assert whole(free, tmp_path) and len(files_of(tmp_path)) <= 40
+def test_short_runs_are_few_files_of_two_processes(tmp_path, monkeypatch):
+    """A file takes 0.2 s: far fewer files than runs, and none of them lost."""
+    monkeypatch.setattr(store_runs, "CHUNK_TIME", 0.2)
+    free = Sweep("constant", parse_grid("b=5:1000:12log gain.x=0.2:8:12"), {"t_max": 0.02})
+    assert sweep.run_sweep(free, tmp_path, workers=2) == 144
+    assert whole(free, tmp_path) and 2 < len(files_of(tmp_path)) <= 40
     assert sweep.run_sweep(free, tmp_path, workers=2) == 0
 
 

@@ -284,9 +284,11 @@ def check_contents(names):
     reason="needs a C compiler and Python's headers",
 )
 def test_a_wheel_holds_the_kernel_for_this_python_and_later_ones(run, checkout, tmp_path, right):
+    less = {"HAPTICCLAY_CFLAGS": "-O0"}  # a third of the time; -O3 built what other tests run
     if (ROOT / "build").is_dir():  # what `make` compiled
         shutil.copytree(ROOT / "build", checkout / "build")
-    setup(checkout, "bdist_wheel")
+        less = {}
+    setup(checkout, "bdist_wheel", **less)
     (wheel,) = (checkout / "dist").glob("*.whl")
     assert "-cp311-abi3-" in wheel.name or not native.is_there()
     with zipfile.ZipFile(wheel) as archive:

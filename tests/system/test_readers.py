@@ -207,10 +207,15 @@ def deep_inline(kind, depth):
     return f"a = {tables}\n" if kind == "toml" else '{"a":[' * depth + "1" + "]}" * depth
 
 
-@pytest.fixture
-def no_collection():
-    """What other tests leave is not finalized at the bottom of a recursion, where that fails."""
+@pytest.fixture(scope="module")
+def collected():
+    """Takes away what other tests left: once, since a collection takes longer than a reader."""
     gc.collect()
+
+
+@pytest.fixture
+def no_collection(collected):
+    """What other tests leave is not finalized at the bottom of a recursion, where that fails."""
     gc.disable()
     yield
     gc.enable()

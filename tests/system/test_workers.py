@@ -10,7 +10,7 @@ import pytest
 
 from hapticclay.errors import ParameterError
 from hapticclay.studies import Range, Sweep, run_sweep, store
-from tests.hunt import some
+from tests.hunt import HUNTS
 
 STUDIES = {
     "sweep": """
@@ -56,7 +56,7 @@ def last_line(done):
     return done.stderr.splitlines()[-1]
 
 
-@pytest.mark.parametrize("study", some(STUDIES, 2))  # all by the same pool
+@pytest.mark.parametrize("study", STUDIES if HUNTS else ["trials"])  # all by the same pool
 def test_a_script_without_main_guard_is_told_of_it(tmp_path, study):
     said = last_line(run_script(HEAD + STUDIES[study], tmp_path))
     assert said.startswith("ChildProcessError: the study must stand below")

@@ -1,6 +1,7 @@
 """Limits of joint loops: against another map, other theory, and the engine's own runs."""
 
 import functools
+import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -10,10 +11,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import linear_sum_assignment
 
 import hapticclay as hc
 from benchmarks import arm_integrators
 from hapticclay.arms.mechanism import Linear
+from hapticclay.theory import joint_crossings
 from hapticclay.theory.joint_families import Circle, Family
 from hapticclay.theory.joint_gains import Study, delay_crossing, joint_loop
 from hapticclay.theory.wall_limits import stiffness_band
@@ -419,3 +422,15 @@ def test_a_law_of_another_arm_is_refused():
         hc.JointPD([1.0], [1.0], velocity="filter")
     with pytest.raises(hc.ParameterError, match="left out without"):
         hc.JointPD([1.0], [1.0], cutoff=3.0)
+
+
+@given(st.integers(2, 7), st.integers(1, 40), st.integers(0, 2**32 - 1))
+def test_eigenvalues_of_two_angles_are_paired_at_the_least_sum_of_distances(k, m, seed):
+    rng = np.random.default_rng(seed)
+    a, b = rng.normal(size=(2, k, k)) + 1j * rng.normal(size=(2, k, k))
+    values = np.linalg.eigvals(a + np.linspace(0.0, 3.0, m)[:, None, None] * b)
+    paired = joint_crossings.branches(values)
+    for one, other in itertools.pairwise(paired):
+        gaps = np.abs(one[:, None] - other[None, :])
+        assert gaps.trace() == pytest.approx(gaps[linear_sum_assignment(gaps)].sum(), rel=1e-12)
+    np.testing.assert_array_equal(np.sort(paired, axis=1), np.sort(values, axis=1))
