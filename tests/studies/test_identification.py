@@ -17,6 +17,7 @@ from hapticclay.fields import make_part, plain_data
 from hapticclay.studies import identification
 from hapticclay.studies.identification import fit, measured, response
 from hapticclay.studies.workspace import Drift, poses
+from tests.cli.test_figure_options import assert_written
 from tests.hunt import some
 
 DT = 0.36e-3
@@ -377,16 +378,16 @@ def test_bad_input_is_refused(kw, field):
 
 
 def test_command_line(capsys, tmp_path):
-    args = ["identify", "--axis", "x", "--quick", "--noise", "--dpi", "40", "--out", str(tmp_path)]
-    assert app.main(args) == 0
+    args = ["identify", "--axis", "x", "--quick", "--noise", "--out", str(tmp_path)]
+    assert app.main([*args, "--style", "print", "--dpi", "40", "--data", "--format", "svg"]) == 0
     out, err = capsys.readouterr()
     assert err == "" and "damping [1/s]" in out and "95 % interval" in out
-    assert sorted(p.name for p in tmp_path.iterdir()) == [
-        "fig4.png",
-        "fig5.png",
-        "fig6.png",
-        "identify.json",
-    ]
+    figures = "fig4", "fig5", "fig6"
+    assert_written(tmp_path, figures, ("svg",))
+    tables = {p.stem.partition("-")[0] for p in tmp_path.glob("*.csv")}
+    assert tables == {*figures}
+    left = {p.name for p in tmp_path.iterdir() if p.suffix != ".csv"}
+    assert left == {*(f"{x}.svg" for x in figures), "identify.json"}
     found = json.loads((tmp_path / "identify.json").read_text())
     assert found["schema"] == "hapticclay-identify-1" and [r["what"] for r in found["results"]] == [
         "G",
