@@ -166,6 +166,24 @@ def pytest_runtest_protocol(item):
         return (yield)
 
 
+@pytest.fixture(autouse=True)
+def no_layout(request):
+    """Figures are drawn as they are, but in a test that is marked `layout`.
+
+    To find room for all texts takes most of the time of a figure; each kind of figure has it found
+    in views/test_figures.py.
+    """
+    if request.node.get_closest_marker("layout"):
+        yield
+        return
+    from hapticclay.views import style
+
+    with pytest.MonkeyPatch.context() as patch:
+        for parameters in (style.STYLE, style.PRINT):
+            patch.setitem(parameters, "figure.constrained_layout.use", False)
+        yield
+
+
 @pytest.fixture(scope="session")
 def paper_runs():
     """The runs behind the ledger, made once."""

@@ -144,8 +144,22 @@ class Figure:
 
 
 def _encoded(figure: matplotlib.figure.Figure, kind: str, dpi: float) -> bytes:
-    data = io.BytesIO()
-    figure.savefig(data, format=kind, dpi=dpi, metadata=UNDATED[kind])
+    """As `Figure.savefig` of matplotlib, to the byte; that draws all once more, for its layout."""
+    from matplotlib.backends import backend_agg, backend_pdf, backend_svg
+
+    canvases: Any = {
+        "png": backend_agg.FigureCanvasAgg,
+        "svg": backend_svg.FigureCanvasSVG,
+        "pdf": backend_pdf.FigureCanvasPdf,
+    }
+    data, before = io.BytesIO(), (figure.canvas, figure.dpi)
+    canvas = canvases[kind](figure)
+    try:
+        figure.dpi = dpi
+        getattr(canvas, f"print_{kind}")(data, metadata=UNDATED[kind])
+    finally:
+        figure.dpi = before[1]
+        figure.set_canvas(before[0])
     return data.getvalue()
 
 

@@ -7,8 +7,6 @@ import pytest
 
 from hapticclay.cli.app import main
 
-pytestmark = pytest.mark.usefixtures("no_layout")
-
 CARDS = Path(__file__).parents[2] / "mjcf" / "arms"
 TWO = str(CARDS / "planar_2r.xml")
 GAINS = ["--Kp", "100", "50", "--Kd", "1", "0.5"]

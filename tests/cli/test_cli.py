@@ -18,8 +18,6 @@ from hapticclay.display import cell_text
 from hapticclay.simulation import record, simulate
 from hapticclay.views import run_figures
 
-pytestmark = pytest.mark.usefixtures("no_layout")
-
 
 def run(capsys, *args):
     code = app.main(args)

@@ -13,8 +13,6 @@ from hapticclay.cli import app
 from hapticclay.ports import Exchanges, LoopReport
 from tests.ports.conftest import Client, tick
 
-pytestmark = pytest.mark.usefixtures("no_layout")
-
 
 def session_of(words, client_of, tmp_path):
     """A session ended by Ctrl-C: its folder, output and errors."""

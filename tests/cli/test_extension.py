@@ -9,7 +9,6 @@ import sys
 from typing import Annotated
 
 import pytest
-from matplotlib.figure import Figure
 
 import hapticclay as hc
 from hapticclay.cli import app, commands, parser
@@ -25,8 +24,6 @@ from hapticclay.studies.sampling import parse_grid
 from hapticclay.studies.store import read_sweep
 from hapticclay.studies.sweep import Sweep
 from hapticclay.views import sweep_plots
-
-pytestmark = pytest.mark.usefixtures("no_layout")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -156,12 +153,6 @@ class ReachCommand:
         return 0
 ''',
 }
-
-
-@pytest.fixture(autouse=True)
-def no_layout(monkeypatch):
-    """Figures are written as they are."""
-    monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)
 
 
 @pytest.fixture

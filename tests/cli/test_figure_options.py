@@ -39,9 +39,7 @@ COMMANDS = {  # words, the figures that come of them, and formats; in a hunt all
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_writes_its_figures_in_formats(name, record, tmp_path, capsys, request):
-    if name != "run":  # one layout is enough
-        request.getfixturevalue("no_layout")
+def test_every_command_writes_its_figures_in_formats(name, record, tmp_path, capsys):
     words, figures, formats = COMMANDS[name]
     formats = FORMATS if HUNTS else formats
     if name == "sweep":
@@ -60,7 +58,6 @@ def test_every_command_writes_its_figures_in_formats(name, record, tmp_path, cap
     capsys.readouterr()
 
 
-@pytest.mark.usefixtures("no_layout")
 def test_numbers_of_a_run_are_those_of_its_record(tmp_path, capsys):
     words = ["run", "constant", "--t-max", "0.1", "--dpi", "50", "--data", "--out", str(tmp_path)]
     assert app.main(words) == 0
@@ -99,7 +96,6 @@ def test_wrong_words_are_refused_before_any_work(command, words, told, capsys):
     assert told in capsys.readouterr().err
 
 
-@pytest.mark.usefixtures("no_layout")
 def test_formats_may_stand_before_the_experiment(tmp_path, capsys):
     words = ["run", "--format", "svg", "pdf", "free", "--t-max", "0.01", "--out"]
     assert app.main([*words, str(tmp_path)]) == 0

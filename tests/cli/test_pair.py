@@ -6,8 +6,6 @@ import pytest
 
 from hapticclay.cli.app import main
 
-pytestmark = pytest.mark.usefixtures("no_layout")
-
 PAIR = """
 [leader]
 mass = 6.0

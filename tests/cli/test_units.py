@@ -25,8 +25,6 @@ from hapticclay.simulation.asked_error import parse_error
 from hapticclay.studies.distribution import Distribution
 from hapticclay.studies.sampling import Range, parse_grid
 
-pytestmark = pytest.mark.usefixtures("no_layout")
-
 SMALLER = {  # of each unit a smaller one, and its size
     "m": ("mm", "1e-3"), "s": ("ms", "1e-3"), "N": ("mN", "1e-3"), "kg": ("g", "1e-3"),
     "N.s/m": ("N.s/mm", "1e3"), "N/m": ("N/mm", "1e3"), "Hz": ("kHz", "1e3"),

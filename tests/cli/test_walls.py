@@ -10,8 +10,6 @@ from hapticclay.cli import app
 from hapticclay.cli.walls import box_of
 from hapticclay.errors import ParameterError
 
-pytestmark = pytest.mark.usefixtures("no_layout")
-
 WORDS = (
     "--mass 200g --damper 0.5 --friction 0.01 --quantum 5um --Ts 2ms --delay 0.5ms "
     "--velocity-window 2 --filter 80 --hand 0.25 2 6 --unilateral"

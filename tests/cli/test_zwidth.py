@@ -8,8 +8,6 @@ import pytest
 import hapticclay as hc
 from hapticclay.cli import app
 
-pytestmark = pytest.mark.usefixtures("no_layout")
-
 
 def run(capsys, *args):
     code = app.main(args)

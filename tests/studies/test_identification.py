@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from matplotlib.figure import Figure
 
 import hapticclay as hc
 from benchmarks import intervals
@@ -311,12 +310,11 @@ def test_drift_over_the_workspace(drift):
     assert len(drift.ranges()) == 24 and json.dumps(drift.summary())
 
 
-def test_map_is_drawn(drift, monkeypatch):
+def test_map_is_drawn(drift):
     from hapticclay.views import workspace_plots
 
     figure = workspace_plots.workspace_plot(drift)
     assert [ax.get_xlabel() for ax in figure.axes[2:4]] == ["world x [m]", "world x [m]"]
-    monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)
     figure.savefig("/dev/null", format="png", dpi=40)
 
 
@@ -378,8 +376,7 @@ def test_bad_input_is_refused(kw, field):
     assert e.value.field == field
 
 
-def test_command_line(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)
+def test_command_line(capsys, tmp_path):
     args = ["identify", "--axis", "x", "--quick", "--noise", "--dpi", "40", "--out", str(tmp_path)]
     assert app.main(args) == 0
     out, err = capsys.readouterr()

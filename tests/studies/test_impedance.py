@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import hapticclay as hc
 from hapticclay.cli import app
@@ -130,8 +129,7 @@ def test_figures_and_tables_of_a_wall_and_of_the_arm():
                    for t in tables.values() for name in t)  # fmt: skip
 
 
-def test_the_command_prints_and_writes(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)
+def test_the_command_prints_and_writes(tmp_path, capsys):
     words = ["impedance", "--K", "300", "--B", "2", "--damper", "0.5", "--Ts", "1ms"]
     words += ["--dpi", "50"]
     assert app.main([*words, "--lines", "5", "--out", str(tmp_path), "--data"]) == 0

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from matplotlib.figure import Figure
 from scipy import stats
 
 import hapticclay as hc
@@ -281,8 +280,7 @@ def test_a_disk_without_room_is_refused_before_the_runs(tmp_path, monkeypatch):
     assert not list((tmp_path / "data").glob("*"))
 
 
-def test_the_command_writes_what_it_found(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)
+def test_the_command_writes_what_it_found(tmp_path, capsys):
     words = ["robustness", "--out", str(tmp_path), "--runs", "3", "--grid", "K=2:6:3 b=50,200"]
     assert app.main([*words, "--band", "3", "--workers", "1", "--data"]) == 0
     told = capsys.readouterr()

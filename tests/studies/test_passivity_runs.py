@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import hapticclay as hc
 from hapticclay.cli import app
@@ -122,7 +121,6 @@ def test_continuous_runs_have_no_controller():
 
 
 def test_the_command_writes_all_figures(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)
     few = {"INDEX_TURNS": ((1, 4), (1, 1)), "INDEX_POINTS": 50, "REGION_POINTS": 5}
     for name, value in {**few, "INDEX_LINES": 3, "ARM_BAND": (3.0, 30.0)}.items():
         monkeypatch.setattr(study, name, value)

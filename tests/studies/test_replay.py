@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import hapticclay as hc
 from hapticclay.cli.app import main
@@ -147,7 +146,6 @@ def test_files_side_by_side_under_a_recording(made, tmp_path, capsys, monkeypatc
         str(hc.with_fields(scenario, {"clay": hc.slab(40.0)}).save(tmp_path / "soft.toml")),
     ]
     out, found, compare = tmp_path / "out", [], comparison.compare_files
-    monkeypatch.setattr(Figure, "get_layout_engine", lambda self: None)
     # what does not depend on a recording
     monkeypatch.setattr(comparison, "worst_limit", lambda loop: np.nan)
     monkeypatch.setattr(compare_plots, "CLAY_DAMPINGS", np.geomspace(1.0, 3000.0, 4))

@@ -16,7 +16,7 @@ import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.views import palette, style
 from hapticclay.views.captions import unit_text
-from hapticclay.views.figure import FORMATS, csv_text, curves_drawn
+from hapticclay.views.figure import FORMATS, UNDATED, csv_text, curves_drawn
 from hapticclay.views.style import figure_size, figure_style, points
 
 X = np.linspace(0.0, 1.0, 7)
@@ -60,6 +60,7 @@ def test_each_format_is_what_it_says(tmp_path):
 
 
 @pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.layout
 def test_the_same_figure_gives_the_same_bytes(tmp_path, kind):
     figure = hc.Figure(parabola)
     for name in ("a", "b"):
@@ -67,10 +68,17 @@ def test_the_same_figure_gives_the_same_bytes(tmp_path, kind):
     assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
 
 
-def test_a_picture_for_a_screen_is_that_of_the_plot_function(tmp_path):
-    hc.Figure(parabola).save(tmp_path / "a.png")
-    parabola().savefig(tmp_path / "b.png")
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+@pytest.mark.layout
+@pytest.mark.parametrize("name, kind", [("screen", "png"), *(("print", k) for k in FORMATS)])
+def test_a_file_is_that_of_the_plot_function(tmp_path, name, kind):
+    """To the byte: laid out for the format, at its resolution and in the style; all as before."""
+    with style.styled(name) as look:
+        ours, plain = parabola(), parabola()
+        plain.savefig(tmp_path / f"plain.{kind}", dpi=look.dpi, metadata=UNDATED[kind])
+    before = ours.canvas, ours.dpi
+    (made,) = hc.Figure(lambda: ours).save(tmp_path / f"ours.{kind}", style=name)
+    assert made.read_bytes() == (tmp_path / f"plain.{kind}").read_bytes()
+    assert (ours.canvas, ours.dpi) == before
 
 
 @settings(max_examples=50)

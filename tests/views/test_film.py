@@ -209,6 +209,7 @@ def test_bad_input_is_one_line(args, word, tmp_path, monkeypatch, capsys):
     assert code == 2 and err.count("\n") == 1 and word in err
 
 
+@pytest.mark.layout
 def test_running_plots_end_as_the_whole_curve(record):
     """Drawn in many images or in one: the same bytes, with curves inside the axes only."""
     pieces, whole = RunningPlots(record, 300, 480), RunningPlots(record, 300, 480)
@@ -255,6 +256,7 @@ def ran(name):
 
 
 @pytest.mark.parametrize("name, size", PLOTTED, ids=str)
+@pytest.mark.layout
 def test_labels_of_running_plots_neither_overlap_nor_leave_the_picture(name, size):
     assert plots_fit(*size)
     figure, _ = running_figure(ran(name), *size)

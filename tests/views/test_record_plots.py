@@ -83,6 +83,7 @@ def test_energies_end_where_the_run_has_added_them_up(scenario):
     assert all(len(x) == len(record.t) and x[0] == 0.0 for x in found.values() if x is not None)
 
 
+@pytest.mark.layout
 def test_energy_plot_shows_measured_and_added_up(cut):
     figure = cut.plot.energy()
     (ax,) = figure.axes

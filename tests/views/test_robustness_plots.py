@@ -47,6 +47,7 @@ DRAWN = [(name, "screen") for name in CASES] + [(name, "print") for name in PRIN
 
 
 @pytest.mark.parametrize("name, style", DRAWN)
+@pytest.mark.layout
 def test_every_text_lies_in_the_figure(name, style, monkeypatch):
     drawn, draw = [], Text.draw
 

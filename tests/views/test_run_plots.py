@@ -48,10 +48,11 @@ def test_force_plot_shows_b_beside_the_ratios(run):
     hc.free(force=(0.0, 0.0), t_max=0.1),
     hc.constant_cut(operator=hc.Operator(), t_max=1.0, dt=1e-3),
 ], ids=["free", "unstable", "two samples", "at rest", "hand"])  # fmt: skip
+@pytest.mark.layout
 def test_any_record_can_be_drawn(scenario, tmp_path):
     record = hc.simulate(scenario)
     for draw in (run_plots.velocity_plot, run_plots.force_ratio_plot):
-        draw(record, "x").savefig(tmp_path / "p.png")
+        hc.Figure(lambda draw=draw: draw(record, "x")).save(tmp_path / "p.png")
         assert (tmp_path / "p.png").stat().st_size > 5000
         other = draw(record, "y")
         other.set_layout_engine("none")  # the same room as that of x
@@ -83,6 +84,7 @@ def ran(name):
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.layout
 def test_no_title_is_clipped_or_runs_into_the_legend(name):
     scenario, record = SCENARIOS[name], ran(name)
     drawn = run_figures.figures(record)

@@ -62,6 +62,7 @@ def pictures(record):
 
 
 @pytest.mark.filterwarnings("ignore::matplotlib.MatplotlibDeprecationWarning")
+@pytest.mark.layout
 def test_no_setting_of_the_user_changes_a_picture(record):
     changed = hostile()
     assert len(changed) > 200 and {"text.usetex", "savefig.bbox", "axes.labelsize"} <= {*changed}
@@ -79,6 +80,7 @@ def test_the_settings_of_the_user_are_as_before(record):
         assert dict(matplotlib.rcParams) == before
 
 
+@pytest.mark.layout
 def test_a_settings_file_leaves_the_width_in_print(tmp_path, capsys):
     """The width is that of one column of a journal, 8.5 cm, whatever the settings crop."""
     (tmp_path / "matplotlibrc").write_text(SMALL)

@@ -82,6 +82,7 @@ def test_transparency_is_drawn_for_each_design():
 @pytest.mark.parametrize(
     "gains", [(1.0,), (1.0, 25.0), (0.5, 1.0, 2.0), (1.0, 6.0, 12.0, 25.0, 50.0)], ids=str
 )
+@pytest.mark.layout
 def test_nyquist_legend_stays_within_the_figure(gains):
     figure = plots.nyquist_plot("x", 50.0, gains, operator=HAND)
     figure.draw_without_rendering()
