@@ -7,6 +7,7 @@ the other workers wait.
 """
 
 import contextlib
+import functools
 import gc
 import importlib
 import os
@@ -92,7 +93,13 @@ def pytest_collection(session):
 
 def file_of(item):
     """The file of a test, from this folder."""
-    return item.path.relative_to(HERE).as_posix()
+    return name_of(item.path)
+
+
+@functools.cache  # for thousands of tests
+def name_of(path):
+    """The name of a file, from this folder."""
+    return path.relative_to(HERE).as_posix()
 
 
 def folder_turn(file):

@@ -264,7 +264,17 @@ def rest_of(screen):
     return said
 
 
-def stopped_at_a_terminal(folder, *args, program=("-m", "hapticclay")):
+SOON = """
+import functools, sys
+from hapticclay.cli import app, console
+from hapticclay.views import film
+console.progress_bar = functools.partial(console.progress_bar, delay=0.1)  # not after 2 s
+film.ready = lambda *given: None  # without asking for OpenGL
+sys.exit(app.main())
+"""
+
+
+def stopped_at_a_terminal(folder, *args):
     """Presses Ctrl-C in a long run when its bar is shown; returns exit status, stdout, screen."""
     terminal, end = pty.openpty()
     termios.tcsetwinsize(end, (24, 80))
@@ -272,7 +282,7 @@ def stopped_at_a_terminal(folder, *args, program=("-m", "hapticclay")):
         open(terminal, "rb", buffering=0) as screen,
         open(folder / "said", "w+") as out,
         subprocess.Popen(
-            [sys.executable, *program, *args],
+            [sys.executable, "-c", SOON, *args],
             cwd=folder,
             stderr=end,
             stdout=out,
@@ -309,14 +319,10 @@ def test_ctrl_c_keeps_what_was_run(tmp_path):
 
 
 def test_ctrl_c_while_a_film_is_simulated_leaves_nothing_behind(tmp_path):
-    (tmp_path / "film.py").write_text(
-        "import sys; from hapticclay.cli import app; from hapticclay.views import film; "
-        "film.ready = lambda *a: None; sys.exit(app.main())"
-    )  # without asking for OpenGL
     args = ("video", "constant", "--dt", "2e-6", "--out", "x.webp")
-    code, out, said = stopped_at_a_terminal(tmp_path, *args, program=["film.py"])
+    code, out, said = stopped_at_a_terminal(tmp_path, *args)
     assert (code, out) == (130, "") and said.split("\r")[-2:] == ["hapticclay: interrupted", "\n"]
-    assert os.listdir(tmp_path) == ["film.py"]
+    assert os.listdir(tmp_path) == []
 
 
 def test_output_cut_short_is_no_traceback_and_loses_nothing(tmp_path):

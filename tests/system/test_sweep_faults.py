@@ -167,10 +167,10 @@ def alive(process):
 
 
 @contextlib.contextmanager
-def at_work(out, t_max=0.3, chunk=4):
-    """A sweep with two workers that has written two parts, and its worker processes."""
+def at_work(out, t_max=0.3, chunk=4, workers=2):
+    """A sweep that has written two parts, and its worker processes."""
     with subprocess.Popen(
-        command(out, t_max=t_max, b=MORE, chunk=chunk),
+        command(out, t_max=t_max, b=MORE, workers=workers, chunk=chunk),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -458,7 +458,7 @@ def test_a_folder_removed_while_a_file_is_written_is_an_error(tmp_path, monkeypa
 @pytest.mark.untraced
 def test_the_command_says_in_one_line_that_its_folder_has_gone(tmp_path):
     out = tmp_path / "o"
-    with at_work(out, 0.3, 4) as (p, _):
+    with at_work(out, workers=1) as (p, _):
         shutil.rmtree(out)
         said, err = p.communicate(timeout=60)
     lines = [line for line in err.splitlines() if " to go" not in line]

@@ -37,7 +37,7 @@ def x_server(*args):
     """A screen of its own; its name."""
     reading, writing = os.pipe()
     x = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writing), "-screen", "0", "640x480x24", "-noreset", *args],
+        ["Xvfb", "-displayfd", str(writing), "-screen", "0", "320x240x24", "-noreset", *args],
         pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     os.close(writing)
@@ -133,7 +133,7 @@ class Mouse:
 
     def drag(self, pixels, moves=5, pictures=1):
         """Pull to the right in some moves, each seen for so many pictures."""
-        self.do("mousemove", 320, 240, "keydown", "ctrl", "mousedown", 3)
+        self.do("mousemove", 160, 120, "keydown", "ctrl", "mousedown", 3)
         self.pictures(5)
         for _ in range(moves):
             self.do("mousemove_relative", "--", pixels // moves, 0)
@@ -203,7 +203,7 @@ def test_closing_while_clay_is_cut_ends_it_and_the_record_is_there(screen, tmp_p
         screen, tmp_path, "view", "--b", "2000", "--dt", "1e-3", "--out", "o", "--no-plots"
     )
     try:
-        mouse.drag(200)
+        mouse.drag(100)
         mouse.until(lambda now: now["x"] > 0.055)
         code, out, err = mouse.end(how)
     finally:
@@ -228,7 +228,7 @@ def test_closing_a_replay_before_its_end_ends_it(screen, tmp_path, how):
 
 def test_mouse_cuts_through_the_clay(screen, tmp_path):
     mouse = Mouse(screen, tmp_path, "view", "--out", "o")
-    mouse.drag(192, 6)
+    mouse.drag(96, 6)
     mouse.until(lambda now: now["x"] > 0.17 and now["frames"] > 50)
     code, out, err = mouse.close()
     assert (code, err) == (0, ""), (out, err)
