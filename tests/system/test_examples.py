@@ -134,6 +134,7 @@ def test_runs_and_shows_a_figure(page, tmp_path, monkeypatch):
             assert labels or len(shared) > 1, f"{page.name}: axes without a label"
 
 
+@pytest.mark.layout
 def test_the_style_sheet_is_the_style_of_the_figures():
     """hapticclay/views/figure.mplstyle, for figures of one's own, repeats style.STYLE."""
     sheet = matplotlib.rc_params_from_file(
