@@ -81,7 +81,8 @@ class Pattern:
 
     def models(self, d: Differences) -> tuple[np.ndarray, list[np.ndarray]]:
         """The models of runs, and the arrays that they name."""
-        out, kept = np.repeat(self.row.models, len(d.gain)), []
+        model = self.row.models.view(layout.dtype_of(records.Model))
+        out, kept = np.repeat(model, len(d.gain)), []
         out["ox"], out["oy"] = d.origin.T
         axis = out["axis"][:, :2]
         axis["K"], axis["push"] = d.gain, d.force

@@ -153,7 +153,8 @@ def columns(jobs):
     tables = [x.arrays["table"].ravel() for x in alone]
     found = arrays_of(together, "table", map(len, tables)) if jobs[0].clay else tables
     del kept
-    return together, np.concatenate([x.models for x in alone]), found, tables
+    models = np.concatenate([x.models for x in alone]).view(together.dtype)
+    return together, models, found, tables
 
 
 def test_numbers_of_many_runs_are_those_of_each_to_the_bit():
