@@ -28,7 +28,7 @@ from hapticclay.ports.service import REST
 from tests.ports.conftest import SCENE
 
 PERIOD = 0.005
-BY_MESSAGE = Limits(period=PERIOD, ramp=0.0)
+BY_MESSAGE = Limits(period=PERIOD, ramp=0.0, patience=1.0)  # answers are late on a busy computer
 
 
 @contextmanager
@@ -90,7 +90,7 @@ def test_exchanges_with_our_own_device():
 
 def test_the_force_grows_over_the_ramp():
     """In even steps from nothing, at exchanges that each count for a period."""
-    limits = Limits(period=0.01, ramp=0.1, largest_force=2.0)
+    limits = Limits(period=0.01, ramp=0.1, largest_force=2.0, patience=1.0)
     with device(lambda k, f: STILL) as (url, sent), connect(url, limits) as client:
         for _ in range(15):
             client.exchange((8.0, 0.0, 0.0))
@@ -101,7 +101,7 @@ def test_the_force_grows_over_the_ramp():
 
 def test_the_force_of_a_hand_grows_once_its_period_is_known():
     """K times 10 mm, in even steps from nothing, however long the period was measured."""
-    limits = Limits(period=0.01, ramp=0.1)
+    limits = Limits(period=0.01, ramp=0.1, patience=1.0)
     with device(lambda k, f: STILL) as (url, sent), connect(url, limits) as client:
         hand = DeviceHand(client, Coupled(K=200.0), (0.0, 0.0))
         before = len(sent)
@@ -210,7 +210,7 @@ def test_a_device_that_is_gone_is_an_outcome():
 
 def test_a_jump_turns_the_force_within_its_rate_of_change():
     """From -3 N to 3 N in even steps of slew_rate Ts = 0.5 N: the place jumps by 1 m."""
-    limits = Limits(period=1e-3, ramp=0.0)
+    limits = Limits(period=1e-3, ramp=0.0, patience=1.0)
     places = [at(0.05 + 1e-6 * k if k < 70 else -0.95 + 1e-6 * k) for k in range(200)]
     with device(lambda k, f: places[k]) as (url, sent), connect(url, limits) as client:
         hand = DeviceHand(client, Coupled(), (0.0, 0.0))
@@ -307,7 +307,7 @@ def test_a_device_at_rest_without_force_is_not_frozen():
     ],
 )
 def test_a_frame_beyond_all_bounds_is_a_lost_sample(bad):
-    limits = Limits(period=0.01, ramp=0.0)
+    limits = Limits(period=0.01, ramp=0.0, patience=1.0)
     with (
         device(lambda k, f: bad if k == 4 else at(1e-4 * k)) as (url, sent),
         connect(url, limits) as client,
