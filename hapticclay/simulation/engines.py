@@ -59,7 +59,7 @@ def give_notice(why: str) -> None:
     if not _notice_given:
         _notice_given = True
         print(
-            "hapticclay: Python makes the steps, some 10 times slower: "
+            "hapticclay: Python makes the steps, some 15 times slower: "
             f"no compiled kernel ({why}); {remedy(why)}",
             file=sys.stderr,
         )
