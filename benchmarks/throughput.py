@@ -396,9 +396,10 @@ TITLES = {
     "Earlier releases compiled in it (uncached) or loaded what an earlier process had stored "
     "(cached).",
     "rows": "The closed loop, every sample recorded, against the floor: a bare loop of `mj_step` "
-    "in C with the same model, measured alternately; medians. `mj_step` also looks for contacts and "
-    "reads a clock 28 times; the loop calls only the pieces of a step that the arm needs, which "
-    "give the same bits. On a busy machine the ratios are reliable, the microseconds are not.",
+    "in C with the same model, measured alternately; medians. `mj_step` also looks for contacts "
+    "and reads a clock 28 times; the loop calls only the pieces of a step that the arm needs, "
+    "which give the same bits. On a busy machine the ratios are reliable, the microseconds are "
+    "not.",
     "batch": "Batches over the floor on all cores, measured alternately: time on the clock, and "
     "processor time.",
     "linearity": "Time per run, from a small batch to a large one, over the floor in the same way; "
