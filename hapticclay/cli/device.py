@@ -150,12 +150,12 @@ class DeviceCommand:
         """Serves one end of a pair, or both, then writes the record and the exchanges."""
         from ..ports.exchanges import FILE
         from ..ports.pair_ends import serve_pair
-        from ..ports.server import EVERY
+        from ..ports.server import every_of
         from ..scene.pair import Pair
 
         pair = Pair.load(file)
         given = self._how(pair.Ts)
-        every = EVERY if self.clock == "wall" else 1
+        every = every_of(self.clock)
         with serve_pair(pair, end=self.end, every=every, **given) as ends, console.ctrl_c() as stop:
             for name, server in ends.served.items():
                 print(f"{name}: {self._shown} listens at {server.url}", flush=True)

@@ -52,7 +52,8 @@ class One:
                 return
             if command.gain is not None and command.gain != self.gain:
                 self.gain = command.gain
-                run.put_gain(self.gain) if takes_gain(run.row.m) else run.change_gain(self.gain)
+                change = run.put_gain if takes_gain(run.row.m) else run.change_gain
+                change(self.gain)
             run.push_evenly((0.0, *command.force, 0.0, 0.0))
             make_steps(run, n)
 

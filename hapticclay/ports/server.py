@@ -209,6 +209,11 @@ def _envelope(connection: Any, status: HTTPStatus, error: str = "", data: Any = 
     return response
 
 
+def every_of(clock: Clock) -> int:
+    """How many samples there are for one that a record keeps."""
+    return 1 if clock == "tick" else EVERY
+
+
 @checked
 @contextlib.contextmanager
 def serve(
@@ -249,9 +254,8 @@ def serve(
             is taken, or websockets is not installed.
     """
     most = inverse3.largest_force
-    every = 1 if clock == "tick" else EVERY
     device = SimulatedDevice(
-        scenario, period=period, hand=hand, clay=clay, largest_force=most, every=every
+        scenario, period=period, hand=hand, clay=clay, largest_force=most, every=every_of(clock)
     )
     service = Service(device, clock=clock, inverse3=inverse3)
     with DeviceServer(service, host, port) as server:

@@ -152,14 +152,14 @@ def _encoded(figure: matplotlib.figure.Figure, kind: str, dpi: float) -> bytes:
         "svg": backend_svg.FigureCanvasSVG,
         "pdf": backend_pdf.FigureCanvasPdf,
     }
-    data, before = io.BytesIO(), (figure.canvas, figure.dpi)
+    data, canvas_before, dpi_before = io.BytesIO(), figure.canvas, figure.dpi
     canvas = canvases[kind](figure)
     try:
         figure.dpi = dpi
         getattr(canvas, f"print_{kind}")(data, metadata=UNDATED[kind])
     finally:
-        figure.dpi = before[1]
-        figure.set_canvas(before[0])
+        figure.dpi = dpi_before
+        figure.set_canvas(canvas_before)
     return data.getvalue()
 
 
