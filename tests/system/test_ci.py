@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.waiting import PATIENCE
+
 ROOT = Path(__file__).parents[2]
 STAND_INS = ("python3", "cc", "Xvfb", "xdotool", "chromium", "make", "ldconfig")
 LIBRARIES = "echo libEGL.so.1 libGL.so.1 libatomic.so.1"
@@ -34,7 +36,7 @@ def test_a_run_sees_a_new_machine_and_leaves_nothing(tmp_path, status):
         "SEEN": str(tmp_path / "seen"),
         "STATUS": str(status),
     }
-    assert subprocess.run([ROOT / ".ci/run"], env=env, timeout=60).returncode == status
+    assert subprocess.run([ROOT / ".ci/run"], env=env, timeout=PATIENCE).returncode == status
     first = (tmp_path / "seen").read_text().splitlines()[0].split(" ")
     home, tmp, files, *caches, pip = first
     assert files == "0" and home != tmp and caches == ["", "", ""]  # as on a new machine
