@@ -57,7 +57,7 @@ def _print_command(words: Sequence[str], width: int) -> None:
     for text in (usage, *about):
         print(textwrap.fill(text, width) + "\n")
     color = None if os.environ.get("NO_COLOR") else "auto"
-    page = io.StringIO()  # rich flushes what it writes to, and ends the process where a pipe is closed
+    page = io.StringIO()  # not the output: rich flushes it, and exits with 1 where it is closed
     is_terminal = bool(sys.stdout) and sys.stdout.isatty()
     console = Console(file=page, width=width, color_system=color, force_terminal=is_terminal)
     app.help_print([], console=console)
