@@ -19,7 +19,7 @@ import pytest
 from hypothesis import Phase, settings
 
 os.environ.setdefault("MPLBACKEND", "agg")
-# before NumPy: workers share the cores, and oracles, which are no questions, have small matrices too
+# before NumPy: workers share the cores, and oracles, which are no questions, have small matrices
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # what is compiled is kept, as on a user's machine: a hundred child processes import the package,
 # and each worker the tests
