@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import inspect
+import io
 import os
 import shutil
+import sys
 import textwrap
 from collections.abc import Sequence
 
@@ -55,10 +57,11 @@ def _print_command(words: Sequence[str], width: int) -> None:
     for text in (usage, *about):
         print(textwrap.fill(text, width) + "\n")
     color = None if os.environ.get("NO_COLOR") else "auto"
-    console = Console(width=width, color_system=color)
-    with console.capture() as page:  # rich would end the process where a pipe is closed
-        app.help_print([], console=console)
-    print(page.get(), end="")
+    page = io.StringIO()  # not the output: rich flushes it, and exits with 1 where it is closed
+    is_terminal = bool(sys.stdout) and sys.stdout.isatty()
+    console = Console(file=page, width=width, color_system=color, force_terminal=is_terminal)
+    app.help_print([], console=console)
+    print(page.getvalue(), end="")
 
 
 def _paragraphs(kind: type) -> list[str]:

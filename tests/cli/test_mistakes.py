@@ -81,8 +81,9 @@ def test_an_entry_of_a_field_shows_the_field(capsys):
     assert app.main(["fields", "gain.z"]) == 2
 
 
-def test_a_help_page_in_a_closed_pipe_ends_like_other_output():
-    """As of `hapticclay run --help | head`."""
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_help_page_in_a_closed_pipe_ends_like_other_output(unbuffered):
+    """As of `hapticclay run --help | head`; Python writes when it must, or at once."""
     read, write = os.pipe()
     os.close(read)
     with os.fdopen(write, "w") as closed:
@@ -90,6 +91,7 @@ def test_a_help_page_in_a_closed_pipe_ends_like_other_output():
             [sys.executable, "-m", "hapticclay", "run", "--help"],
             stdout=closed,
             stderr=subprocess.PIPE,
+            env=dict(os.environ, PYTHONUNBUFFERED=unbuffered),
         )
     assert (done.returncode, done.stderr) == (141, b"")
 
