@@ -20,8 +20,8 @@ from .console import ends
 
 HELP = frozenset(("-h", "--help"))
 
-# Matrices here are small: BLAS threads that wait for each other take up to ten times as long.
-# Before NumPy; whoever sets it decides.
+# Questions limit BLAS to one thread; a command has no other use for more, which NumPy would start
+# and which child processes would inherit: 20 ms on two cores. Whoever sets it decides.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
