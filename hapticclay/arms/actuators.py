@@ -73,7 +73,7 @@ def _actuator_sides(model: Any, i: int) -> tuple[float, float]:
         low, high = min(low, -by_control[0]), min(high, by_control[1])
     ratio = gear(model, i)
     sides = float(low) * abs(ratio), float(high) * abs(ratio)
-    return sides if ratio > 0.0 else sides[::-1]
+    return sides if ratio > 0.0 else (sides[1], sides[0])
 
 
 def _is_motor(model: Any, i: int) -> bool:

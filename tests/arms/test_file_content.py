@@ -57,7 +57,7 @@ def test_random_content_moves_an_arm_as_plain_mujoco_does(seed):
 @examples(6)
 @given(seed=st.integers(0, 10**6))
 def test_energy_is_balanced_with_random_content(seed):
-    """Of second order in the step: a quarter of it leaves a sixteenth of the rest, 0.2 with noise."""
+    """Of second order in the step: a quarter of it leaves a sixteenth of the rest, or noise."""
     random = np.random.default_rng(seed)
     text = random_arm(random)
     arm = of(text, pose=random.normal(0.0, 0.3, mujoco.MjModel.from_xml_string(text).nq).tolist())
