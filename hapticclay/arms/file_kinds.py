@@ -83,7 +83,7 @@ def _first_tag(path: Path) -> str:
         parser.Parse(content(path), True)
     except _Read:
         pass
-    except (expat.ExpatError, ValueError, LookupError) as error:  # of an unknown encoding, too
+    except (expat.ExpatError, LookupError) as error:  # of an unknown encoding, too
         other = f"must be MJCF or URDF, which are XML ({error})"
         raise ParameterError("file", str(path), ENDINGS.get(path.suffix.lower(), other)) from None
     return found[0] if found else ""

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import ParameterError, choice, is_series, number
-from . import handles, islands, limbs, model_file
+from . import actuators, content, handles, islands, limbs, model_file, passive
 from .mechanism import Mechanism
 
 LIGHTEST = 1e-12  # [kg.m^2] least eigenvalue of M of a mechanism with an inverse
@@ -56,17 +56,16 @@ def load(arm: Any) -> Loaded:
         ParameterError: the file cannot be loaded, or holds no arm of this kind.
     """
     file = model_file.opened(arm.file)
-    held = handles.handle(file.model, arm.site, _named_joints(file.model, arm.joints))
-    joints = _arm_joints(file.model, arm.joints, held.chain)
-    islands.check_kinds(file.model, joints)
+    grip = handles.handle(file.model, arm.site, _named_joints(file.model, arm.joints))
+    joints = _arm_joints(file.model, arm.joints, grip.chain)
     _refuse_lacking(file, joints)
     key = keyframe(file.model, arm.pose)
     position = file.model.qpos0 if key is None else file.model.key_qpos[key]
-    model, numbers, locked = islands.hold(file.spec, file.model, position, held.site)
-    joints = [numbers[j] for j in joints]
-    outside = [*locked, *islands.release(model, joints)]
-    _refuse_tendons(model)
-    site = held.site
+    model, numbers, locked = islands.hold(file.spec, file.model, position, grip.site)
+    joints, site = [numbers[j] for j in joints], grip.site
+    outside = [*locked, *islands.release(model, joints), *content.off(model)]
+    passive.settle(model)
+    content.refuse(model)
     pose = _pose(model, arm.pose, joints)
     names = tuple(model.joint(j).name for j in joints)
     dofs = [int(model.jnt_dofadr[j]) for j in joints]
@@ -75,17 +74,19 @@ def load(arm: Any) -> Loaded:
         "joints": names,
         "site": None if site is None else handles.name(model, site),
     }
+    mechanism = Mechanism(model, dofs, site, pose)
+    _check_joints(mechanism, names)
+    passive.carry_friction(model, dofs, mechanism.following, mechanism.follow())
     for field, of in IN_MODEL.items():
         values = getattr(model, of)
         values[dofs] = _per_joint(model, field, getattr(arm, field), joints, values[dofs])
         _refuse_negative(field, values, model)
         fields[field] = tuple(values[dofs].tolist())
-    limits = _file_limits(model, joints)
+    limits = actuators.torque_limits(model, joints)
     given = _per_joint(model, "torque_limit", arm.torque_limit, joints, limits)
     _refuse_no_torque(names, given)
     fields["torque_limit"] = tuple(given)
-    mechanism = Mechanism(model, dofs, site, pose)
-    _check_mechanism(mechanism, names)
+    _check_inertia(mechanism, names)
     fields["pose"] = {model.joint(j).name: float(q) for j, q in enumerate(mechanism.pose)}
     own = _notes(model, arm, mechanism, joints)
     return Loaded(
@@ -93,8 +94,8 @@ def load(arm: Any) -> Loaded:
         mechanism,
         fields,
         _ranges(model, joints),
-        (*own, *held.notes, *outside, *_moved(model, arm, mechanism, pose), *file.notes),
-        held.names,
+        (*own, *grip.notes, *outside, *_moved(model, arm, mechanism, pose), *file.notes),
+        grip.names,
     )
 
 
@@ -109,22 +110,6 @@ def _refuse_lacking(file: model_file.Opened, joints: Sequence[int]) -> None:
                 f"<inertial> for {link}"
             )
             raise ParameterError("mesh", mesh, bound)
-
-
-# ---- what is refused of the file ---------------------------------------------------------------
-
-
-def _refuse_tendons(model: Any) -> None:
-    """Tendons may tie joints; a tendon with mechanics of its own is refused."""
-    for i in range(model.ntendon):
-        own = [
-            name
-            for name in ("stiffness", "damping", "frictionloss", "armature")
-            if np.any(getattr(model, f"tendon_{name}")[i])
-        ]
-        if own:
-            bound = f"must have no {own[0]}: an arm's tendons may only tie joints"
-            raise ParameterError("tendon", model.tendon(i).name, bound)
 
 
 # ---- joints --------------------------------------------------------------------------------------
@@ -151,6 +136,7 @@ def _arm_joints(model: Any, wanted: Any, chain: Sequence[int]) -> list[int]:
         chosen = islands.driven(model, chain)
     if not chosen:
         raise ParameterError("joints", None, "must be named: no joint moves the handle")
+    islands.check_kinds(model, chosen)
     return chosen
 
 
@@ -237,13 +223,6 @@ def _pose(model: Any, given: Any, joints: list[int]) -> np.ndarray:
     return start
 
 
-def _file_limits(model: Any, joints: list[int]) -> np.ndarray:
-    """Largest torque of each joint to both sides that the file allows, infinite for none."""
-    low, high = model.jnt_actfrcrange[joints].T
-    limited = model.jnt_actfrclimited[joints] > 0
-    return np.where(limited, np.maximum(np.minimum(-low, high), 0.0), math.inf)
-
-
 def _refuse_no_torque(names: Sequence[str], limits: Sequence[float]) -> None:
     """A motor pushes to both sides: a file's range (0, 5) leaves it nothing to one of them."""
     for name, limit in zip(names, limits, strict=True):
@@ -260,8 +239,8 @@ def _ranges(model: Any, joints: list[int]) -> np.ndarray:
 # ---- what is refused, and what is noted ----------------------------------------------------------
 
 
-def _check_mechanism(mechanism: Mechanism, names: Sequence[str]) -> None:
-    """Refuses constraints that leave the arm free or stuck, and joints without inertia."""
+def _check_joints(mechanism: Mechanism, names: Sequence[str]) -> None:
+    """Refuses constraints that leave the arm free or stuck."""
     if mechanism.overclosed():
         bound = "must be free to move each by itself: constraints of the file tie them"
         raise ParameterError("joints", list(names), bound)
@@ -271,6 +250,10 @@ def _check_mechanism(mechanism: Mechanism, names: Sequence[str]) -> None:
             "more can move under the constraints of the file"
         )
         raise ParameterError("joints", list(names), bound)
+
+
+def _check_inertia(mechanism: Mechanism, names: Sequence[str]) -> None:
+    """Refuses joints without inertia."""
     inertia = mechanism.at(mechanism.pose[mechanism.dofs]).inertia
     if not np.linalg.eigvalsh(inertia).min() > LIGHTEST:
         light = names[int(np.diag(inertia).argmin())]
@@ -331,8 +314,11 @@ def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> lis
         tied = [model.joint(j).name for j in mechanism.following]
         notes.append(f"constraints, taken as rigid, move {', '.join(tied)}")
         notes += _anchors(model)
-    if model.nu:
-        notes.append(f"{model.nu} actuators of the file take no part")
+    if model.nactuator:
+        notes.append(f"{model.nactuator} actuators of the file take no part")
     if np.any(model.geom_contype | model.geom_conaffinity):
         notes.append("contacts of the file take no part")
-    return notes
+    if arm.torque_limit is None:
+        notes += actuators.limit_notes(model, joints, names)
+    by_joint = {j: model.joint(j).name for j in range(model.njnt)}
+    return [*notes, *content.noted(model, by_joint, mechanism.dofs, mechanism.following)]

@@ -15,6 +15,7 @@ import numpy as np
 from ..display import one_line
 from ..errors import ParameterError, choice
 from . import file_kinds, geometry, includes, urdf_text
+from .joint_names import name_joints
 
 UNNAMED = "MuJoCo Model"  # MuJoCo's name of a model without one
 MOST_OF_FAULT = 300  # characters of what MuJoCo says
@@ -92,6 +93,7 @@ def _read(file: Any) -> tuple[Any, str, tuple[str, ...], dict[str, str]]:
 
     if isinstance(file, mujoco.MjSpec):
         spec, name = file.copy(), file.modelname
+        name_joints(spec)
         return spec, name, *geometry.drop(spec, None)
     path = _path(file)
     if file_kinds.is_urdf(path):
@@ -103,6 +105,7 @@ def _read(file: Any) -> tuple[Any, str, tuple[str, ...], dict[str, str]]:
         spec, notes = includes.spec_of(path)
     spec.compiler.fusestatic = False  # a URDF's tool keeps its name
     name = spec.modelname if spec.modelname != UNNAMED else path.stem
+    name_joints(spec)
     more, lacking = geometry.drop(spec, path)
     return spec, name, (*notes, *more), lacking
 

@@ -21,7 +21,7 @@ from . import file_kinds, geometry
 from .places import place_of
 
 KEPT = ("mujoco", "link", "joint")  # children of <robot> that MuJoCo reads
-POINT = 2e-15  # [kg.m^2] moments of a mass in a point: MuJoCo wants more than 1e-15
+POINT = 2e-14  # [kg.m^2] moments of a mass in a point: MuJoCo wants more than 1e-14
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 HELD = ("floating", "planar")
 
