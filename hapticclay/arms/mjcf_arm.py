@@ -40,8 +40,8 @@ class MjcfArm:
             each joint of the arm; None for the file's. Then those of the arm's joints.
         damping: viscous damping of the joints [N.m.s/rad], 0 to 1e6, likewise.
         friction: Coulomb friction of the joints [N.m], 0 to 1e6, likewise.
-        gravity: "compensated" if the controller holds the arm against gravity, by the torque for
-            the measured joint positions; "acts" if nothing does.
+        gravity: "compensated" if the host holds the arm against gravity under any controller, by
+            the torque for the measured joint positions; "acts" if nothing does.
         torque_limit: largest torque of each joint's motor [N.m], > 0, likewise; None for that of
             the file, or none.
         plane: in runs, the axes of the world, such as "xy" or "zx", in which clay and forces lie
