@@ -1,7 +1,6 @@
 """Public names given what they do not take: a ParameterError in one short line, and no other."""
 
 import inspect
-import signal
 import sys
 
 import numpy as np
@@ -12,9 +11,9 @@ from hypothesis import strategies as st
 import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.cli.commands import COMMANDS
+from tests.waiting import alarm
 
 MOST = 800  # characters of a message: name, value and bound
-PATIENCE = 20.0  # [s], as an alarm: a wrong value is no work
 LONG_RUNS = ("studies.identify", "studies.drift_map")  # do with what they have
 
 
@@ -101,14 +100,9 @@ def ways(name, call, value):
 
 @pytest.fixture(autouse=True)
 def in_time():
-    def late(number, frame):
-        raise TimeoutError
-
-    before = signal.signal(signal.SIGALRM, late)
-    signal.setitimer(signal.ITIMER_REAL, PATIENCE)
-    yield
-    signal.setitimer(signal.ITIMER_REAL, 0.0)
-    signal.signal(signal.SIGALRM, before)
+    """What waits for ever fails rather than hangs."""
+    with alarm():
+        yield
 
 
 @pytest.mark.filterwarnings("ignore")

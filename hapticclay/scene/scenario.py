@@ -448,10 +448,12 @@ def _check_arm(s: Scenario) -> None:
             raise ParameterError(name, getattr(s, name), bound)
     if len(arm.names) > MOST_JOINTS:
         raise ParameterError("arm", arm.name, f"must have at most {MOST_JOINTS} joints in runs")
-    arm.mechanism.check_weight()
     limits: Any = arm.torque_limit
     if isinstance(law, JointPD) and law.runs == "drive" and any(map(math.isfinite, limits)):
-        bound = "must be none where drives run the law, whose limits are not simulated"
+        bound = (
+            "must be none where drives run the law, whose limits are not simulated: "
+            f"MjcfArm(torque_limit={[math.inf] * len(arm.names)})"
+        )
         raise ParameterError("arm.torque_limit", limits, bound)
     if io is not None and io.dac_bits and not all(map(math.isfinite, limits)):
         bound = "must be finite where a converter gives the torques, whose range it is"

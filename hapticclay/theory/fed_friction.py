@@ -25,7 +25,8 @@ from ..results import Result, Tables
 from . import roots
 from .client_loop import Delay, Sample
 from .joint_gains import Study
-from .joint_loop import FREE, JointLoop, timing_words
+from .joint_loop import JointLoop, timing_words
+from .rest import FREE
 
 DECADES = 3  # of the rate 1/k, searched on either side of it
 PER_DECADE = 6

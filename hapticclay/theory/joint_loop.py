@@ -20,10 +20,10 @@ from ..arms import joint_law
 from ..display import time_words
 from ..errors import ParameterError
 from . import linear_loop
+from .rest import FREE
 
 MOST_STATES = 1200  # largest order of a map whose eigenvalues are computed
 AT_REST = 1e-6  # modes this near to z = 1 may be rest
-FREE = 1e-9  # of the largest stiffness: smaller ones are none
 ROUNDING = 1e-10  # of an eigenvalue
 
 

@@ -19,8 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from . import joint_crossings
-from .joint_loop import AT_REST, FREE, MOST_STATES, ROUNDING, near_resonances
-from .pair_loop import NO_DRAG, PairLoop
+from .joint_loop import AT_REST, MOST_STATES, ROUNDING, near_resonances
+from .pair_loop import PairLoop
+from .rest import FREE, NO_DRAG
 
 SLOWEST = 1e-4  # [rad] least angle of the search
 TURN = 1e-6  # of an angle: of differences

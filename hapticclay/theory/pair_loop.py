@@ -14,12 +14,9 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import ParameterError
-from .joint_loop import FREE, MOST_STATES, is_stable
+from .joint_loop import MOST_STATES, is_stable
 from .pair_end import End
-
-NO_DRAG = 1e-12  # of balanced equations
-TURN = 1e-5  # of z: of differences of derivatives
-STEP = 1e-30  # of a complex step: a derivative without rounding
+from .rest import FREE, Rest, balanced
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +129,7 @@ class PairLoop:
     @cached_property
     def structural(self) -> int:
         """Directions in which the pair rests anywhere: eigenvalues at 1 that are no verdict."""
-        size = np.linalg.svd(_balanced(self._at_rest)[0], compute_uv=False)
+        size = np.linalg.svd(balanced(self._at_rest)[0], compute_uv=False)
         return int(np.sum(size <= FREE * size[0]))
 
     @cached_property
@@ -168,16 +165,8 @@ class PairLoop:
         return out
 
     @cached_property
-    def _rest(self) -> tuple[np.ndarray, np.ndarray]:
-        """L and R: T(1) R = 0 and L' T(1) = 0, as many columns as directions of rest."""
-        whole, rows, columns = _balanced(self.equations(1.0).real)
-        left, _, right = np.linalg.svd(whole)
-        kept = len(whole) - self.structural
-        return rows[:, None] * left[:, kept:], columns[:, None] * right[kept:].T
-
-    def _slope(self, z: float = 1.0) -> np.ndarray:
-        """T'(z)."""
-        return self.equations(z + 1j * STEP).imag / STEP
+    def _rest(self) -> Rest:
+        return Rest(self.equations, self.structural)
 
     @cached_property
     def _inputs(self) -> np.ndarray:
@@ -190,52 +179,33 @@ class PairLoop:
 
     def shape(self, z: complex) -> tuple[np.ndarray, np.ndarray]:
         """Motion of leader and follower at an eigenvalue, shape (n,) each."""
-        whole, _, columns = _balanced(self.equations(z))
+        whole, _, columns = balanced(self.equations(z))
         X = columns * np.linalg.svd(whole)[2][-1].conj()
         start = self.leader.size
         return X[: self.leader.n], X[start : start + self.follower.n]
 
-    @cached_property
+    @property
     def free(self) -> int:
         """Directions of rest in which nothing resists steady motion: eigenvalues 1 once more."""
-        if not self.structural:
-            return 0
-        size = np.linalg.svd(self.drag(), compute_uv=False)
-        return int(np.sum(size <= max(FREE * size[0], NO_DRAG)))
+        return self._rest.free
 
     def drag(self) -> np.ndarray:
-        """Resistance to steady motion, L' T'(1) R: singular where a direction of rest has none."""
-        L, R = self._rest
-        return L.T @ self._slope() @ R
+        """Resistance to steady motion: singular where a direction of rest has none."""
+        return self._rest.drag
 
     def steady_trend(self) -> int:
-        """What one more sample does where drag is singular: 1 if the real eigenvalue 1 leaves.
-
-        With z = 1 + e and n more samples: e (w' L' (T''/2 R u + T' X)) = -n w' dD/dN u, where
-        D u = 0, w' D = 0 and T X = -T' R u.
-        """
-        L, R = self._rest
-        left, _, right = np.linalg.svd(L.T @ self._slope() @ R)
-        w, u = L @ left[:, -1], R @ right[-1]
-        first = self._slope()
-        second = (self._slope(1.0 + TURN) - self._slope(1.0 - TURN)) / (2.0 * TURN)
-        X = np.linalg.lstsq(self.equations(1.0).real, -first @ u, rcond=FREE)[0]
-        later = self.between(self.there + 1, self.back)._slope() - first
-        return 1 if (w @ (0.5 * second @ u + first @ X)) * (w @ later @ u) < 0.0 else -1
+        """What one more sample does where drag is singular: 1 if the real eigenvalue 1 leaves."""
+        return self._rest.trend(self.between(self.there + 1, self.back)._rest)
 
     def drift(self) -> np.ndarray:
         """Measured rates per constant torque in steady motion [rad/(N.m.s)], shape (n, n).
 
-        Of X = R x/(z - 1) + Y near z = 1, T Y = B e - T' R x. Between samples the rate is another
-        one where drives pull on: by the ripple of the held torque.
+        Between samples the rate is another one where drives pull on: by the ripple of the held
+        torque.
         """
         if not self.structural:
             return np.zeros((self.n, self.n))
-        L, R = self._rest
-        moved = R @ np.linalg.lstsq(self.drag(), L.T @ self._inputs, rcond=NO_DRAG)[0]
-        whole, rows, columns = _balanced(self.equations(1.0).real)
-        pushed = self._inputs - self._slope() @ moved
-        Y = columns[:, None] * np.linalg.lstsq(whole, rows[:, None] * pushed, rcond=FREE)[0]
+        Y = self._rest.drift(self._inputs)[1]
         v = self.leader.columns["v"], self.follower.columns["v"]
         return np.vstack([Y[v[0]], Y[self.leader.size :][v[1]]])
 
@@ -362,21 +332,6 @@ def _resting(end: End) -> tuple[np.ndarray, np.ndarray]:
     out[n : n + k, n : n + k] += np.eye(k)
     out[n + k :, n + k :] = np.eye(m)
     return out, of(end.control.message)
-
-
-def _balanced(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A matrix with rows and columns of like size, and their factors."""
-    rows, columns = np.ones(len(matrix)), np.ones(matrix.shape[1])
-    for _ in range(3):
-        scaled = rows[:, None] * matrix * columns
-        rows /= np.sqrt(_sizes(scaled, 1))
-        columns /= np.sqrt(_sizes(scaled, 0))
-    return rows[:, None] * matrix * columns, rows, columns
-
-
-def _sizes(matrix: np.ndarray, axis: int) -> np.ndarray:
-    largest = np.abs(matrix).max(axis)
-    return np.where(largest > 0.0, largest, 1.0)
 
 
 def _joined(leader: np.ndarray, follower: np.ndarray, arrived: np.ndarray, n: int) -> np.ndarray:

@@ -12,6 +12,7 @@ import pytest
 from hapticclay.cli import app
 from hapticclay.ports import Exchanges, LoopReport
 from tests.ports.conftest import Client, tick
+from tests.waiting import PATIENCE
 
 
 def session_of(words, client_of, tmp_path):
@@ -30,7 +31,7 @@ def session_of(words, client_of, tmp_path):
     client_of(client)
     client.socket.close()
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, err
     return tmp_path / "s", line + out, err
 
@@ -115,7 +116,7 @@ def test_both_ends_of_a_pair_are_served_and_their_record_is_written(tmp_path):
         for client in (hand, tool):
             client.socket.close()
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
+        out, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0 and not err and "controllers and link took" in out
     assert [x.split(":")[0] for x in lines[:2]] == ["leader", "follower"]
     for end in ("leader", "follower"):

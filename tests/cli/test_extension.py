@@ -24,6 +24,7 @@ from hapticclay.studies.sampling import parse_grid
 from hapticclay.studies.store import read_sweep
 from hapticclay.studies.sweep import Sweep
 from hapticclay.views import sweep_plots
+from tests.waiting import PATIENCE
 
 
 @dataclasses.dataclass(frozen=True)
@@ -287,6 +288,6 @@ def test_a_command_imports_what_it_needs(words, heavy):
         f"print([m for m in {heavy!r} if m in sys.modules], file=sys.stderr)"
     )
     out = subprocess.run(
-        [sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=PATIENCE
     )
     assert out.stderr == "[]\n"

@@ -11,6 +11,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.cli import app
+from hapticclay.cli.commands import COMMANDS
 from hapticclay.errors import MissingPackage, needing
 from hapticclay.views import film
 
@@ -37,7 +38,6 @@ def folder(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "line, said",
     [
-        ("", "hapticclay --help says what each is for"),
         ("lab", "lab needs source: one of wall, zwidth, delay, jnd, pair"),
         ("lab walls", "did you mean 'wall'?"),
         ("identify push.csv", "; give --columns t=time input=cmd output=pos"),
@@ -81,8 +81,22 @@ def test_an_entry_of_a_field_shows_the_field(capsys):
     assert app.main(["fields", "gain.z"]) == 2
 
 
-def test_a_help_page_in_a_closed_pipe_ends_like_other_output():
-    """As of `hapticclay run --help | head`."""
+@pytest.mark.parametrize("words", ["", "--help"])
+def test_each_command_is_listed_once(words, capsys, monkeypatch):
+    """Alone, `hapticclay` says what most people need, and names the rest."""
+    monkeypatch.setenv("COLUMNS", "200")  # a line each
+    assert app.main(words.split()) == 0
+    out, err = capsys.readouterr()
+    lines = [line for line in out.splitlines() if ":" not in line[:12]]
+    listed = [line.split()[0] for line in lines if line.startswith("  ")]
+    named = [x for line in lines for x in line.partition(": ")[2].split(", ") if x in COMMANDS]
+    names = listed if words else listed + [x for x in named if x not in listed]
+    assert sorted(names) == sorted(COMMANDS) and not err
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_help_page_in_a_closed_pipe_ends_like_other_output(unbuffered):
+    """As of `hapticclay run --help | head`; Python writes when it must, or at once."""
     read, write = os.pipe()
     os.close(read)
     with os.fdopen(write, "w") as closed:
@@ -90,6 +104,7 @@ def test_a_help_page_in_a_closed_pipe_ends_like_other_output():
             [sys.executable, "-m", "hapticclay", "run", "--help"],
             stdout=closed,
             stderr=subprocess.PIPE,
+            env=dict(os.environ, PYTHONUNBUFFERED=unbuffered),
         )
     assert (done.returncode, done.stderr) == (141, b"")
 

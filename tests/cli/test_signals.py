@@ -9,6 +9,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.cli import app, console
+from tests.waiting import PATIENCE
 
 RUN = ["run", "constant", "--dt", "1e-6", "--every", "100", "--no-plots", "--out"]
 SIGNALS = [signal.SIGTERM, signal.SIGHUP]
@@ -37,7 +38,9 @@ sys.exit(app.main())
 def test_a_run_keeps_its_samples(tmp_path, how, ignored):
     ignore = (lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)) if ignored else None
     words = [sys.executable, "-c", WAIT, str(int(how)), *RUN, str(tmp_path)]
-    done = subprocess.run(words, capture_output=True, text=True, preexec_fn=ignore, timeout=120)
+    done = subprocess.run(
+        words, capture_output=True, text=True, preexec_fn=ignore, timeout=PATIENCE
+    )
     assert done.returncode == 128 + how and "Traceback" not in done.stderr
     assert "status: interrupted at" in done.stdout
     assert hc.Record.load(tmp_path).outcome.code == "interrupted"

@@ -14,6 +14,7 @@ import hapticclay as hc
 from hapticclay.cli import app
 from hapticclay.gym import dataset
 from hapticclay.studies import store
+from tests.waiting import PATIENCE
 
 CUT, NAME = "CutLine-v0", "hapticclay/test/a-v0"
 OF_WORDS = ["gym", "dataset", CUT, "--name", NAME]
@@ -136,7 +137,7 @@ dataset.record("CutLine-v0", sys.argv[1], 4, progress=end)
 def test_a_killed_recording_goes_on_with_any_number_of_episodes(folder, episodes):
     """Two of four are kept; the data set is that of a call of its own with that many."""
     pytest.importorskip("minari")
-    killed = subprocess.run([sys.executable, "-c", KILLED, NAME], timeout=120)
+    killed = subprocess.run([sys.executable, "-c", KILLED, NAME], timeout=PATIENCE)
     assert killed.returncode == -signal.SIGKILL
     counts = []
     dataset.record(CUT, NAME, episodes, progress=counts.append)

@@ -16,6 +16,7 @@ from hapticclay.kernel import dynamics, engine, mover, path, records
 from hapticclay.model.signals import Multisine
 from hapticclay.views import stage
 from tests.oracles.links import Links
+from tests.waiting import PATIENCE
 
 
 def test_operational_inertia_at_home_is_read_from_the_engine():
@@ -204,7 +205,7 @@ def test_threads_that_collect_warnings_get_their_own_and_leave_things_as_they_we
     def second():
         with engine.warnings_caught() as caught:
             both.set()
-            first_over.wait(10.0)
+            first_over.wait(PATIENCE)
             diverge()
         found["second"] = caught
 
@@ -213,7 +214,7 @@ def test_threads_that_collect_warnings_get_their_own_and_leave_things_as_they_we
         with engine.warnings_caught() as caught:
             thread = threading.Thread(target=second)
             thread.start()
-            both.wait(10.0)
+            both.wait(PATIENCE)
             diverge()
         first_over.set()
         thread.join()

@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import math
-import time
 from contextlib import contextmanager
 
 import numpy as np
@@ -24,6 +23,7 @@ from hapticclay.ports.driven_arm import Drive
 from hapticclay.ports.server import DeviceServer
 from hapticclay.ports.service import Service
 from hapticclay.views.window import Window
+from tests.waiting import until
 
 HAND = hc.Scenario(operator=hc.Operator(0.25, 2.0, 300.0), force=(0.0, 0.0))
 FREE = hc.free()
@@ -80,25 +80,26 @@ def test_programs_drive_the_arm_while_the_mouse_is_the_hand(tmp_path):
     session = ServedSession(FREE, stiffness=10.0)
     with played(session) as (server, player), connect(server.url) as socket:
         first = json.loads(socket.recv())["inverse3"][0]["state"]["cursor_position"]
-        end = time.monotonic() + 10.0
-        x = first["x"]
-        while x < first["x"] + 1e-3 and time.monotonic() < end:
+
+        def pushed():
             socket.send(tick(2.0))
             state = json.loads(socket.recv())["inverse3"][0]["state"]
-            x = state["cursor_position"]["x"]
-        assert x >= first["x"] + 1e-3 and state["current_cursor_force"]["x"] == 2.0
+            is_away = state["cursor_position"]["x"] >= first["x"] + 1e-3
+            return is_away and state["current_cursor_force"]["x"] == 2.0
+
+        until(pushed, pause=0.0)
         with player.lock:
             sight = Window(session).look([], (0.0, 0.03))  # the mouse pulls along y
             assert sight.writing.verdict.startswith("1 program drives the arm")
-        while session.arm.force != (0.0, 0.0) and time.monotonic() < end:
-            time.sleep(0.005)  # the watchdog
-        assert session.arm.force == (0.0, 0.0)
+        until(lambda: session.arm.force == (0.0, 0.0))  # the watchdog
         y = session.handle()[0][1]
-        while session.handle()[0][1] < y + 1e-4 and time.monotonic() < end:
+
+        def pulled():
             with player.lock:
                 session.pull((0.0, 0.2))
-            time.sleep(0.01)
-        assert session.handle()[0][1] >= y + 1e-4
+            return session.handle()[0][1] >= y + 1e-4
+
+        until(pulled)
         with player.lock:
             session.restart()
         socket.send("{}")
@@ -232,12 +233,10 @@ def test_a_player_paces_itself_by_the_device():
     with serve(HAND, clock="wall") as server, DeviceClient(server.url, limits) as client:
         session = DeviceSession(FREE, DeviceHand(client, Coupled(), (0.0, 0.0)))
         before = len(client.log)
-        player, end = Player(session), time.monotonic() + 20.0
+        player = Player(session)
         player.start()
-        while len(client.log) < before + 40 and time.monotonic() < end:
-            time.sleep(0.01)
+        until(lambda: len(client.log) >= before + 40)
         player.stop()
-        assert len(client.log) >= before + 40
         assert client.log.timing().rate < 201.0
 
 
@@ -269,10 +268,9 @@ def test_view_serves_the_arm_and_reports_the_loop(tmp_path, monkeypatch, capsys)
 
 def test_view_takes_a_device_as_the_hand(tmp_path, monkeypatch, capsys):
     def play(command, session):
-        player, end = Player(session), time.monotonic() + 10.0
+        player = Player(session)
         player.start()
-        while session.t < 0.3 and time.monotonic() < end:
-            time.sleep(0.01)
+        until(lambda: session.t >= 0.3)
         player.stop()
 
     monkeypatch.setattr(ViewCommand, "_play", play)

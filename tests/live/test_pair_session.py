@@ -1,12 +1,11 @@
 """A leader in a person's hand, its follower, and the verdict that stands beside them."""
 
-import time
-
 import numpy as np
 import pytest
 
 import hapticclay as hc
 from hapticclay.live.pair_session import PairSession, Theory
+from tests.waiting import until
 
 LAW = hc.JointPD((400.0,), (20.0,))
 DEVICE = hc.Device(0.5, 1.0)
@@ -18,10 +17,7 @@ def pair(law=LAW, **kw):
 
 
 def known(session):
-    end = time.monotonic() + 60.0
-    while session.theory.found is None and time.monotonic() < end:
-        time.sleep(0.01)
-    return session.theory.found
+    return until(lambda: session.theory.found)
 
 
 def test_a_held_handle_rests_where_three_springs_balance():
@@ -93,7 +89,4 @@ def test_theory_answers_the_newest_question():
     theory = Theory()
     for late in (2e-3, 4e-3, 6e-3):
         theory.ask(pair(link=hc.Link(delay=late)))
-    end = time.monotonic() + 60.0
-    while theory.found is None and time.monotonic() < end:
-        time.sleep(0.01)
-    assert theory.found.present == 6e-3
+    assert until(lambda: theory.found).present == 6e-3

@@ -7,7 +7,6 @@ import math
 import socket
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -121,11 +120,9 @@ def test_nobody_listening_neither_blocks_nor_fails():
         port = s.getsockname()[1]
     session, stream = Session(hc.free()), UdpStream(f"localhost:{port}")
     with contextlib.closing(stream):
-        begin = time.perf_counter()
         for _ in range(300):
             session.advance(FRAME_TIME)
             stream.send(session)
-        assert time.perf_counter() - begin < 60.0  # never waits; a second on this machine
         assert not stream._socket.getblocking()
     session.advance(FRAME_TIME)
     stream.send(session)  # closed: dropped as well

@@ -8,6 +8,7 @@ from websockets.sync.client import connect
 
 import hapticclay as hc
 from hapticclay.ports import serve
+from tests.waiting import PATIENCE
 
 SCENE = hc.Scenario(operator=hc.Operator(0.25, 2.0, 60.0), force=(0.0, 0.0))
 
@@ -27,7 +28,7 @@ class Client:
 
     def send(self, data):
         self.socket.send(data)
-        return json.loads(self.socket.recv(timeout=5.0))
+        return json.loads(self.socket.recv(timeout=PATIENCE))
 
     def state(self, data):
         return self.send(data)["inverse3"][0]["state"]

@@ -3,7 +3,6 @@
 import json
 import math
 import socket
-import time
 import urllib.error
 import urllib.request
 
@@ -19,6 +18,7 @@ from hapticclay.ports import ButtonScript, Inverse3, Trajectory, serve
 from hapticclay.ports.driven_arm import TARGET_STIFFNESS
 from hapticclay.ports.inverse import DEVICES
 from tests.ports.conftest import SCENE, tick
+from tests.waiting import PATIENCE, until
 
 PERIOD = 0.005
 
@@ -276,7 +276,7 @@ def test_http_beside_the_socket(served):
 def test_the_handshake_and_the_frames_as_bytes(served):
     """A header below 4 kB, no compression, one unfragmented text frame below 8 kB."""
     server, _ = served(period=PERIOD)
-    with socket.create_connection(("127.0.0.1", server.port), timeout=5.0) as raw:
+    with socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE) as raw:
         raw.sendall(
             b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\n"
             b"Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
@@ -296,18 +296,15 @@ def test_a_message_of_more_than_64_kB_ends_the_connection(served):
     c = client()
     c.socket.send(b" " * 70_000)
     with pytest.raises(ConnectionClosed) as closed:
-        c.socket.recv(timeout=5.0)
+        c.socket.recv(timeout=PATIENCE)
     assert closed.value.rcvd.code == 1009
 
 
 def test_the_watchdog_takes_a_stale_force_away(served):
     server, client = served(clock="wall")
     c = client()
-    assert c.state(tick(x=2.0))["current_cursor_force"]["x"] == 2.0
-    end = time.monotonic() + 5.0
-    while server.service.device.force != (0.0, 0.0) and time.monotonic() < end:
-        time.sleep(0.005)
-    assert server.service.device.force == (0.0, 0.0)
+    until(lambda: c.state(tick(x=2.0))["current_cursor_force"]["x"] == 2.0)
+    until(lambda: server.service.device.force == (0.0, 0.0))
     assert c.send("{}")["inverse3"][0]["state"]["control_mode"] == "idle"
 
 

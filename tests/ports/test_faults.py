@@ -6,7 +6,6 @@ import math
 import random
 import socket
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -21,13 +20,11 @@ from hapticclay.ports.rows import CHUNK, Rows
 from hapticclay.ports.server import DeviceServer
 from hapticclay.ports.service import MOST_LOGS, Service
 from tests.ports.conftest import SCENE, Client, tick
+from tests.waiting import PATIENCE, until
 
 
-def limp(server, within=5.0):
-    end = time.monotonic() + within
-    while server.service.device.force != (0.0, 0.0) and time.monotonic() < end:
-        time.sleep(0.005)
-    return server.service.device.force == (0.0, 0.0)
+def limp(server):
+    return until(lambda: server.service.device.force == (0.0, 0.0))
 
 
 def test_a_client_that_is_killed_leaves_no_force(served):
@@ -54,7 +51,7 @@ def test_rubbish_of_all_kinds(served):
     for size in range(0, 2000, 40):
         assert c.send(random.randbytes(size))["inverse3"]
     for raw in (b"\x00" * 100, b"GET / HTTP/1.1\r\n\r\n", b"\x16\x03\x01" + random.randbytes(80)):
-        with socket.create_connection(("127.0.0.1", server.port), timeout=5.0) as s:
+        with socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE) as s:
             s.sendall(raw)
     assert c.send("{}")["inverse3"]
     assert len(server.service.notices) <= 101
@@ -87,7 +84,7 @@ def test_half_open_sockets_and_a_slow_reader_stop_nobody(served):
         slow.socket.socket.shutdown(socket.SHUT_RDWR)
         for s in halves:
             s.close()
-        thread.join(timeout=10.0)
+        thread.join(timeout=PATIENCE)
 
 
 def test_many_clients_at_once(served):
@@ -102,7 +99,7 @@ def test_a_message_of_10_MB_ends_its_client_and_no_other(served):
     c, other = client(), client()
     with pytest.raises((ConnectionClosed, OSError)):
         c.socket.send(b" " * 10_000_000)
-        c.socket.recv(timeout=5.0)
+        c.socket.recv(timeout=PATIENCE)
     assert other.send("{}")["inverse3"] and server.service.clients <= 2
 
 
@@ -286,9 +283,7 @@ def test_a_simulation_that_fails_ends_the_device_and_says_why(clock, caplog):
     device = Failing(SCENE)
     with DeviceServer(Service(device, clock=clock)) as server:
         client = Client(server.url)
-        end = time.monotonic() + 10.0
-        while not server.service.ended and time.monotonic() < end:
-            client.send(tick(x=1.0))
+        until(lambda: client.send(tick(x=1.0)) and server.service.ended, pause=0.0)
         assert server.service.ended == "FloatingPointError: the law divides by nothing"
         last = device.t
         assert client.send(tick(x=1.0))["inverse3"] and device.t == last > 0.0

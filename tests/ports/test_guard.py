@@ -11,6 +11,7 @@ from websockets.sync.client import connect
 
 from hapticclay.ports import Inverse3, serve
 from tests.ports.conftest import SCENE, tick
+from tests.waiting import PATIENCE
 
 UPGRADE = (
     "Upgrade: websocket",
@@ -22,7 +23,7 @@ UPGRADE = (
 
 def status(port, *fields, target="/", host="127.0.0.1"):
     """The status of an answer to a request with these fields."""
-    with socket.create_connection((host, port), timeout=10.0) as s:
+    with socket.create_connection((host, port), timeout=PATIENCE) as s:
         lines = f"GET {target} HTTP/1.1", *fields, "", ""
         s.sendall("\r\n".join(lines).encode("latin-1"))
         words = s.makefile("rb").readline().split()

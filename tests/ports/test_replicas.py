@@ -10,6 +10,7 @@ from websockets.sync.client import connect
 
 import hapticclay as hc
 from hapticclay.ports import ButtonScript, Inverse3, Trajectory, serve
+from tests.waiting import PATIENCE
 
 SCENE = hc.Scenario(operator=hc.Operator(0.25, 2.0, 60.0), force=(0.0, 0.0))
 HAND = Trajectory.to((0.03, 0.0))
@@ -28,7 +29,7 @@ def isaac_lab(url, steps):
     seen, force, device_id, first = [], (0.0, 0.0, 0.0), None, True
     with connect(url, ping_interval=None) as ws:
         for _ in range(steps):
-            data = json.loads(ws.recv(timeout=1.0))
+            data = json.loads(ws.recv(timeout=PATIENCE))
             inverse3 = data.get("inverse3", [])
             grips = data.get("wireless_verse_grip", [])
             if first:
@@ -105,7 +106,7 @@ def test_saw_haply_service(url):
         for _ in range(20):
             push = {"set_cursor_force": {"values": {"x": 1.0, "y": 0.0, "z": 0.0}}}
             ws.send(json.dumps({"inverse3": [{"device_id": "05DA", "commands": push}]}))
-        answers = [json.loads(ws.recv(timeout=5.0)) for _ in range(20)]
+        answers = [json.loads(ws.recv(timeout=PATIENCE)) for _ in range(20)]
     xs = [a["inverse3"][0]["state"]["cursor_position"]["x"] for a in answers]
     assert xs == sorted(xs) and len(set(xs)) == 20
 
@@ -122,7 +123,7 @@ def test_ros2_driver(url):
         ws.send(json.dumps(probe).encode())
         for _ in range(10):
             ws.send(json.dumps(probe).encode())
-            frame = json.loads(ws.recv(timeout=5.0))
+            frame = json.loads(ws.recv(timeout=PATIENCE))
             assert frame["inverse3"][0]["state"]["cursor_position"]["x"] >= 0.08
 
 

@@ -2,7 +2,6 @@
 
 import json
 import math
-import threading
 import time
 
 import pytest
@@ -23,6 +22,7 @@ from hapticclay.ports.rosbridge import (
 from hapticclay.ports.service import REST, Service
 from tests.ports.conftest import SCENE
 from tests.ports.test_inverse import JSON
+from tests.waiting import PATIENCE, until
 
 PERIOD = 0.005
 SHOWN = Inverse3(protocol="rosbridge", buttons=ButtonScript((0.0,), (frozenset({"a"}),)))
@@ -55,7 +55,7 @@ class RosClient:
         return self.receive()
 
     def receive(self):
-        return json.loads(self.socket.recv(timeout=5.0))
+        return json.loads(self.socket.recv(timeout=PATIENCE))
 
     def wrench(self, x=0.0, y=0.0, z=0.0, topic="/arm/body/servo_cf"):
         force = {"x": x, "y": y, "z": z}
@@ -336,14 +336,13 @@ def test_a_subscriber_renders_a_wall_and_the_report_tells_it():
 def test_a_silent_client_lets_the_arm_go():
     with serve(SCENE, clock="wall", inverse3=SHOWN) as server:
         client = RosClient(server.url)
-        client.wrench(x=2.0)
-        end = time.monotonic() + 5.0
-        while server.service.device.force != (2.0, 0.0) and time.monotonic() < end:
-            threading.Event().wait(0.001)
-        assert server.service.device.force == (2.0, 0.0)
-        while server.service.device.force != (0.0, 0.0) and time.monotonic() < end:
-            threading.Event().wait(0.001)
-        assert server.service.device.force == (0.0, 0.0)
+
+        def pushed():
+            client.wrench(x=2.0)
+            return server.service.device.force == (2.0, 0.0)
+
+        until(pushed, pause=0.001)
+        until(lambda: server.service.device.force == (0.0, 0.0))
         client.socket.close()
 
 
@@ -360,12 +359,11 @@ def test_a_press_reaches_each_subscriber_of_buttons_however_throttled():
         for _ in range(30):  # 150 ms
             client.wrench()
         seen = {"/phantom/button": [], "/left/phantom/button": []}
-        while True:
-            try:
-                found = json.loads(client.socket.recv(timeout=0.2))
-            except TimeoutError:
-                break
-            if found["op"] == "publish":
-                seen[found["topic"]].append(found["msg"]["grey_button"])
+        while min(map(len, seen.values())) < 3:
+            message = client.receive()
+            if message["op"] == "publish":
+                seen[message["topic"]].append(message["msg"]["grey_button"])
+        with pytest.raises(TimeoutError):
+            client.socket.recv(timeout=0.1)
         client.socket.close()
     assert list(seen.values()) == [[0, 1, 0], [0, 1, 0]]

@@ -10,6 +10,7 @@ import pytest
 import hapticclay as hc
 from hapticclay.kernel import native
 from hapticclay.simulation import memory, one_run
+from tests.waiting import PATIENCE
 
 GB = 10**9
 WIRED = dataclasses.replace(
@@ -135,6 +136,8 @@ def test_a_process_may_have_less_than_the_machine():
         "raise SystemExit(app.main(['run', 'free', '--force', '0', '0', '--dt', '1e-5', '--t-max', "
         "'100']))"
     )
-    p = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    p = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE
+    )
     assert p.returncode == 2 and p.stdout == "" and p.stderr.count("\n") == 1, p.stderr
     assert p.stderr.startswith("hapticclay: every = 1: up to 10000002 samples take 4.3 GB")

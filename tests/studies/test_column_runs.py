@@ -12,6 +12,7 @@ import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.studies.column_runs import ColumnRuns, run_columns
 from hapticclay.studies.store import read_sweep
+from tests.waiting import PATIENCE
 
 pytest.importorskip("pyarrow")
 BASE = replace(hc.constant_cut(operator=hc.Operator()), length=None, t_max=0.004)
@@ -53,7 +54,7 @@ run_columns(BASE, HANDS, sys.argv[1], chunk=5, workers=1, progress=end)
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="POSIX")
 def test_a_killed_process_goes_on_from_its_whole_files(tmp_path):
-    killed = subprocess.run([sys.executable, "-c", KILLED, tmp_path], timeout=120)
+    killed = subprocess.run([sys.executable, "-c", KILLED, tmp_path], timeout=PATIENCE)
     assert killed.returncode == -signal.SIGKILL
     assert run_columns(BASE, HANDS, tmp_path, chunk=5, workers=1) == 8
     assert_whole(tmp_path)

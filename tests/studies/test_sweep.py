@@ -9,8 +9,6 @@ import re
 import signal
 import subprocess
 import sys
-import threading
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,6 +25,7 @@ from hapticclay.studies import store, store_runs, sweep, sweep_rows
 from hapticclay.studies.sampling import Range, parse_fixed, parse_grid
 from hapticclay.studies.sweep import Sweep
 from hapticclay.views import sweep_plots
+from tests.waiting import PATIENCE, alarm, until
 
 GRID = "b=10:1000:3log gain.x=1:2:2"
 
@@ -324,15 +323,12 @@ def test_interrupted_and_killed_sweeps_go_on(tmp_path, capsys, monkeypatch, how,
         text=True,
         start_new_session=True,
     ) as p:
-        for _ in range(600):
-            if len(list((out / "data").glob("part-*"))) >= 2 or p.poll() is not None:
-                break
-            time.sleep(0.05)
+        until(lambda: len(list((out / "data").glob("part-*"))) >= 2 or p.poll() is not None)
         if how == signal.SIGKILL:
             os.killpg(p.pid, how)
         else:
             p.send_signal(how)
-        said, told = p.communicate(timeout=60)
+        said, told = p.communicate(timeout=PATIENCE)
         assert p.returncode == code
     if how == signal.SIGINT:
         assert "resumes the sweep" in said and told.count(store_runs.FINISHING) == 1
@@ -404,16 +400,14 @@ def spawn(*args, **kw):
     )
 
 
-@pytest.fixture(scope="module")
-def scheduler(tmp_path_factory):
-    """The process of a scheduler, and its address."""
-    file = tmp_path_factory.mktemp("scheduler") / "scheduler.json"
+@pytest.fixture
+def scheduler(tmp_path):
+    """The process of a scheduler, and its address: one for each test, since tests end it."""
+    file = tmp_path / "scheduler.json"
     words = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
     process = spawn("distributed.cli.dask_scheduler", *words)
     try:
-        while not (file.is_file() and file.stat().st_size):
-            assert process.poll() is None
-            time.sleep(0.05)
+        until(lambda: file.is_file() and file.stat().st_size, alive=lambda: process.poll() is None)
         yield process, json.loads(file.read_text())["address"]
     finally:
         process.kill()
@@ -422,6 +416,8 @@ def scheduler(tmp_path_factory):
 
 def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path, scheduler):
     """A real scheduler, two worker processes without a nanny, one killed with work in hand."""
+    from distributed import Client
+
     s = Sweep("constant", parse_grid("b=10:1000:12log gain.x=1:2:2"), {"t_max": 0.5}, chunk=1)
     _, address = scheduler
     workers = []
@@ -438,6 +434,8 @@ def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path, scheduler
             )
             for _ in range(2)
         ]
+        with Client(address, set_as_default=False) as client:
+            client.wait_for_workers(2, timeout=PATIENCE)
         killed = []
 
         def kill(n):
@@ -447,7 +445,7 @@ def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path, scheduler
 
         far, here = tmp_path / "far", tmp_path / "here"
         assert sweep.run_sweep(s, far, scheduler=address, progress=kill) >= 24
-        assert killed and workers[0].wait(10) == -9
+        assert killed and workers[0].wait(PATIENCE) == -9
         sweep.run_sweep(s, here, workers=1)
         assert columns(store.read_sweep(far)) == columns(store.read_sweep(here))
     finally:
@@ -457,21 +455,33 @@ def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path, scheduler
 
 
 def test_unreachable_scheduler_is_one_line(tmp_path):
-    begin = time.monotonic()
-    with pytest.raises(ParameterError, match="scheduler"):
+    with alarm(), pytest.raises(ParameterError, match="scheduler"):  # dask alone tries for ever
         sweep.run_sweep(small(), tmp_path, scheduler="tcp://127.0.0.1:9")
-    assert time.monotonic() - begin < 60.0  # it ends: dask alone would try for ever by None
     assert 2.0 * store_runs.SCHEDULER_PATIENCE < 10.0  # dask tries for twice as long
 
 
+KILL_WHEN_ASKED = """
+import os, sys, time
+from distributed import Client
+client = Client(sys.argv[1])
+while not client.run_on_scheduler(lambda dask_scheduler: len(dask_scheduler.tasks)):
+    time.sleep(0.05)
+os.kill(int(sys.argv[2]), 9)
+os._exit(0)  # without a word about the scheduler
+"""
+
+
 def test_a_scheduler_that_dies_is_one_line(tmp_path, capfd, scheduler):
-    """The last test that needs it."""
+    """It dies once it has tasks; no worker is there, so the sweep waits for results."""
     process, address = scheduler
-    end = threading.Timer(1.0, process.kill)  # no worker is there: it waits for results
-    end.start()
-    with pytest.raises(ConnectionError, match="has gone; the same command resumes"):
-        sweep.run_sweep(small(), tmp_path, scheduler=address)
-    end.join()
+    killer = subprocess.Popen([sys.executable, "-c", KILL_WHEN_ASKED, address, str(process.pid)])
+    try:
+        with pytest.raises(ConnectionError, match="has gone; the same command resumes"):
+            sweep.run_sweep(small(), tmp_path / "sweep", scheduler=address)
+        assert killer.wait(PATIENCE) == 0
+    finally:
+        killer.kill()
+        killer.wait()
     assert capfd.readouterr().err == ""
 
 

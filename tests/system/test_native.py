@@ -23,6 +23,7 @@ import hapticclay as hc
 from hapticclay.errors import ParameterError
 from hapticclay.kernel import native, probe
 from hapticclay.simulation import engines
+from tests.waiting import PATIENCE
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = Path(native.__file__).parents[1]
@@ -92,13 +93,13 @@ def run(tmp_path_factory):
             file.write_text("")
         print(place.parent, engine, *files, sep="\t", file=started[-1].stdin, flush=True)
         if not started[-1].stdout.readline():
-            started[-1].wait(timeout=120)
+            started[-1].wait(timeout=PATIENCE)
         out, err = (file.read_text() for file in files)
         return out.split(), err.splitlines()
 
     yield in_a_process
     for process in started:
-        process.communicate(timeout=120)
+        process.communicate(timeout=PATIENCE)
 
 
 def changed(place, what):

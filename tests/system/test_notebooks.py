@@ -13,6 +13,7 @@ from IPython.utils.capture import capture_output
 
 from hapticclay.cli import app
 from hapticclay.studies import labs
+from tests.waiting import PATIENCE
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS = sorted((ROOT / "examples" / "notebooks").glob("*.ipynb"))
@@ -28,7 +29,7 @@ def in_a_kernel(book, folder, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
     client = nbclient.NotebookClient(
-        book, timeout=300, resources={"metadata": {"path": str(folder)}}
+        book, timeout=PATIENCE, resources={"metadata": {"path": str(folder)}}
     )
     client.execute()
     assert any(cell.get("outputs") for cell in book.cells)

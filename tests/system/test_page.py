@@ -9,7 +9,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ import hapticclay as hc
 from hapticclay.live.session import Session
 from hapticclay.model import constants
 from hapticclay.views.page import Page
+from tests.waiting import PATIENCE, until
 
 viser = pytest.importorskip("viser", reason="pip install 'hapticclay[web]'")
 CHROMIUM = (
@@ -45,7 +45,7 @@ def page():
     thread.start()
     yield made
     done.set()
-    thread.join(timeout=30.0)
+    thread.join(timeout=PATIENCE)
     assert not thread.is_alive()
 
 
@@ -56,7 +56,7 @@ def press(slider, key, times):
     for _ in range(times):
         shown = slider.get_attribute("aria-valuenow")
         slider.press(key)
-        expect(slider).not_to_have_attribute("aria-valuenow", shown, timeout=30_000)
+        expect(slider).not_to_have_attribute("aria-valuenow", shown, timeout=1e3 * PATIENCE)
 
 
 @pytest.mark.skipif(not CHROMIUM, reason="needs chromium (apt-get install chromium)")
@@ -66,18 +66,13 @@ def test_page_loads_and_its_sliders_change_the_simulation(page, tmp_path, capfd)
     with playwright.sync_playwright() as p:
         browser = p.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         tab = browser.new_page(viewport={"width": 720, "height": 400})
-        tab.set_default_timeout(150_000)  # software drawing, about a picture a second
+        tab.set_default_timeout(1e3 * PATIENCE)  # software drawing, about a picture a second
         tab.on("console", lambda m: troubles.append(m.text) if m.type == "error" else None)
         tab.on("pageerror", lambda e: troubles.append(str(e)))
         tab.goto(page.url)
         playwright.expect(tab).to_have_title("hapticclay")
         sliders = tab.locator("[role=slider]")
         sliders.nth(2).wait_for()
-
-        def until(condition, seconds=90.0):
-            end = time.monotonic() + seconds
-            while time.monotonic() < end and not condition():
-                tab.wait_for_timeout(50)
 
         press(sliders.nth(2), "ArrowRight", 2)
         # the page sends at most 20 values a second, of all sliders together: the last
@@ -148,18 +143,15 @@ def test_first_view_holds_arm_and_clay(scenario, width, height):
 
 
 def test_page_says_what_the_monitor_says(page):
-    deadline = time.monotonic() + 30.0
     page.gain.value = 3.0
-    while time.monotonic() < deadline and "no limit of K here" not in page.verdict.content:
-        time.sleep(0.05)
+    until(lambda: "no limit of K here" in page.verdict.content)
     assert (
         "stable" in page.verdict.content
     )  # in free space, where no gain is too much for this hand
     onset = hc.Outcome("diverged", 1.0, 1, "y", "growing <oscillation>")
     with page.player.lock:
         page.session.run.watch.onset, page.session._last_swing = onset, page.session.t + 1e3
-    while time.monotonic() < deadline and "UNSTABLE" not in page.verdict.content:
-        time.sleep(0.05)
+    until(lambda: "UNSTABLE" in page.verdict.content)
     assert "UNSTABLE since 1.0 s: growing &lt;oscillation&gt; of y" in page.verdict.content
 
 
@@ -167,12 +159,12 @@ def test_page_listens_on_this_machine_alone(page):
     assert page.url == f"http://127.0.0.1:{page.port}"
     assert page.server.get_port() == page.port
     with pytest.raises(ConnectionRefusedError):  # 127.0.0.2: open on all addresses only
-        socket.create_connection(("127.0.0.2", page.port), timeout=5.0)
+        socket.create_connection(("127.0.0.2", page.port), timeout=PATIENCE)
 
 
 def asked(port, *lines):
     """First line of the answer to a request of these lines."""
-    with socket.create_connection(("127.0.0.1", port), timeout=10.0) as s:
+    with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as s:
         s.sendall("\r\n".join((*lines, "", "")).encode("latin-1"))
         return s.makefile("rb").readline().decode().strip()
 
@@ -250,7 +242,7 @@ def test_a_socket_is_no_way_around_the_guard(page):
     assert page.server.get_port() == page.port
     speak: dict = {"subprotocols": [Subprotocol(f"viser-v{viser.__version__}")]}
     with connect(f"ws://127.0.0.1:{page.port}", **speak) as s:
-        assert s.recv(timeout=10.0)
+        assert s.recv(timeout=PATIENCE)
     with pytest.raises(InvalidStatus, match="403"):
         connect(f"ws://127.0.0.1:{page.port}", origin="http://evil.example", **speak)
     guarded = Page(Session(hc.constant_cut()), host="0.0.0.0", port=0)
@@ -260,7 +252,7 @@ def test_a_socket_is_no_way_around_the_guard(page):
             with pytest.raises(InvalidStatus, match="403"):
                 connect(f"ws://127.0.0.1:{guarded.port}", additional_headers=headers, **speak)
         with connect(f"ws://127.0.0.1:{guarded.port}", additional_headers=cookie, **speak) as s:
-            assert s.recv(timeout=10.0)
+            assert s.recv(timeout=PATIENCE)
     finally:
         guarded.close()
 
@@ -273,7 +265,7 @@ def test_a_viser_that_cannot_be_guarded_is_refused(monkeypatch):
 
 
 def answer(port, path="/", **headers):
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10.0)
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE)
     connection.request("GET", path, headers=headers)
     response = connection.getresponse()
     body = response.read()
@@ -328,7 +320,7 @@ def test_reset_while_the_hand_holds_goes_on(page):
     assert page.session.point is not None
     thread = threading.Thread(target=page._reset, args=(None,), daemon=True)
     thread.start()
-    thread.join(timeout=10.0)
+    thread.join(timeout=PATIENCE)
     assert not thread.is_alive() and page.session.point is None and not page.hold.value
 
 
@@ -338,7 +330,7 @@ def test_player_that_dies_leaves_no_server(monkeypatch):
     with pytest.raises(ZeroDivisionError):
         page.serve()
     with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(("127.0.0.1", page.server.get_port()), timeout=5.0)
+        socket.create_connection(("127.0.0.1", page.server.get_port()), timeout=PATIENCE)
 
 
 @contextlib.contextmanager
@@ -375,7 +367,7 @@ def test_ctrl_c_ends_it_and_the_record_is_there(tmp_path, host):
         )  # nothing else before
         assert answer(int(re.search(r":(\d+)", said)[1]))[0] in (200, 403)
         p.send_signal(signal.SIGINT)
-        out, err = p.communicate(timeout=60)
+        out, err = p.communicate(timeout=PATIENCE)
     assert p.returncode == 0 and "written to o" in out and "viser" not in out
     assert err.count("\n") == (host == "0.0.0.0") and ("warning" in err) == (host == "0.0.0.0")
     assert hc.Record.load(tmp_path / "o").outcome.code == "finished"
@@ -383,7 +375,7 @@ def test_ctrl_c_ends_it_and_the_record_is_there(tmp_path, host):
 
 def test_missing_viser_is_one_line_that_says_what_to_install(tmp_path):
     with started(tmp_path, before="sys.modules['viser'] = None") as p:
-        out, err = p.communicate(timeout=60)
+        out, err = p.communicate(timeout=PATIENCE)
     assert (
         (p.returncode, out) == (2, "")
         and err.count("\n") == 1
@@ -399,7 +391,7 @@ def test_guard_survives_noise(caplog, capfd):
     own = f"Host: 127.0.0.1:{page.port}"
     try:
         for noise in (b"\r\n\r\n", b"\xff" * 100 + b"\r\n\r\n", b"GET\r\n\r\n", b"x" * 100_000):
-            with socket.create_connection(("127.0.0.1", page.port), timeout=5.0) as s:
+            with socket.create_connection(("127.0.0.1", page.port), timeout=PATIENCE) as s:
                 s.sendall(noise)
         lines = ("GET http://[ HTTP/1.1", "GET //[ HTTP/1.1", "GET http://127.0.0.1/ HTTP/1.1")
         lines += ("POST / HTTP/1.1", "GET", "", "GET * HTTP/1.1", "GET /?token=%ff%00\xe9 HTTP/1.1")

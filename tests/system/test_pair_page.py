@@ -6,15 +6,17 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
 
 import hapticclay as hc
 from hapticclay.live.pair_session import PairSession
 from tests.system.test_page import CHROMIUM, FLAGS, answer, press
+from tests.waiting import PATIENCE, until
 
 viser = pytest.importorskip("viser", reason="pip install 'hapticclay[web]'")
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
@@ -43,7 +45,7 @@ def shown(pair):
         yield page
     finally:
         done.set()
-        thread.join(timeout=30.0)
+        thread.join(timeout=PATIENCE)
         assert not thread.is_alive()
 
 
@@ -54,13 +56,6 @@ def file(tmp_path):
     return path
 
 
-def until(condition, seconds=90.0):
-    end = time.monotonic() + seconds
-    while time.monotonic() < end and not condition():
-        time.sleep(0.05)
-    return condition()
-
-
 @pytest.mark.skipif(not CHROMIUM, reason="needs chromium (apt-get install chromium)")
 def test_sliders_restart_the_pair_with_a_later_link(file):
     playwright = pytest.importorskip("playwright.sync_api", reason="pip install playwright")
@@ -69,14 +64,14 @@ def test_sliders_restart_the_pair_with_a_later_link(file):
         page.session.paused = True  # Chromium has the processor until the sliders are there
         browser = p.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         tab = browser.new_page(viewport={"width": 720, "height": 400})
-        tab.set_default_timeout(150_000)
+        tab.set_default_timeout(1e3 * PATIENCE)
         tab.on("pageerror", lambda e: troubles.append(str(e)))
         tab.goto(page.url)
         slider = tab.locator("[role=slider]").nth(0)
         slider.wait_for()
         press(slider, "ArrowRight", 2)  # half a sample each
-        assert until(lambda: page.session.pair.link.delay == pytest.approx(6e-3))
-        assert until(lambda: "link 6 ms" in page.verdict.content)
+        until(lambda: page.session.pair.link.delay == pytest.approx(6e-3))
+        until(lambda: "link 6 ms" in page.verdict.content)
         playwright.expect(tab.get_by_text("delay left")).to_be_visible()
         browser.close()
     assert troubles == []
@@ -92,8 +87,8 @@ def drag(page, away):
 def test_the_hand_pulls_where_the_arrows_are(file):
     with shown(hc.Pair.load(file)) as page:
         drag(page, [0.05, 0.0, 0.0])
-        assert until(lambda: page.session.run.newest and page.session.run.newest[1][0] > 0.02)
-        assert until(lambda: "delay left" in page.status.content)
+        until(lambda: page.session.run.newest and page.session.run.newest[1][0] > 0.02)
+        until(lambda: "delay left" in page.status.content)
         page._reset(None)
         assert page.session.point is None and not page.hold.value
 
@@ -103,10 +98,10 @@ def test_a_change_of_gains_leaves_uneven_delays_as_the_file_has_them(file):
     pair = replace(hc.Pair.load(file), link=hc.Link(delay=(1.3e-3, 0.5e-3)), Ts=1e-3)
     with shown(pair) as page:
         page.gain.value = 1.5
-        assert until(lambda: page.session.gain == 1.5)
+        until(lambda: page.session.gain == 1.5)
         assert page.session.pair.link.delays == (1.3e-3, 0.5e-3)
         page.delay.value = 2.0
-        assert until(lambda: page.session.pair.link.delays == (2e-3, 2e-3))
+        until(lambda: page.session.pair.link.delays == (2e-3, 2e-3))
 
 
 def test_a_drag_that_begins_while_the_page_is_drawn_is_kept(file):
@@ -121,7 +116,7 @@ def test_a_drag_that_begins_while_the_page_is_drawn_is_kept(file):
 
         page._pose = drag_first
         assert drawn.wait(90.0)
-        assert until(lambda: page.session.run.newest and page.session.run.newest[1][0] > 0.02)
+        until(lambda: page.session.run.newest and page.session.run.newest[1][0] > 0.02)
         assert page.target.position[0] == pytest.approx(page._start[0] + 0.05)
 
 
@@ -133,7 +128,7 @@ def test_arms_stand_where_the_film_has_them(name):
     with shown(pair) as page:
         for i, parts in enumerate(page._parts):
             handle = arm.handle() + page._shift[i]
-            assert until(lambda h=handle, p=parts: np.allclose(p["knob"][0].position, h, atol=0.02))
+            until(lambda h=handle, p=parts: np.allclose(p["knob"][0].position, h, atol=0.02))
 
 
 def test_a_wall_stands_and_an_object_moves_with_the_handle(file):
@@ -142,7 +137,7 @@ def test_a_wall_stands_and_an_object_moves_with_the_handle(file):
     with shown(pair) as page:
         assert page._touched[0] is not None and page._touched[1] is None
         drag(page, [0.05, 0.0, 0.0])
-        assert until(lambda: page._touched[0].position[0] > 0.02)
+        until(lambda: page._touched[0].position[0] > 0.02)
 
 
 def test_ctrl_c_ends_it_and_the_record_is_there(file, tmp_path):
@@ -155,10 +150,14 @@ def test_ctrl_c_ends_it_and_the_record_is_there(file, tmp_path):
         try:
             said = p.stdout.readline()
             assert said.startswith("open http://")
-            assert answer(int(re.search(r":(\d+)", said)[1]))[0] == 200
-            time.sleep(0.5)
+            port = int(re.search(r":(\d+)", said)[1])
+            assert answer(port)[0] == 200
+            speak = [Subprotocol(f"viser-v{viser.__version__}")]
+            with connect(f"ws://127.0.0.1:{port}", subprotocols=speak, max_size=None) as tab:
+                for _ in range(4):  # the page, and what has changed since: it runs
+                    assert tab.recv(timeout=PATIENCE)
             p.send_signal(signal.SIGINT)
-            out, err = p.communicate(timeout=60)
+            out, err = p.communicate(timeout=PATIENCE)
         finally:
             p.kill()
     assert p.returncode == 0 and err == "" and "written to o" in out

@@ -5,7 +5,6 @@ import gc
 import json
 import os
 import random
-import signal
 import socket
 import struct
 import tracemalloc
@@ -30,8 +29,7 @@ from hapticclay.studies.replay import Recording
 from hapticclay.studies.store import read_sweep
 from hapticclay.studies.sweep import load_sweep
 from hapticclay.views.images import gray_image
-
-PATIENCE = 20  # [s], as an alarm: what waits for ever fails rather than hangs
+from tests.waiting import alarm
 
 
 def samples(path):
@@ -63,16 +61,9 @@ READERS = {  # by the name of the file
 
 @pytest.fixture(autouse=True)
 def in_time():
-    """A reader that blocks is interrupted."""
-
-    def late(number, frame):
-        raise TimeoutError
-
-    before = signal.signal(signal.SIGALRM, late)
-    signal.setitimer(signal.ITIMER_REAL, PATIENCE)
-    yield
-    signal.setitimer(signal.ITIMER_REAL, 0.0)
-    signal.signal(signal.SIGALRM, before)
+    """What waits for ever fails rather than hangs."""
+    with alarm():
+        yield
 
 
 def refused(read, path):

@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import psutil
@@ -20,6 +19,7 @@ from hapticclay.studies import store, store_runs, sweep
 from hapticclay.studies.sampling import parse_grid
 from hapticclay.studies.sweep import Sweep
 from tests.hunt import HUNTS
+from tests.waiting import PATIENCE, until
 
 RUNS = 40
 MORE = "10:1000:40log"  # values of b: twice the runs, so that a sweep is caught at work
@@ -62,16 +62,6 @@ def temporary(out):
         for f in out.rglob("*")
         if f.is_file() and f.name not in whole and not f.name.startswith("part-")
     ]
-
-
-def until(condition, seconds=60.0):
-    """Waits for it, but not for ever; whether it came."""
-    end = time.monotonic() + seconds
-    while not condition():
-        if time.monotonic() > end:
-            return False
-        time.sleep(0.02)
-    return True
 
 
 @pytest.fixture(scope="module")
@@ -176,10 +166,10 @@ def at_work(out, t_max=0.3, chunk=4, workers=2):
         text=True,
     ) as p:
         try:
-            assert until(
-                lambda: len(list((out / "data").glob("part-*"))) >= 2 or p.poll() is not None
+            until(
+                lambda: len(list((out / "data").glob("part-*"))) >= 2,
+                alive=lambda: p.poll() is None,
             )
-            assert p.poll() is None
             yield p, psutil.Process(p.pid).children(recursive=True)
         finally:
             p.kill()
@@ -198,14 +188,14 @@ def test_a_killed_parent_is_outlived_by_no_worker_and_no_lock(tmp_path, how):
         assert p.returncode == (-how if how == signal.SIGKILL else 128 + how)
         with store.claimed(ours, tmp_path) as (_, todo):
             assert 0 < len(todo) < 2 * RUNS
-        assert until(lambda: not any(map(alive, children)), 5.0)
+        until(lambda: not any(map(alive, children)))
     assert store.missing_parts(ours, tmp_path)  # none had gone on
 
 
 def test_a_killed_worker_is_one_line_and_the_sweep_goes_on(tmp_path):
     with at_work(tmp_path) as (p, children):
         next(c for c in children if "spawn_main" in " ".join(c.cmdline())).kill()
-        _, err = p.communicate(timeout=60)
+        _, err = p.communicate(timeout=PATIENCE)
         said = [line for line in err.splitlines() if " to go" not in line]
         assert p.returncode == 1 and len(said) == 1 and "worker was killed" in said[0]
     assert sweep.run_sweep(plan(MORE, t_max=0.3, chunk=4), tmp_path, workers=1) > 0
@@ -460,7 +450,7 @@ def test_the_command_says_in_one_line_that_its_folder_has_gone(tmp_path):
     out = tmp_path / "o"
     with at_work(out, workers=1) as (p, _):
         shutil.rmtree(out)
-        said, err = p.communicate(timeout=60)
+        said, err = p.communicate(timeout=PATIENCE)
     lines = [line for line in err.splitlines() if " to go" not in line]
     assert p.returncode == 1 and len(lines) == 1 and f"{out} was removed" in lines[0]
     assert "runs in" not in said and not out.exists()
@@ -478,7 +468,7 @@ def test_of_sweeps_started_at_once_one_wins_and_the_others_are_refused(tmp_path)
         )
         for x in b
     ]
-    ends = [(*p.communicate(timeout=120), p.returncode) for p in starts]
+    ends = [(*p.communicate(timeout=PATIENCE), p.returncode) for p in starts]
     assert sorted(code for _, _, code in ends) == [0, 2, 2], ends
     for said in (err for _, err, code in ends if code):
         assert said.count("\n") == 1

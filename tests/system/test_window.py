@@ -25,6 +25,7 @@ from hapticclay.live.session import Session
 from hapticclay.views import window
 from hapticclay.views.viewer import Pane
 from tests.hunt import HUNTS
+from tests.waiting import PATIENCE, until
 
 missing = [tool for tool in ("Xvfb", "xdotool") if not shutil.which(tool)]
 pytestmark = pytest.mark.skipif(
@@ -94,34 +95,24 @@ class Mouse:
             stderr=subprocess.PIPE,
             text=True,
         )
-        for _ in range(600):
-            found = subprocess.run(
-                ["xdotool", "search", "--name", "MuJoCo"],
-                env=screen,
-                capture_output=True,
-                text=True,
-            )
-            if found.stdout or self.program.poll() is not None:
-                break
-            time.sleep(0.1)
-        self.window = (
-            found.stdout.split()[0]
-            if found.stdout
-            else pytest.fail(f"no window: {self.program.communicate()}")
-        )
+        words = ["xdotool", "search", "--name", "MuJoCo"]
+
+        def windows():
+            return subprocess.run(words, env=screen, capture_output=True, text=True).stdout.split()
+
+        until(lambda: windows() or self.program.poll() is not None)
+        if not (shown := windows()):
+            pytest.fail(f"no window: {self.program.communicate()}")
+        self.window = shown[0]
         self.until(lambda now: now["pictures"] >= 5)
 
     def seen(self):
         """What the last picture was made of."""
         return json.loads(self.told.read_text()) if self.told.exists() else {"pictures": 0}
 
-    def until(self, condition, seconds=60.0):
+    def until(self, condition):
         """Wait for a picture of which this is true; fail if none comes."""
-        end = time.monotonic() + seconds
-        while not condition(now := self.seen()):
-            if time.monotonic() > end or self.program.poll() is not None:
-                pytest.fail(f"not within {seconds} s: {now}")
-            time.sleep(0.01)
+        until(lambda: condition(self.seen()), alive=lambda: self.program.poll() is None)
 
     def pictures(self, n):
         """Wait for n more pictures."""
@@ -140,7 +131,7 @@ class Mouse:
             self.pictures(pictures)
 
     def end(self, how):
-        """Closes the window and returns exit status and output; fails after a minute."""
+        """Closes the window and returns exit status and output."""
         if how == "Ctrl-Q":
             self.do("keydown", "ctrl", "key", "q", "keyup", "ctrl")
         elif how == "Ctrl-C":
@@ -150,10 +141,10 @@ class Mouse:
         else:
             self.do({"destroyed": "windowclose", "disconnected": "windowkill"}[how], self.window)
         try:
-            out, err = self.program.communicate(timeout=60)
+            out, err = self.program.communicate(timeout=PATIENCE)
         except subprocess.TimeoutExpired:
             self.program.send_signal(signal.SIGABRT)  # so that it says where it stands
-            pytest.fail(f"{how}: still running after a minute: {self.program.communicate()}")
+            pytest.fail(f"{how}: still running: {self.program.communicate()}")
         return self.program.returncode, out, err
 
     def close(self):

@@ -11,6 +11,7 @@ import pytest
 from hapticclay.errors import ParameterError
 from hapticclay.studies import Range, Sweep, run_sweep, store
 from tests.hunt import HUNTS
+from tests.waiting import PATIENCE
 
 STUDIES = {
     "sweep": """
@@ -40,7 +41,7 @@ def guarded(text):
 
 def run(words, folder, **kw):
     return subprocess.run(
-        words, cwd=folder, capture_output=True, text=True, timeout=120, check=False, **kw
+        words, cwd=folder, capture_output=True, text=True, timeout=PATIENCE, check=False, **kw
     )
 
 

@@ -17,6 +17,7 @@ from hapticclay.views.film import FilmOptions
 from hapticclay.views.running_plots import RunningPlots, plots_fit, running_figure
 from hapticclay.views.stage import Stage
 from tests.hunt import HUNTS
+from tests.waiting import PATIENCE
 
 
 def lens_works():
@@ -123,7 +124,7 @@ def filmed(folder, blocked, *outs):
         env=env,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
     )
     assert p.returncode == 2 and p.stderr.count("\n") == len(outs), p.stderr
     assert p.stdout == "" and list(folder.iterdir()) == []
@@ -172,7 +173,7 @@ def test_runs_need_no_gl_whatever_is_asked_for(tmp_path, wanted, blocked):
         env=env,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
     )
     assert p.stdout == f"time limit at 0.1000 s {wanted}\n", p.stderr
 
