@@ -9,7 +9,8 @@ import hapticclay as hc
 from hapticclay.ports.device import held_scenario
 
 ARM = """<mujoco><compiler angle="radian"/><worldbody><body>
-<joint name="a" axis="0 1 0" range="{}"/><inertial pos=".2 0 .03" mass="1" diaginertia=".01 .01 .01"/>
+<joint name="a" axis="0 1 0" range="{}"/>
+<inertial pos=".2 0 .03" mass="1" diaginertia=".01 .01 .01"/>
 <body pos=".31 .002 .017"><joint name="b" axis="0 1 0" range="-1 2"/>
 <inertial pos=".107 0 .021" mass=".53" diaginertia=".003 .003 .003"/><site name="ee" pos=".3 0 0"/>
 </body></body></worldbody></mujoco>"""
