@@ -12,6 +12,9 @@ import numpy as np
 
 from ..display import one_line
 from ..errors import ParameterError, choice, is_series, nearest, number
+from . import actuators, content, passive
+from .joint_names import name_joints
+from .joint_ranges import outside_words
 from .mechanism import Mechanism
 
 LIGHTEST = 1e-12  # [kg.m^2] least eigenvalue of M of a mechanism with an inverse
@@ -58,7 +61,9 @@ def load(arm: Any) -> Loaded:
     """
     model, name = compiled(arm.file)
     _refuse_joints(model)
-    _refuse_tendons(model)
+    off = tuple(content.off(model))
+    passive.settle(model)
+    content.refuse(model)
     site = _handle(model, arm.site)
     joints = _arm_joints(model, arm.joints, site)
     pose = _pose(model, arm.pose, joints)
@@ -69,24 +74,26 @@ def load(arm: Any) -> Loaded:
         "joints": names,
         "site": None if site is None else _name(model, site),
     }
+    mechanism = Mechanism(model, dofs, site, pose)
+    _check_joints(mechanism, names)
+    passive.carry_friction(model, dofs, mechanism.following, mechanism.follow())
     for field, of in IN_MODEL.items():
         values = getattr(model, of)
         values[dofs] = _per_joint(model, field, getattr(arm, field), joints, values[dofs])
         _refuse_negative(field, values, model)
         fields[field] = tuple(values[dofs].tolist())
-    limits = _file_limits(model, joints)
+    limits = actuators.torque_limits(model, joints)
     given = _per_joint(model, "torque_limit", arm.torque_limit, joints, limits)
     _refuse_no_torque(names, given)
     fields["torque_limit"] = tuple(given)
-    mechanism = Mechanism(model, dofs, site, pose)
-    _check_mechanism(mechanism, names)
+    _check_inertia(mechanism, names)
     fields["pose"] = {model.joint(j).name: float(q) for j, q in enumerate(mechanism.pose)}
     return Loaded(
         name,
         mechanism,
         fields,
         _ranges(model, joints),
-        (*_notes(model, arm, mechanism, joints), *_moved(model, arm, mechanism, pose)),
+        (*_notes(model, arm, mechanism, joints), *off, *_moved(model, arm, mechanism, pose)),
     )
 
 
@@ -100,6 +107,7 @@ def compiled(file: Any) -> tuple[Any, str]:
     with warnings_caught() as caught:
         try:
             spec, name = spec_of(file)
+            name_joints(spec)
             model = spec.compile()
         except ValueError as error:
             if isinstance(error, ParameterError):
@@ -173,19 +181,6 @@ def _refuse_joints(model: Any) -> None:
             body = model.body(model.jnt_bodyid[j]).name
             bound = f"must be a hinge or a slide, is {kind}: an arm stands on the world"
             raise ParameterError(f"joint of {body or 'a body'}", model.joint(j).name, bound)
-
-
-def _refuse_tendons(model: Any) -> None:
-    """Tendons may tie joints; a tendon with mechanics of its own is refused."""
-    for i in range(model.ntendon):
-        own = [
-            name
-            for name in ("stiffness", "damping", "frictionloss", "armature")
-            if np.any(getattr(model, f"tendon_{name}")[i])
-        ]
-        if own:
-            bound = f"must have no {own[0]}: an arm's tendons may only tie joints"
-            raise ParameterError("tendon", model.tendon(i).name, bound)
 
 
 # ---- handle and joints ---------------------------------------------------------------------------
@@ -321,13 +316,6 @@ def _pose(model: Any, given: Any, joints: list[int]) -> np.ndarray:
     return start
 
 
-def _file_limits(model: Any, joints: list[int]) -> np.ndarray:
-    """Largest torque of each joint to both sides that the file allows, infinite for none."""
-    low, high = model.jnt_actfrcrange[joints].T
-    limited = model.jnt_actfrclimited[joints] > 0
-    return np.where(limited, np.maximum(np.minimum(-low, high), 0.0), math.inf)
-
-
 def _refuse_no_torque(names: Sequence[str], limits: Sequence[float]) -> None:
     """A motor pushes to both sides: a file's range (0, 5) leaves it nothing to one of them."""
     for name, limit in zip(names, limits, strict=True):
@@ -344,8 +332,8 @@ def _ranges(model: Any, joints: list[int]) -> np.ndarray:
 # ---- what is refused, and what is noted ----------------------------------------------------------
 
 
-def _check_mechanism(mechanism: Mechanism, names: Sequence[str]) -> None:
-    """Refuses constraints that leave the arm free or stuck, and joints without inertia."""
+def _check_joints(mechanism: Mechanism, names: Sequence[str]) -> None:
+    """Refuses constraints that leave the arm free or stuck."""
     if mechanism.overclosed():
         bound = "must be free to move each by itself: constraints of the file tie them"
         raise ParameterError("joints", list(names), bound)
@@ -355,6 +343,10 @@ def _check_mechanism(mechanism: Mechanism, names: Sequence[str]) -> None:
             "more can move under the constraints of the file"
         )
         raise ParameterError("joints", list(names), bound)
+
+
+def _check_inertia(mechanism: Mechanism, names: Sequence[str]) -> None:
+    """Refuses joints without inertia."""
     inertia = mechanism.at(mechanism.pose[mechanism.dofs]).inertia
     if not np.linalg.eigvalsh(inertia).min() > LIGHTEST:
         light = names[int(np.diag(inertia).argmin())]
@@ -390,6 +382,18 @@ def _moved(model: Any, arm: Any, mechanism: Mechanism, pose: np.ndarray) -> Iter
             yield f"the pose of the file does not close the chain: {name} was moved by {gap:.3g}"
 
 
+def _pose_notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> Iterator[str]:
+    """Whose the pose is, unless it is given, and whether the arm can take it."""
+    homes = [model.key(i).name for i in range(model.nkey)]
+    whose = "key frame home of the file" if "home" in homes else "zero position of the file"
+    whose = whose if arm.pose is None else "as given"
+    names, q = [model.joint(j).name for j in joints], mechanism.pose[mechanism.dofs]
+    if beyond := outside_words(q, _ranges(model, joints), names):
+        yield f"pose: {whose}, at which {beyond}"
+    elif arm.pose is None:
+        yield f"pose: {whose}"
+
+
 def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> list[str]:
     """Sentences about what the file leaves open, and what of it takes no part."""
     names = [model.joint(j).name for j in joints]
@@ -402,11 +406,7 @@ def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> lis
             f"no rotor inertia (armature) at {', '.join(bare)}: limits of geared joints are then "
             "far too low"
         )
-    if arm.pose is None:
-        homes = [model.key(i).name for i in range(model.nkey)]
-        notes.append(
-            f"pose: {'key frame home' if 'home' in homes else 'zero position'} of the file"
-        )
+    notes += _pose_notes(model, arm, mechanism, joints)
     used = {*mechanism.dofs, *mechanism.following}
     locked = [model.joint(j).name for j in range(model.njnt) if j not in used]
     if locked:
@@ -415,8 +415,11 @@ def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> lis
         tied = [model.joint(j).name for j in mechanism.following]
         notes.append(f"constraints, taken as rigid, move {', '.join(tied)}")
         notes += _anchors(model)
-    if model.nu:
-        notes.append(f"{model.nu} actuators of the file take no part")
+    if model.nactuator:
+        notes.append(f"{model.nactuator} actuators of the file take no part")
     if np.any(model.geom_contype | model.geom_conaffinity):
         notes.append("contacts of the file take no part")
-    return notes
+    if arm.torque_limit is None:
+        notes += actuators.limit_notes(model, joints, names)
+    by_joint = {j: model.joint(j).name for j in range(model.njnt)}
+    return [*notes, *content.noted(model, by_joint, mechanism.dofs, mechanism.following)]

@@ -172,13 +172,18 @@ REFUSED = {
         {},
         "is ball",
     ),
-    "a springy tendon": (
+    "friction of a tendon": (
         xml(
             BODY.format(SITE),
-            '<tendon><fixed name="t" stiffness="1"><joint joint="j" coef="1"/></fixed></tendon>',
+            '<tendon><fixed name="t" frictionloss="1"><joint joint="j" coef="1"/></fixed></tendon>',
         ),
         {},
-        "stiffness",
+        "frictionloss = 't': must be 0",
+    ),
+    "a damper that gives energy": (
+        xml(BODY.format(SITE).replace("<joint", '<joint damping="1 -3 1"')),
+        {},
+        "must take energy at all rates",
     ),
     "no such site": (xml(BODY.format(SITE)), {"site": "handel"}, "did you mean 'handle'"),
     "two sites": (xml(BODY.format(SITE + '<site name="b"/>')), {}, "must be named"),
