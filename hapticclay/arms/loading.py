@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import ParameterError, choice, is_series, number
 from . import actuators, content, handles, islands, limbs, model_file, passive
+from .joint_ranges import outside_words
 from .mechanism import Mechanism
 
 LIGHTEST = 1e-12  # [kg.m^2] least eigenvalue of M of a mechanism with an inverse
@@ -289,6 +290,27 @@ def _moved(model: Any, arm: Any, mechanism: Mechanism, pose: np.ndarray) -> Iter
             yield f"the pose of the file does not close the chain: {name} was moved by {gap:.3g}"
 
 
+def _pose_notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> Iterator[str]:
+    """Whose the pose is, unless it is given, and whether the arm can take it."""
+    by_key = arm.pose is None or isinstance(arm.pose, str | int)
+    key = keyframe(model, arm.pose) if by_key else None
+    whose = (
+        "zero position of the file"
+        if key is None
+        else f"key frame {_key_name(model, key)} of the file"
+    )
+    whose = whose if by_key else "as given"
+    names, q = [model.joint(j).name for j in joints], mechanism.pose[mechanism.dofs]
+    if beyond := outside_words(q, _ranges(model, joints), names):
+        yield f"pose: {whose}, at which {beyond}"
+    elif by_key:
+        yield f"pose: {whose}"
+
+
+def _key_name(model: Any, key: int) -> str:
+    return model.key(key).name or str(key)
+
+
 def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> list[str]:
     """Sentences about what the file leaves open, and what of it takes no part."""
     names = [model.joint(j).name for j in joints]
@@ -301,11 +323,7 @@ def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> lis
             f"no rotor inertia (armature) at {', '.join(bare)}: limits of geared joints are then "
             "far too low"
         )
-    if arm.pose is None:
-        homes = [model.key(i).name for i in range(model.nkey)]
-        notes.append(
-            f"pose: {'key frame home' if 'home' in homes else 'zero position'} of the file"
-        )
+    notes += _pose_notes(model, arm, mechanism, joints)
     used = {*mechanism.dofs, *mechanism.following}
     locked = [model.joint(j).name for j in range(model.njnt) if j not in used]
     if locked:
