@@ -26,6 +26,7 @@ import hapticclay as hc
 from hapticclay import files
 from hapticclay.errors import ParameterError
 from hapticclay.results import json_ready
+from hapticclay.theory.joint_gains import Study, first_joint
 
 from . import common
 from .peers.held_arm import HeldArm, urdf_inertia
@@ -85,8 +86,8 @@ def loaded(file: Path, handle: str) -> tuple[hc.MjcfArm, str]:
     """An arm from a file without any option, or with its handle if that must be named."""
     try:
         return hc.MjcfArm(file), "answered"
-    except ParameterError as error:
-        if handle == "-" or error.field != "site":
+    except ParameterError:
+        if handle == "-":
             raise
     return hc.MjcfArm(file, site=handle), "answered, handle named"
 
@@ -99,17 +100,18 @@ def judged(file: Path, handle: str) -> dict[str, Any]:
     except ParameterError as error:
         return {"result": "refused", "why": str(error), "seconds": time.perf_counter() - begin}
     law = gains(arm)
-    limits = hc.theory.joint_limits(arm, law, TS, TS)
+    family = Study(arm, law, TS, TS).family("Kp")
+    limit = family.limit()
     return {
         "result": result,
         "seconds": time.perf_counter() - begin,
         "joints": list(arm.names),
         "handle": arm.site,
         "notes": list(arm.notes),
-        "scale": limits.scale,
-        "joint": limits.joint,
-        "buzz": limits.buzz,
-        **compared(file, arm, law, limits.scale),
+        "scale": limit.high,
+        "joint": arm.names[first_joint(family, limit)],
+        "buzz": limit.frequency(TS),
+        **compared(file, arm, law, limit.high),
     }
 
 
