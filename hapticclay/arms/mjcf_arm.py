@@ -15,7 +15,8 @@ from ..errors import ParameterError, array_of, choice
 from .loading import load
 from .mechanism import Linear, Mechanism
 
-PerJoint = Mapping[str, float] | Sequence[float] | None
+PerJoint = Mapping[str, float] | Sequence[float] | float | None
+Pose = Mapping[str, float] | Sequence[float] | str | int | None
 
 
 @named
@@ -24,8 +25,8 @@ class MjcfArm:
     """An arm that MuJoCo loads: any chain of hinges and slides, open or closed by constraints.
 
     Joints between the handle and the world are the arm's, unless `joints` names others; a joint
-    that equality constraints tie to them follows; all others are locked at the pose. Actuators,
-    contacts and joint limits of the file take no part. What the file leaves open is in `notes`.
+    that equality constraints tie to them follows; all others are locked at the pose. The file's
+    contacts and the forces of its actuators take no part. What the file leaves open is in `notes`.
 
     Attributes:
         file: MJCF or URDF file, an mujoco.MjSpec, or the name of an arm of the package: planar_2r,
@@ -33,17 +34,20 @@ class MjcfArm:
         site: site, or body, at which the hand holds the arm; None for the only site on a moving
             body.
         joints: names of the arm's joints, in the order of its gains; None for those between the
-            handle and the world. Then those in use.
+            handle and the world. Then those in use. Joints without a name in the file are joint 1,
+            joint 2, ... in its order.
         pose: joint positions [rad or m] by name, or one for each joint of the arm; None for the
             key frame "home", or the positions of the file. Then those of all joints, by name.
         armature: reflected inertia of the rotors [kg.m^2], 0 to 1e3, by joint name, or one for
-            each joint of the arm; None for the file's. Then those of the arm's joints.
+            each joint of the arm; None for the file's, actuators included. Then those of the arm's
+            joints.
         damping: viscous damping of the joints [N.m.s/rad], 0 to 1e6, likewise.
-        friction: Coulomb friction of the joints [N.m], 0 to 1e6, likewise.
-        gravity: "compensated" if the controller holds the arm against gravity, by the torque for
-            the measured joint positions; "acts" if nothing does.
+        friction: Coulomb friction of the joints [N.m], 0 to 1e6, likewise; that of joints which
+            follow them included.
+        gravity: "compensated" if the host holds the arm against gravity under any controller, by
+            the torque for the measured joint positions; "acts" if nothing does.
         torque_limit: largest torque of each joint's motor [N.m], > 0, likewise; None for that of
-            the file, or none.
+            the file's joints and actuators, or none.
         plane: in runs, the axes of the world, such as "xy" or "zx", in which clay and forces lie
             and which p, v and forces name x and y; None for the first two along which the handle
             moves.
@@ -52,7 +56,7 @@ class MjcfArm:
     file: Any
     site: str | None = None
     joints: Sequence[str] | None = None
-    pose: PerJoint = None
+    pose: Pose = None
     armature: PerJoint = None
     damping: PerJoint = None
     friction: PerJoint = None
@@ -184,7 +188,9 @@ class MjcfArm:
             ParameterError: neither `site` nor the file names one.
         """
         if self.site is None:
-            bound = "must name a site or body at the handle: the file has no site on a moving body"
+            names = self._loaded.handles  # type: ignore[attr-defined]
+            such = f", such as {', '.join(names)}" * bool(names)
+            bound = f"must name a site or body at the handle{such}: the file leaves it open"
             raise ParameterError("site", None, bound)
 
     def _place(self, q: Sequence[float] | np.ndarray | None) -> np.ndarray:

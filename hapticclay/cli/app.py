@@ -85,9 +85,14 @@ def _print_end(text: str) -> None:
 
 
 def parse_words(words: Sequence[str]) -> Callable[[], int] | None:
-    """The command of a command line; None if it asked for help, which is then printed."""
+    """The command of a command line; None if it asked for help or nothing: then help is printed."""
     if words[:1] == ["--version"]:
         words = ["version"]
+    if not words:
+        from .manual import print_overview
+
+        print_overview()
+        return None
     if words[:1] == ["help"]:
         words = [*words[1:2], "--help"]
     if not HELP.isdisjoint(words):

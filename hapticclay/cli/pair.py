@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from ..errors import Bound, ParameterError
 from ..files import writable
 from . import console
+from .log_options import NAMES as LOG_NAMES
 from .log_options import LogOptions, column_names
 from .options import Loose
 from .unused import Unused
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 OF_PAIR = ("map", "compare", "cells", "feel", "run", "film")
 OF_THEORY = ("delay", "kind", "Ts", "view", *OF_PAIR)
-OF_LOGS = ("columns", "band", "level", "units", "counts", "table", "where")
+OF_LOGS = ("columns", "band", "level", *LOG_NAMES)
 
 
 @dataclass(frozen=True)

@@ -34,9 +34,9 @@ def along_z(m, k, muscle, taken):
 
 
 def taken_by_joints(m, k, w, taken):
-    """What the dampers of the joints take in addition [J]."""
+    """What the dampers of the joints, and a fluid, take in addition [J]."""
     for i in range(m.joints):
-        force = k.L * joints.damping(m, w, i) + k.R * joints.damping(m, k.w, i)
+        force = k.L * joints.damping(m, w, i) + k.R * joints.damping(m, k.w, i) - joints.drag(m, i)
         taken += 0.5 * k.H * force * (w[i] + k.w[i])
     return taken
 

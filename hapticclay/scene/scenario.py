@@ -13,6 +13,7 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..arms.joint_law import JointPD, checked_law
+from ..arms.joint_ranges import outside
 from ..arms.mjcf_arm import MjcfArm
 from ..display import html_table, one_line
 from ..errors import Bound, ParameterError, choice, number, numbers_of, quantity
@@ -420,10 +421,10 @@ def _check_force(s: Scenario) -> None:
 
 def _check_pose(arm: MjcfArm) -> None:
     """Refuses a pose beyond the range of a joint, where a run would end at once."""
-    for name, q, (low, high) in zip(arm.names, arm.q, arm.ranges, strict=True):
-        if not low <= q <= high:
-            bound = f"must be within the range of the joint, {low:.4g} to {high:.4g}"
-            raise ParameterError(f"arm.pose.{name}", float(q), bound)
+    for i in outside(arm.q, arm.ranges):
+        low, high = arm.ranges[i]
+        bound = f"must be within the range of the joint, {low:.4g} to {high:.4g}"
+        raise ParameterError(f"arm.pose.{arm.names[i]}", float(arm.q[i]), bound)
 
 
 def _check_arm(s: Scenario) -> None:
@@ -448,10 +449,12 @@ def _check_arm(s: Scenario) -> None:
             raise ParameterError(name, getattr(s, name), bound)
     if len(arm.names) > MOST_JOINTS:
         raise ParameterError("arm", arm.name, f"must have at most {MOST_JOINTS} joints in runs")
-    arm.mechanism.check_weight()
     limits: Any = arm.torque_limit
     if isinstance(law, JointPD) and law.runs == "drive" and any(map(math.isfinite, limits)):
-        bound = "must be none where drives run the law, whose limits are not simulated"
+        bound = (
+            "must be none where drives run the law, whose limits are not simulated: "
+            f"MjcfArm(torque_limit={[math.inf] * len(arm.names)})"
+        )
         raise ParameterError("arm.torque_limit", limits, bound)
     if io is not None and io.dac_bits and not all(map(math.isfinite, limits)):
         bound = "must be finite where a converter gives the torques, whose range it is"

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..arms.joint_law import JointPD, compensated
+from ..arms.joint_ranges import widened
 from ..scene.scenario import Scenario
 from ..theory.client_loop import with_hands_of
 from ..theory.joint_gains import joint_loop
@@ -107,7 +108,8 @@ class JointMonitor:
     def _good(self, rows: np.ndarray, q: np.ndarray, rates: np.ndarray) -> tuple[int, Any]:
         """Number of rows before the first bad one: its code, joint and cause."""
         fast = ~(np.abs(rates) <= FASTEST)
-        out = (q < self.ranges[:, :1]) | (q > self.ranges[:, 1:])
+        low, high = widened(self.ranges).T
+        out = (q < low[:, None]) | (q > high[:, None])
         bad = fast | out | ~np.isfinite(rows).all(axis=0)
         good = int(bad.any(axis=0).argmax()) if bad.any() else rows.shape[1]
         if good == rows.shape[1]:

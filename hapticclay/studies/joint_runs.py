@@ -16,6 +16,7 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..arms.joint_law import JointPD, compensated
+from ..arms.joint_ranges import without_ranges
 from ..arms.mjcf_arm import MjcfArm
 from ..errors import ParameterError
 from ..model.hardware import Hardware
@@ -39,7 +40,6 @@ ROWS, LEAST_ROWS = 96, 12  # of the Hankel matrix, of all joints and of one
 RANKED = 1e-5  # smaller singular values are nonlinear motion
 AGREEMENT = 0.1  # of the expected growth or decay ...
 SLACK = 1e-4  # ... and of the angular frequency: what such a step leaves, of damped light joints
-ROOM = 2.0  # times SIZE that a joint must have to either end of its range
 ALIKE = 0.95  # of the largest motion: a joint that moves so much is not another one
 OFFSET, BUILT = 0.01, 1.0  # [rad] of the reference, and length [s], of the run as built
 
@@ -160,11 +160,10 @@ def joint_runs(
         progress: wraps the factors of the runs, to show how many are done.
 
     Raises:
-        ParameterError: as `joint_limits`; a joint is at the end of its range, or has no Kp and a
-            weight or spring pulls it away from the pose.
+        ParameterError: as `joint_limits`; a joint is outside its range, or has no Kp and a weight
+            or spring pulls it away from the pose.
     """
     study = Study(arm, law, Ts, delay)
-    _check_room(arm)
     scale = study.family("Kp").limit().high
     factors = [1.0]
     if math.isfinite(scale) and scale > 0.0:
@@ -255,7 +254,7 @@ def buzz(arm: MjcfArm, law: JointPD, Ts: float, delay: float) -> tuple[Record, M
 def near_limit(arm: MjcfArm, law: JointPD, Ts: float, delay: float, factor: float) -> Scenario:
     """Small motion of an arm at its pose, with all Kp times a factor: what the map describes."""
     n = len(arm.names)
-    free = replace(arm, friction=(0.0,) * n, torque_limit=(math.inf,) * n)
+    free = without_ranges(replace(arm, friction=(0.0,) * n, torque_limit=(math.inf,) * n))
     scaled = replace(law, Kp=tuple(factor * k for k in law.Kp))
     study = Study(free, scaled, Ts, delay)
     mode = expected_mode(study.loop)
@@ -324,16 +323,6 @@ def holding(arm: MjcfArm, law: JointPD) -> np.ndarray:
         bound = f"must be > 0 at {name}, which its weight or spring pulls away from the pose"
         raise ParameterError("Kp", law.Kp, bound)
     return arm.q + np.where(pulled, pull / np.where(Kp > 0.0, Kp, 1.0), 0.0)
-
-
-def _check_room(arm: MjcfArm) -> None:
-    """Refuses a pose at the end of a joint's range, where a run ends at once."""
-    low, high = arm.ranges.T
-    tight = (arm.q - low < ROOM * SIZE) | (high - arm.q < ROOM * SIZE)
-    if tight.any():
-        name = arm.names[int(tight.argmax())]
-        bound = f"must be within the range of {name}, not at its end, where a run would end"
-        raise ParameterError("pose", float(arm.q[int(tight.argmax())]), bound)
 
 
 def mode_of_run(record: Record, loop: JointLoop, expected: Mode) -> Mode:

@@ -11,6 +11,7 @@ import pytest
 
 import hapticclay as hc
 from hapticclay.cli import app
+from hapticclay.cli.commands import COMMANDS
 from hapticclay.errors import MissingPackage, needing
 from hapticclay.views import film
 
@@ -37,7 +38,6 @@ def folder(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "line, said",
     [
-        ("", "hapticclay --help says what each is for"),
         ("lab", "lab needs source: one of wall, zwidth, delay, jnd, pair"),
         ("lab walls", "did you mean 'wall'?"),
         ("identify push.csv", "; give --columns t=time input=cmd output=pos"),
@@ -79,6 +79,19 @@ def test_an_entry_of_a_field_shows_the_field(capsys):
     out = capsys.readouterr().out
     assert "\nclay.x.values = " in out and out.startswith("gain = 1,0.5")
     assert app.main(["fields", "gain.z"]) == 2
+
+
+@pytest.mark.parametrize("words", ["", "--help"])
+def test_each_command_is_listed_once(words, capsys, monkeypatch):
+    """Alone, `hapticclay` says what most people need, and names the rest."""
+    monkeypatch.setenv("COLUMNS", "200")  # a line each
+    assert app.main(words.split()) == 0
+    out, err = capsys.readouterr()
+    lines = [line for line in out.splitlines() if ":" not in line[:12]]
+    listed = [line.split()[0] for line in lines if line.startswith("  ")]
+    named = [x for line in lines for x in line.partition(": ")[2].split(", ") if x in COMMANDS]
+    names = listed if words else listed + [x for x in named if x not in listed]
+    assert sorted(names) == sorted(COMMANDS) and not err
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])

@@ -7,6 +7,7 @@ every trait of `model.support` under every method that takes it.
 import dataclasses
 import itertools
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -199,6 +200,15 @@ FILTERED = dict(
 )
 
 
+BENT = """<mujoco><option density="300" viscosity="1" gravity="0 -9.81 0"/><worldbody>
+<body gravcomp="0.5"><joint name="a" damping="0.1 0.2 0.1" stiffness="1 2 3" range="-3 3"/>
+<geom type="capsule" size="0.03" fromto="0 0 0 0.3 0 0"/><body pos="0.3 0 0">
+<joint name="b" ref="90" damping="0 0.3"/><geom type="capsule" size="0.02" fromto="0 0 0 0 0.2 0"/>
+<site name="handle" pos="0 0.25 0"/></body></body></worldbody><tendon><fixed name="t" damping="0.1"
+stiffness="5" springlength="0.2" armature="0.01"><joint joint="a" coef="1"/><joint joint="b"
+coef="-0.5"/></fixed></tendon></mujoco>"""
+
+
 def arms(method, **common):
     """Arms from files: planar, closed, spatial, with all that may act on them."""
     spring = (hc.Spring(), hc.Spring(k=300.0), hc.Spring())
@@ -222,6 +232,10 @@ def arms(method, **common):
             hardware=hc.Hardware(encoder=4096, delay=1.3e-3, dac_bits=12, jitter=2e-5),
         )  # fmt: skip
         out[card] = hc.Scenario(**parts | common)
+    bent = hc.MjcfArm(
+        mujoco.MjSpec.from_string(BENT), friction=[0.05, 0.02], torque_limit=[3.0, 3.0]
+    )
+    out["bent"] = dataclasses.replace(out["planar_2r"], arm=bent)
     return out | {"own law": dataclasses.replace(out["planar_2r"], controller=OWN)}
 
 

@@ -174,7 +174,7 @@ def kick_of(random, n, axes=2):
         joint_M=M.ravel(), joint_J=J.ravel(), moment=moment, pivots=np.zeros(n, int),
         matrix=np.full(2 * n * n + 2 * n, np.nan),
     )  # fmt: skip
-    m = SimpleNamespace(engine=e, joints=n, axes=axes, damper=damper, slip=slip, closed=0)
+    m = SimpleNamespace(engine=e, joints=n, axes=axes, damper=damper, slip=slip, computed=0)
     k = records.Kick()
     k.H, k.R, k.dxy = H, R, float(dxy)
     for i, o in enumerate((k.x, k.y, k.z)):

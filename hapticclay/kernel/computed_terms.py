@@ -1,7 +1,7 @@
-"""An arm whose chain is closed by constraints, which are projected out of the terms of its joints.
+"""The terms of an arm that Python computes, some 0.3 ms a step; the kernel calls it by address.
 
-The engine's own constraints are soft; here they hold exactly. Python computes the terms, some
-0.3 ms a step, and the kernel calls it by address.
+Its chain is closed by constraints, soft in the engine and here exact; or some of its passive forces
+are beyond a spring and a damper at each joint: polynomials, tendons, a fluid, weights in parts.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..arms.mechanism import Mechanism
 from ..scene.scenario import Scenario
 
 
-class ClosedChain:
+class ComputedTerms:
     """The functions that the kernel calls, which read and fill the arrays of a mover.
 
     Attributes:
@@ -29,7 +29,7 @@ class ClosedChain:
         self.rows = ["xyz".index(c) for c in arm.axes]
         self.pose, self.rates = places["pose"][:n], places["pose"][n:]
         self.inertia = places["joint_M"].reshape(n, n)
-        self.dampers = places["joint_D"].reshape(n, n)
+        self.dampers, self.drag = places["joint_D"].reshape(n, n), places["joint_F"]
         self.own_dampers = np.diag(arm.damping)
         self.J = places["joint_J"].reshape(3, n)
         self.bias, self.C = places["joint_bias"], places["joint_c"]
@@ -38,15 +38,16 @@ class ClosedChain:
         self.springs = [np.array(x) for x in of.springs]
 
     def at_pose(self, _: Any = None) -> None:
-        """Inertia, dampers of the followers, Jacobian and place of the handle."""
+        """Inertia, dampers at rest, Jacobian and place of the handle."""
         found = self.chain.at(self.pose)
         self.inertia[:], self.dampers[:] = found.inertia, found.damping - self.own_dampers
         self.J[: len(self.rows)] = found.jacobian[self.rows]
         self.handle[:] = self.chain.handle_place()
 
     def at_rates(self, _: Any = None) -> None:
-        """Bias torques, and the handle's centripetal acceleration."""
+        """Bias torques, dampers and drag, and the handle's centripetal acceleration."""
         found = self.chain.moving(self.rates)
+        self.dampers[:], self.drag[:] = found.damping - self.own_dampers, found.drag
         self.bias[:] = found.bias - self._own_springs()
         self.C[: len(self.rows)] = found.centripetal[self.rows]
 
