@@ -1,0 +1,161 @@
+"""From a file, or a spec, to a compiled model: what is read, what of it is left out, and warnings.
+
+Nothing of a file is run. Of its geometry only that stays from which inertia is computed.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..display import one_line
+from ..errors import ParameterError, choice
+from . import file_kinds, geometry, includes, urdf_text
+from .joint_names import name_joints
+
+UNNAMED = "MuJoCo Model"  # MuJoCo's name of a model without one
+MOST_OF_FAULT = 300  # characters of what MuJoCo says
+LEAST = 2e-15  # [kg, kg.m^2] of links without any: MuJoCo wants more than 1e-15 of what moves
+
+
+class Opened(NamedTuple):
+    """A model from a file.
+
+    Attributes:
+        spec: of it, without geometry that is of no use.
+        model: compiled.
+        name: of the model.
+        notes: what was left out, and what MuJoCo warned of.
+        lacking: links whose inertia comes from a mesh that is not there, and its file.
+    """
+
+    spec: Any
+    model: Any
+    name: str
+    notes: tuple[str, ...]
+    lacking: dict[str, str]
+
+
+def opened(file: Any) -> Opened:
+    """Reads and compiles a file, the name of an arm of the package, or a spec.
+
+    Raises:
+        ParameterError: it is not there, or no model; the message says what to do.
+    """
+    from ..physics import warnings_caught
+
+    with warnings_caught() as caught, warnings.catch_warnings(record=True) as shown:
+        warnings.simplefilter("always")
+        try:
+            spec, name, notes, lacking = _read(file)
+            model, more = compiled(spec)
+        except ValueError as error:
+            if isinstance(error, ParameterError):
+                raise
+            raise bad_file(file, one_line(error, MOST_OF_FAULT)) from None
+    for array in ("body_mass", "body_inertia", "dof_armature", "dof_damping", "jnt_axis"):
+        if not np.isfinite(getattr(model, array)).all():
+            raise bad_file(file, f"{array} is not finite")
+    told = [one_line(x, MOST_OF_FAULT) for x in (*caught, *(w.message for w in shown))]
+    heard = [f"MuJoCo warns: {x}" for x in dict.fromkeys(told) if not _is_of_saving(x)]
+    return Opened(spec, model, name, (*notes, *more, *heard), lacking)
+
+
+def spec_of(file: Any) -> tuple[Any, str]:
+    """The spec of a file, or a copy of a spec, and the name of its model.
+
+    Raises:
+        ParameterError: as `opened`.
+    """
+    spec, name, _, _ = _read(file)
+    return spec, name
+
+
+def kept(file: Any) -> Any:
+    """A path as text, which files can hold; of a spec, which its owner may change, a copy."""
+    if isinstance(file, os.PathLike):
+        return os.fspath(file)
+    return file if isinstance(file, str) else file.copy()
+
+
+def bad_file(file: Any, why: str) -> ParameterError:
+    shown = str(file) if isinstance(file, str | os.PathLike) else "MjSpec"
+    return ParameterError("file", shown, f"must be a file that MuJoCo loads ({why})")
+
+
+def _read(file: Any) -> tuple[Any, str, tuple[str, ...], dict[str, str]]:
+    """The spec, its name, notes, and links that lack the mesh of their inertia."""
+    from ..physics import mujoco
+
+    if isinstance(file, mujoco.MjSpec):
+        spec, name = file.copy(), file.modelname
+        name_joints(spec)
+        return spec, name, *geometry.drop(spec, None)
+    path = _path(file)
+    if file_kinds.is_urdf(path):
+        text, notes, armature = urdf_text.prepared(path)
+        spec = mujoco.MjSpec.from_string(text)
+        for joint in spec.joints:
+            joint.armature = armature.get(joint.name, joint.armature)
+    else:
+        spec, notes = includes.spec_of(path)
+    spec.compiler.fusestatic = False  # a URDF's tool keeps its name
+    name = spec.modelname if spec.modelname != UNNAMED else path.stem
+    name_joints(spec)
+    more, lacking = geometry.drop(spec, path)
+    return spec, name, (*notes, *more), lacking
+
+
+def compiled(spec: Any) -> tuple[Any, list[str]]:
+    """The model of a spec, and notes on inertia that is of no body.
+
+    Raises:
+        ValueError: MuJoCo refuses it.
+    """
+    notes: list[str] = []
+    for _ in range(3):
+        try:
+            return spec.compile(), notes
+        except ValueError as error:
+            fault, compiler = str(error), spec.compiler
+            if "mjMINVAL" in fault and not compiler.boundmass >= LEAST:
+                compiler.boundmass = LEAST
+                compiler.boundinertia = max(compiler.boundinertia, LEAST)
+            elif "A + B >= C" in fault and not compiler.balanceinertia:
+                compiler.balanceinertia = True
+                notes = ["inertia of no body (A + B < C): the mean of its three moments is taken"]
+            else:
+                raise
+    raise AssertionError
+
+
+def _is_of_saving(text: str) -> bool:
+    return "from being saved correctly" in text
+
+
+def _path(file: Any) -> Path:
+    """The path of a file, or of an arm of the package by its name."""
+    from ..physics import mjcf_folder
+
+    if not isinstance(file, str | os.PathLike):
+        raise ParameterError("file", file, "must be an MJCF or URDF file, or an mujoco.MjSpec")
+    path = Path(file)
+    is_name = isinstance(file, str) and not path.suffix and os.sep not in file
+    if is_name and not os.path.lexists(path):  # one of the package's
+        own = {x.stem: x for x in sorted((mjcf_folder() / "arms").glob("*.xml"))}
+        path = own[choice("file", file, tuple(own))]
+    if not os.path.isfile(path):
+        bound = f"must be an MJCF or URDF file ({_lacks(path)})"
+        raise ParameterError("file", str(path), bound)
+    return path
+
+
+def _lacks(path: Path) -> str:
+    """Why a path is no file."""
+    if str(path).lstrip().startswith("<"):
+        return "this is a model's text: give mujoco.MjSpec.from_string of it"
+    return "this is a folder" if os.path.isdir(path) else "there is none"
