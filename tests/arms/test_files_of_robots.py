@@ -144,17 +144,38 @@ def test_a_joint_that_nothing_turns_is_held(saved, kind):
     np.testing.assert_allclose(arm.handle(), [1.4, 0.0, 0.0], atol=1e-15)
 
 
-def test_inertia_of_no_body_is_noted(saved):
-    odd = link("la").replace('izz="0.01"', 'izz="0.04"')
+@pytest.mark.parametrize("turned", [0.0, 0.7])
+def test_inertia_of_no_body_is_taken_as_the_file_has_it(saved, turned):
+    """By rotating the tensor: MuJoCo refuses it, though no dynamics needs A + B >= C."""
+    odd = link("la").replace('ixx="0.01"', 'ixx="0.07"').replace('ixz="0"', 'ixz="0.02"')
+    odd = odd.replace('xyz="0.2 0 0"/>', f'xyz="0.2 0 0" rpy="0 0 {turned}"/>')
     arm = hc.MjcfArm(saved(robot(odd, *TWO[1:])), site="lb")
-    assert any("mean of its three moments" in x and x.endswith(": la") for x in arm.notes)
+    assert any("taken as the file has it: la" in x for x in arm.notes)
+    c, s = np.cos(turned), np.sin(turned)
+    own = np.array([0.0, 1.0, 0.0]) @ [[c, -s, 0], [s, c, 0], [0, 0, 1]]  # the axis in its frame
+    about = own @ [[0.07, 0, 0.02], [0, 0.01, 0], [0.02, 0, 0.01]] @ own
     gap = arm.mass_matrix() - M_OF_TWO
-    np.testing.assert_allclose(gap, [[0.01, 0.0], [0.0, 0.0]], atol=1e-15)  # the mean is 0.02
-    point = link("la").replace('"0.01"', '"0"')
-    arm = hc.MjcfArm(saved(robot(point, *TWO[1:])), site="lb")
+    np.testing.assert_allclose(gap, [[about - 0.01, 0.0], [0.0, 0.0]], atol=1e-15)
+
+
+@pytest.mark.parametrize("moment", ["0", "-1e-13"])
+def test_a_mass_in_a_point(saved, moment):
+    arm = hc.MjcfArm(saved(robot(link("la").replace('"0.01"', f'"{moment}"'), *TWO[1:])), site="lb")
     gap = arm.mass_matrix() - M_OF_TWO
-    np.testing.assert_allclose(gap, [[-0.01, 0.0], [0.0, 0.0]], atol=1e-13)
-    assert not any("moments" in x for x in arm.notes)
+    np.testing.assert_allclose(gap, [[-0.01, 0.0], [0.0, 0.0]], atol=2e-13)
+    assert not any("inertia of no body" in x for x in arm.notes)
+    tip = link("tip", (0.0, 0.0, 0.0)), joint("jt", "lb", "tip", kind="fixed", more="")
+    arm = hc.MjcfArm(saved(robot(*TWO, *tip)), site="tip")
+    np.testing.assert_allclose(arm.mass_matrix(), M_OF_TWO, atol=1e-13)
+
+
+def test_links_that_only_joints_name(saved):
+    """An undeclared world is the world; a tool that is not there is a frame."""
+    world = joint("w", "world", "base", 0.0, kind="fixed", more="")
+    tool = joint("t", "lb", "tool", 0.3, kind="fixed", more="")
+    arm = hc.MjcfArm(saved(robot(*TWO, world, tool)), site="tool")
+    np.testing.assert_allclose(arm.handle(), [0.7, 0.0, 0.0], atol=1e-15)
+    assert any(x.endswith("taken as empty: tool") for x in arm.notes)
 
 
 def test_links_without_mass_between_joints(saved):
