@@ -7,7 +7,7 @@ would name as the handle (- for none; + for a file that the one above includes).
 as OWNER+NAME/PATH; meshes that lie there are used, and with --fetch the files that are missing are
 got, without meshes. Each is loaded in a process of its own, as it is and without any option; if the
 answer is that the handle must be named, once more with it. Writes robot_files.md and
-robot_files.json; some ten minutes of processor time. The files are no part of this project.
+robot_files.json; some five minutes of processor time. The files are no part of this project.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ TS = 1e-3  # [s] control sample, and delay
 FREQUENCY, RATIO = 5.0, 0.7  # [Hz] and damping ratio of each joint alone under its gains
 BESIDE = 0.005  # share of the common limit, to either side
 ROUNDING = 1e-12  # relative, of M
+MOST_NAMES = 4  # in a cell
 
 
 class RobotFile(NamedTuple):
@@ -180,8 +181,18 @@ def cells(row: dict[str, Any]) -> list[str]:
         first if row["scale"] and math.isfinite(row["scale"]) else "none",
         _inertia(row),
         _limit(row),
-        "; ".join(x for x in row["notes"] if x.startswith(("locked", "held"))),
+        "; ".join(_short(x) for x in row["notes"] if "locked" in x or "held" in x),
     ]
+
+
+def _short(note: str) -> str:
+    """A note without the most of a long list of names."""
+    names = note.split(", ")
+    return (
+        note
+        if len(names) <= MOST_NAMES
+        else ", ".join(names[:MOST_NAMES]) + f", ... ({len(names)})"
+    )
 
 
 def _inertia(row: dict[str, Any]) -> str:

@@ -273,7 +273,8 @@ def _check_inertia(mechanism: Mechanism, names: Sequence[str]) -> None:
     if not np.linalg.eigvalsh(inertia).min() > LIGHTEST:
         light = names[int(np.diag(inertia).argmin())]
         bound = (
-            "must have an inertia: the links behind it have none along its axis, nor has a rotor"
+            "must have an inertia: the links behind it have none along its axis, nor has a rotor: "
+            f"state <inertial> in the file, or armature of {light} [kg.m^2]"
         )
         raise ParameterError("joint", light, bound)
 
