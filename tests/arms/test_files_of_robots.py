@@ -107,6 +107,19 @@ def test_a_link_whose_inertia_is_in_a_missing_mesh_is_named(saved):
     np.testing.assert_allclose(arm.mass_matrix(), M_OF_TWO, rtol=1e-14)
 
 
+@pytest.mark.parametrize("kind", ["fixed", "prismatic"])
+def test_a_tool_whose_mesh_is_not_there_is_counted_as_none(saved, kind):
+    """Texts of robots come without meshes; fingers and mounts often have no inertia in them."""
+    tool = link("tool", None, MESH.format("collision", "package://r/tool.stl"))
+    arm = hc.MjcfArm(saved(robot(*TWO, tool, joint("j3", "lb", "tool", kind=kind))), site="lb")
+    np.testing.assert_allclose(arm.mass_matrix(), M_OF_TWO, rtol=1e-12)  # 2e-15 kg for MuJoCo
+    assert arm.notes[0].startswith("no inertia in the file") and arm.notes[0].endswith(": tool")
+    assert not any("computed from geometry" in x for x in arm.notes)
+    wrist = TWO[0], link("lb", None), TWO[2], TWO[3], tool, joint("j3", "lb", "tool", kind=kind)
+    with pytest.raises(hc.ParameterError, match=r"tool\.stl|j2.*must have an inertia"):
+        hc.MjcfArm(saved(robot(*wrist)), site="lb")
+
+
 @pytest.mark.parametrize(
     "shape",
     ['<sphere radius="0"/>', '<box size="0.1 0 0.1"/>', '<cylinder radius="0.1" length="0"/>'],
