@@ -63,6 +63,7 @@ def load(arm: Any) -> Loaded:
     key = keyframe(file.model, arm.pose)
     position = file.model.qpos0 if key is None else file.model.key_qpos[key]
     model, numbers, locked = islands.hold(file.spec, file.model, position, grip.site)
+    file.finish(model)
     joints, site = [numbers[j] for j in joints], grip.site
     outside = [*locked, *islands.release(model, joints), *content.off(model)]
     passive.settle(model)
@@ -95,9 +96,22 @@ def load(arm: Any) -> Loaded:
         mechanism,
         fields,
         _ranges(model, joints),
-        (*own, *grip.notes, *outside, *_moved(model, arm, mechanism, pose), *file.notes),
+        (
+            *_guessed(file.guessed),
+            *own,
+            *grip.notes,
+            *outside,
+            *_moved(model, arm, mechanism, pose),
+            *file.notes,
+        ),
         grip.names,
     )
+
+
+def _guessed(links: Sequence[str]) -> Iterator[str]:
+    if links:
+        names = ", ".join(links)
+        yield f"no inertia in the file, computed from geometry at 1000 kg/m^3: {names}"
 
 
 def _refuse_lacking(file: model_file.Opened, joints: Sequence[int]) -> None:
@@ -259,7 +273,8 @@ def _check_inertia(mechanism: Mechanism, names: Sequence[str]) -> None:
     if not np.linalg.eigvalsh(inertia).min() > LIGHTEST:
         light = names[int(np.diag(inertia).argmin())]
         bound = (
-            "must have an inertia: the links behind it have none along its axis, nor has a rotor"
+            "must have an inertia: the links behind it have none along its axis, nor has a rotor: "
+            f"state <inertial> in the file, or armature of {light} [kg.m^2]"
         )
         raise ParameterError("joint", light, bound)
 
