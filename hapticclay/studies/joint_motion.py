@@ -24,7 +24,8 @@ STILL = 1e-12  # [rad] between two samples: less is rounding
 FEWEST = 24  # samples from which modes are read
 SEEN = 1e-2  # of the largest motion of a mode: smaller ones are no swing that a person would see
 PERIODS = 1.5  # of a swing that a run must show
-UNEXPLAINED = 0.05  # share of the motion that the modes may leave
+LARGEST = 0.05  # [rad, m] of motion about a pose
+UNEXPLAINED = 0.02  # share of the motion that the modes may leave
 
 
 class Mode(NamedTuple):
@@ -69,7 +70,7 @@ class JointMotion(Result):
 
     def tables(self) -> Tables:
         """One row per joint."""
-        return {"motion": {"joint": self.names, "share": self.shares}}
+        return {"motion": {"joint": self.names, "share": self.shares.tolist()}}
 
     def contents(self) -> dict[str, Any]:
         """The table, with growth and frequency."""
@@ -92,19 +93,23 @@ def joint_motion(record: Record) -> JointMotion:
     """
     arm, s = record.scenario.file_arm, record.scenario
     every = max(1, round(float(s.Ts or s.dt) / _step(record)))
-    q = record.q[:-1:every]
-    period = every * _step(record)
+    q, period = _small(record.q[:-1:every]), every * _step(record)
     modes, rest = modes_of_motion(q, period, _strongest(q, period))
     largest = max((mode.shares.max() for mode in modes), default=0.0)
-    slowest = PERIODS / (period * len(q))
-    swings = [m for m in modes if m.frequency > slowest and m.shares.max() > SEEN * largest]
-    if not swings or rest > UNEXPLAINED:
+    swings = [m for m in modes if m.frequency > 0.0 and m.shares.max() > SEEN * largest]
+    mode = max(swings, key=lambda m: m.s.real, default=None)
+    if mode is None or rest > UNEXPLAINED or mode.frequency * period * len(q) < PERIODS:
         bound = "must show a swing of its joints: none is in this run, or it is too short"
         raise ParameterError("record", f"{len(record.t)} samples", bound)
-    mode = max(swings, key=lambda m: m.s.real)
     shares = mode.shares / mode.shares.max()
     joint = arm.names[int(shares.argmax())]
     return JointMotion(arm.names, joint, mode.s.real, mode.frequency, shares)
+
+
+def _small(q: np.ndarray) -> np.ndarray:
+    """Positions from the start on, until the motion is too large to be that about a pose."""
+    large = (np.abs(q - q[:1]) > LARGEST).any(axis=1)
+    return q[: int(large.argmax())] if large.any() else q
 
 
 def _step(record: Record) -> float:
