@@ -65,7 +65,7 @@ def load(arm: Any) -> Loaded:
     file = model_file.opened(arm.file)
     grip = handles.handle(file.model, arm.site, _named_joints(file.model, arm.joints))
     joints = _arm_joints(file.model, arm.joints, grip.chain)
-    _refuse_lacking(file, joints)
+    without = _without_mass(file, joints)
     wanted = _wanted_pose(arm.pose, joints)
     key = keyframe(file.model, wanted)
     position = file.model.qpos0 if key is None else file.model.key_qpos[key]
@@ -105,7 +105,7 @@ def load(arm: Any) -> Loaded:
         fields,
         _ranges(model, joints),
         (
-            *_guessed(file.guessed),
+            *_guessed(file, without),
             *own,
             *grip.notes,
             *outside,
@@ -133,23 +133,40 @@ def _servo(
     return servo_gains(whole, position, follow, names)
 
 
-def _guessed(links: Sequence[str]) -> Iterator[str]:
-    if links:
+def _guessed(file: model_file.Opened, without: Sequence[str]) -> Iterator[str]:
+    """Sentences about mass that the file does not state."""
+    if links := [x for x in file.guessed if x not in without]:
         names = ", ".join(links)
         yield f"no inertia in the file, computed from geometry at 1000 kg/m^3: {names}"
+    if without:
+        names = ", ".join(without)
+        yield f"no inertia in the file, nor the mesh that gives it, counted as none: {names}"
 
 
-def _refuse_lacking(file: model_file.Opened, joints: Sequence[int]) -> None:
-    """Refuses an arm with a link whose inertia is in a mesh that is not there."""
-    island = islands.island(file.model, joints)
+def _without_mass(file: model_file.Opened, joints: Sequence[int]) -> list[str]:
+    """What an arm carries whose inertia is in a mesh that is not there.
+
+    Raises:
+        ParameterError: it is a link of the arm itself.
+    """
+    model, carried = file.model, []
+    island = islands.island(model, joints)
+    links = {int(model.jnt_bodyid[j]) for j in island}
     for link, mesh in file.lacking.items():
-        body = file.model.body(link).id if link else 0
-        if island.intersection(limbs.joints_to_root(file.model, body)):
+        body = model.body(link).id
+        if not island.intersection(limbs.joints_to_root(model, body)):
+            continue
+        weld = int(model.body_weldid[body])
+        if body in links or (
+            weld in links and not model.body_mass[model.body_weldid == weld].sum() > LIGHTEST
+        ):
             bound = (
                 f"must be there, as STL, OBJ or MSH: the inertia of {link} comes from it; or state "
                 f"<inertial> for {link}"
             )
             raise ParameterError("mesh", mesh, bound)
+        carried.append(link)
+    return carried
 
 
 # ---- joints --------------------------------------------------------------------------------------
@@ -315,7 +332,8 @@ def _check_inertia(mechanism: Mechanism, names: Sequence[str]) -> None:
     if not np.linalg.eigvalsh(inertia).min() > LIGHTEST:
         light = names[int(np.diag(inertia).argmin())]
         bound = (
-            "must have an inertia: the links behind it have none along its axis, nor has a rotor"
+            "must have an inertia: the links behind it have none along its axis, nor has a rotor: "
+            f"state <inertial> in the file, or armature of {light} [kg.m^2]"
         )
         raise ParameterError("joint", light, bound)
 

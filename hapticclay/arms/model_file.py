@@ -6,6 +6,7 @@ Nothing of a file is run. Of its geometry only that stays from which inertia is 
 from __future__ import annotations
 
 import os
+import re
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -151,8 +152,23 @@ def compiled(spec: Any) -> tuple[Any, list[str]]:
                 compiler.balanceinertia = True
                 notes = ["inertia of no body (A + B < C): the mean of its three moments is taken"]
             else:
+                _refuse_mesh(spec, fault)
                 raise
     raise AssertionError
+
+
+def _refuse_mesh(spec: Any, fault: str) -> None:
+    """Refuses a mesh that MuJoCo cannot take, with the link whose inertia comes from it."""
+    named = re.search(r"Element name '([^']+)'", fault)
+    for mesh in [x for x in spec.meshes if named and x.name == named[1]]:
+        geom = next(x for x in spec.geoms if x.meshname == mesh.name)
+        link = geom.parent.name or "a body"
+        what = one_line(fault.removeprefix("Error: ").partition("Element name")[0], MOST_OF_FAULT)
+        bound = (
+            f"must be one that MuJoCo reads ({what.strip()}): the inertia of {link} comes from it; "
+            f"or state <inertial> for {link}"
+        )
+        raise ParameterError("mesh", mesh.file, bound)
 
 
 def _is_of_saving(text: str) -> bool:

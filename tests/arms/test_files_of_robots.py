@@ -107,6 +107,46 @@ def test_a_link_whose_inertia_is_in_a_missing_mesh_is_named(saved):
     np.testing.assert_allclose(arm.mass_matrix(), M_OF_TWO, rtol=1e-14)
 
 
+@pytest.mark.parametrize("kind", ["fixed", "prismatic"])
+def test_a_tool_whose_mesh_is_not_there_is_counted_as_none(saved, kind):
+    """Texts of robots come without meshes; fingers and mounts often have no inertia in them."""
+    tool = link("tool", None, MESH.format("collision", "package://r/tool.stl"))
+    arm = hc.MjcfArm(saved(robot(*TWO, tool, joint("j3", "lb", "tool", kind=kind))), site="lb")
+    np.testing.assert_allclose(arm.mass_matrix(), M_OF_TWO, rtol=1e-12)  # 2e-15 kg for MuJoCo
+    assert arm.notes[0].startswith("no inertia in the file") and arm.notes[0].endswith(": tool")
+    assert not any("computed from geometry" in x for x in arm.notes)
+    wrist = TWO[0], link("lb", None), TWO[2], TWO[3], tool, joint("j3", "lb", "tool", kind=kind)
+    with pytest.raises(hc.ParameterError, match=r"tool\.stl|j2.*must have an inertia"):
+        hc.MjcfArm(saved(robot(*wrist)), site="lb")
+
+
+@pytest.mark.parametrize(
+    "shape",
+    ['<sphere radius="0"/>', '<box size="0.1 0 0.1"/>', '<cylinder radius="0.1" length="0"/>'],
+)
+def test_geometry_without_volume_gives_no_inertia(saved, shape):
+    """Frames that drawings mark with points."""
+    look = f"<collision><geometry>{shape}</geometry></collision>"
+    tip = link("tip", None, look), joint("j3", "lb", "tip", 0.0, kind="fixed")
+    arm = hc.MjcfArm(saved(robot(*TWO, *tip)), site="tip")
+    np.testing.assert_allclose(arm.mass_matrix(), M_OF_TWO, rtol=1e-14)
+
+
+def test_a_mesh_without_volume_is_named_with_its_link(saved):
+    saved("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 3 4", "flat.obj")
+    part = link("la", None, MESH.format("collision", "flat.obj"))
+    with pytest.raises(hc.ParameterError, match=r"flat\.obj.*<inertial> for la"):
+        hc.MjcfArm(saved(robot(part, joint("j1", "base", "la", 0.0))))
+
+
+def test_a_joint_that_turns_nothing_is_told_what_to_state(saved):
+    parts = (*TWO, link("tip", None), joint("j3", "lb", "tip"))
+    with pytest.raises(hc.ParameterError, match=r"j3.*<inertial>.*armature"):
+        hc.MjcfArm(saved(robot(*parts)), site="tip")
+    arm = hc.MjcfArm(saved(robot(*parts)), site="tip", armature={"j3": 0.01})
+    assert arm.armature == (0.0, 0.0, 0.01)
+
+
 @pytest.mark.parametrize("folder", ["r/urdf", "other/urdf"])
 def test_a_mesh_that_gives_inertia_is_found_in_its_package(saved, folder):
     """A cube of 0.2 m at 1000 kg/m^3: 8 kg, m a^2/6."""
@@ -209,6 +249,9 @@ def test_an_mjcf_without_its_meshes_and_pictures(saved):
     assert "link.stl" in note and "skin.png" in note
     with pytest.raises(hc.ParameterError, match=r"link\.stl.*inertia of la comes from it"):
         hc.MjcfArm(saved(f"<mujoco>{ASSETS}{BODY.format('')}</mujoco>", "b.xml"))
+    nameless = BODY.format("").replace('body name="la"', "body")
+    with pytest.raises(hc.ParameterError, match=r"link\.stl.*inertia of unnamed body comes from"):
+        hc.MjcfArm(saved(f"<mujoco>{ASSETS}{nameless}</mujoco>", "c.xml"))
 
 
 @pytest.mark.parametrize("name", ["arm.mjcf", "arm.xml", "arm"])
@@ -239,6 +282,8 @@ def test_warnings_of_mujoco_are_notes(saved, recwarn, tmp_path, monkeypatch):
         '<attach model="p" prefix=""/></worldbody></mujoco>'
     )
     assert hc.MjcfArm(saved(whole, "whole.xml")).names == ("j1",)
+    ball = '<worldbody><body><freejoint/><geom size=".1"/></body></worldbody>'
+    assert hc.MjcfArm(saved(whole.replace("</mujoco>", f"{ball}</mujoco>"), "ball.xml")).names
     assert not recwarn.list and not os.path.exists("MUJOCO_LOG.TXT")
 
 
