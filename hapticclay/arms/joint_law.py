@@ -96,6 +96,9 @@ class JointPD:
     def drive_samples(self, Ts: float) -> int | None:
         """Samples of the drives in one of the host; None where they count as continuous.
 
+        Args:
+            Ts: control sample of the host [s].
+
         Raises:
             ParameterError: the drives' rate is no whole multiple of the host's.
         """
@@ -121,6 +124,10 @@ class JointPD:
         """The law, control sample and delay of a run: drives that sample are a host of their rate.
 
         Gravity and friction are then fed forward at that rate, too.
+
+        Args:
+            Ts: control sample of the host [s].
+            delay: from a sample of the host to its torque [s].
         """
         if self.drive_rate is None:
             return self, Ts, delay
