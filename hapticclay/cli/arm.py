@@ -31,7 +31,8 @@ class ArmCommand:
     Attributes:
         file: MJCF or URDF file of the arm, or the name of one of the package: planar_2r, five_bar,
             haptic_3, leader_7.
-        gains: File of the gains, .toml, .json or .yaml, as teleoperation projects keep them.
+        gains: File of the gains, .toml, .json or .yaml, as projects keep them; FILE:TABLE for one
+            of several tables.
         Kp: Stiffness of each joint [N.m/rad], in place of --gains.
         Kd: Damping of each joint [N.m.s/rad].
         rate: Control rate [Hz], by default 1000.
@@ -109,7 +110,7 @@ class ArmCommand:
         """The scenario of the run as built, and the film of the buzz."""
         from ..studies.joint_runs import built_scenario, buzz
 
-        law, timing = self._law(), (self._Ts, self.delay)
+        law, timing = self._law(arm), (self._Ts, self.delay)
         built = built_scenario(arm, law, *timing)
         print(f"to run it as built: hapticclay run {built.save(out / 'as_built.toml')}")
         if self.film is None:
@@ -126,7 +127,7 @@ class ArmCommand:
         from ..theory import fed_friction, joint_gains, joint_poses, joint_walls
 
         if self.gains or self.Kp:
-            law = self._law()
+            law = self._law(arm)
             timing = self._Ts, self.delay
             yield joint_gains.joint_limits(arm, law, *timing)
             if self.run:
@@ -152,7 +153,7 @@ class ArmCommand:
     def _Ts(self) -> float:
         return self.Ts if self.Ts is not None else 1.0 / (self.rate or 1000.0)
 
-    def _law(self) -> JointPD:
+    def _law(self, arm: MjcfArm) -> JointPD:
         from ..arms.joint_law import JointPD
 
         given = {
@@ -161,5 +162,5 @@ class ArmCommand:
             if getattr(self, name) is not None
         }
         if self.gains:
-            return JointPD.load(self.gains, **given)
+            return JointPD.load(self.gains, arm.names, **given)
         return JointPD(self.Kp, self.Kd, **given)
