@@ -60,7 +60,7 @@ def read_gains(path: str | os.PathLike[str], joints: Sequence[str] | None = None
     """
     file, name = _split(path)
     found = _chosen(file, name, list(_tables(_settings(file), ())))
-    fields = dict(zip(("Kp", "Kd"), _in_order(found, joints), strict=True))
+    fields: dict[str, Any] = dict(zip(("Kp", "Kd"), _in_order(found, joints), strict=True))
     if found.name.rpartition(".")[2] in OPENARM:
         return _openarm(fields, found.table)
     for key in found.table:

@@ -235,6 +235,7 @@ class Model:
     Ts: real  # [s]
     uneven: whole  # events may lie between the steps
     drops_events: whole  # crossings and stops are overwritten, since nothing reads them
+    halts: whole  # no further step is made: another thread may say so while steps are made
     records_clay_force: whole  # fe is recorded, since it is not b v
     records_held_force: whole  # as the motors hold it
     chance: whole

@@ -25,6 +25,7 @@ from .march import GROWTH_BLOCK
 QUEUE = 4  # rows of the queue of torques in addition to the whole samples of their delay
 STIFF, HITTING = 1.0, 0.02  # see `hardness`
 NOISE_AHEAD = 16384  # control samples whose random effects are drawn at once
+NEVER = 1 << 62  # sample from which no random effects are drawn
 
 
 class Compiled(NamedTuple):

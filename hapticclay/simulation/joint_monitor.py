@@ -14,7 +14,7 @@ from ..arms.joint_units import of_joint
 from ..scene.scenario import Scenario
 from ..theory.client_loop import with_hands_of
 from ..theory.joint_gains import joint_loop
-from .monitor import LIMITS, OFTEN, STILL, WHILE, Outcome, at_rest
+from .monitor import LIMITS, OFTEN, STILL, WHILE, Outcome, at_rest, with_own_lists
 
 FASTEST = 200.0  # [rad/s or m/s] beyond any joint of an arm
 GROWTH = 30.0  # an oscillation that has grown so much, swing by swing, is unstable
@@ -85,6 +85,12 @@ class JointMonitor:
         self.moved = self.unbound = -1
         self.swings = [Swings() for _ in self.names]
         self.bound = np.zeros(0, dtype=bool)
+
+    def copied(self) -> JointMonitor:
+        """The monitor as it is now, which further rows do not change."""
+        made = with_own_lists(self)
+        made.swings = [with_own_lists(x) for x in self.swings]
+        return made
 
     def look(self, rows: np.ndarray, first: int) -> tuple[int, Outcome | None]:
         """Judges the next rows, joints by samples: number of good ones, and an outcome if any."""

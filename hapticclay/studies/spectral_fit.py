@@ -35,7 +35,8 @@ from .sliding import quantum
 
 LEAST_LINES = 20  # of the spectrum in the band, without a period
 LATE = 3.0, 0.05, 0.01  # half intervals, steps and share of a coefficient: a delay that matters
-LEAST_EXCITED = 5  # lines of a periodic input
+LEAST_EXCITED = 5  # lines of a periodic input, ...
+LEAST_STRONG = 12  # ... and of another one, beside the terms of start and end
 EXCITED = 1e-6  # least power of a line, as a share of the strongest in the band
 PERIODIC = 3e-5  # largest share of a periodic input's power in the band between its lines
 REPEATED = 0.95  # least autocorrelation at a period
@@ -294,7 +295,7 @@ def _spectrum(
     rms = float(np.std(signals[0]))
     power = np.abs(r) ** 2
     strong = power > EXCITED * max(power.max(initial=0.0), LINE_FLOOR * rms**2 / max(len(bins), 1))
-    least = LEAST_EXCITED if periods else LEAST_LINES
+    least = LEAST_EXCITED if periods else LEAST_STRONG
     if np.count_nonzero(strong) < least:
         bound = (
             f"must have power at {least} lines or more from {band[0]:.3g} to {band[1]:.3g} Hz; "

@@ -17,16 +17,16 @@ from ..display import time_words
 from ..results import Result, Tables
 from ..scene.pair import Pair
 from ..scene.pair_hardware import slides_of
-from . import joint_crossings, roots
+from . import joint_crossings, pair_roots, roots
 from .held_words import pair_words
 from .joint_families import NEAR
-from .joint_loop import MOST_STATES, grid
+from .joint_loop import grid, is_stable
 from .pair_build import Build
-from .pair_delays import SLOWEST, Delays
+from .pair_delays import SLOWEST
 from .pair_loop import PairLoop
 from .pair_onset import LATEST, Onset, onset
 
-LARGE = 500  # states of a map whose eigenvalues are not worth their time
+LARGE = 200  # states of a map whose eigenvalues are not worth their time
 HIGHEST = 64.0  # factor of all Kp up to which gains are tried
 EXACT = 1e-4  # relative width within which that factor is found
 COARSE = 1e-2  # the same for a map that is LARGE
@@ -45,7 +45,7 @@ class PairLimits(Joints, Result):
         names: joints of the leader, shape (n,).
         stable: whether the pair is stable as it is.
         radius: largest eigenvalue of the map over a sample, without those of rest: below 1 if
-            stable. With more than 1,200 states, that found nearest to the circle or beyond it.
+            stable.
         structural: directions in which the free pair rests anywhere, whose eigenvalues are 1.
         delay: least one-way delay of the link, both ways alike, at which the pair is unstable [s]:
             below it all are stable; 0 if it is unstable without delay; inf for more than 2 s. Waves
@@ -170,8 +170,9 @@ def pair_limits(pair: Pair) -> PairLimits:
     """Whether a leader and a follower are stable, and how much delay, gain and friction they carry.
 
     Both arms are linear about their poses, with hand and contact; torques are held between samples.
-    With messages on their way as states the map over a sample is exact; where they are many,
-    eigenvalues are counted on the unit circle instead. Eigenvalues of rest (z = 1), which a free
+    With messages on their way as states the map over a sample is exact; where they are many, its
+    largest eigenvalue is sought without them, and a count beyond it says that there is no larger
+    one. Eigenvalues of rest (z = 1), which a free
     pair has by its structure, are no verdict.
 
     Args:
@@ -219,9 +220,9 @@ class Study:
     @cached_property
     def worst(self) -> complex:
         """The largest eigenvalue."""
-        if self.loop.states <= MOST_STATES:
+        if self.loop.states <= LARGE:
             return complex(self.loop.eigenvalues[0])
-        return self._delays(1.0).largest(self.loop.there + self.loop.back)
+        return pair_roots.largest(self.loop, self.loop.there + self.loop.back)
 
     @cached_property
     def radius(self) -> float:
@@ -231,18 +232,11 @@ class Study:
     @cached_property
     def stable(self) -> bool:
         """Whether the pair is stable."""
-        return self.holds(1.0)
+        return is_stable(self.radius)
 
     def holds(self, gain: float) -> bool:
         """Whether it is stable with a factor of all Kp."""
-        if self.loop.states <= LARGE:
-            return self.build.loop(gain=gain).stable()
-        return self._delays(gain).count(self.loop.there + self.loop.back) == 0
-
-    def _delays(self, gain: float) -> Delays:
-        """The pair at all whole delays of its link, with the shares of its own."""
-        shares = [self.build.samples(x)[1] * self.pair.Ts for x in self.build.delays]
-        return Delays(self.build.loop((shares[0], shares[1]), gain))
+        return _holds(self.build.loop(gain=gain))
 
     def gain(self) -> float:
         """Largest factor of all Kp."""
@@ -294,7 +288,7 @@ class Study:
         """Largest slope at each joint of both arms, and largest share of the laws' friction."""
         n, none = self.pair.n, np.zeros(self.pair.n)
         loop = self.build.loop(friction=(none, none))
-        if not self._is_stable(loop):
+        if not _holds(loop):
             return none, 0.0
         angles = grid(loop)
         angles = angles[angles >= SLOWEST]  # below, rounding hides the imaginary part
@@ -320,13 +314,6 @@ class Study:
         slope = np.array([largest(unit[j] + unit[n + partner[j]]) for j in range(n)])
         return slope, largest(np.concatenate([law.slopes for law in self.pair.laws]))
 
-    def _is_stable(self, loop: PairLoop) -> bool:
-        if loop.states <= LARGE:
-            return loop.stable()
-        none = np.zeros(self.pair.n)
-        least = self.build.loop((loop.follower.share, loop.leader.share), friction=(none, none))
-        return Delays(least).count(loop.there + loop.back) == 0
-
     # ---- where the time goes
 
     def budget(self) -> dict[str, float]:
@@ -342,6 +329,13 @@ class Study:
             read = [self.build.samples(x)[0] * pair.Ts - x for x in self.build.delays]
             causes["wait for a sample"] = 0.5 * sum(read)
         return {cause: late for cause, late in causes.items() if late > 0.0}
+
+
+def _holds(loop: PairLoop) -> bool:
+    """Whether a pair is stable."""
+    if loop.states <= LARGE:
+        return loop.stable()
+    return pair_roots.beyond(loop, loop.there + loop.back) <= 0
 
 
 def _steady(matrix: np.ndarray) -> list[float]:
