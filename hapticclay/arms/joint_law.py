@@ -90,6 +90,31 @@ class JointPD:
 
     @classmethod
     @checked
+    def of(cls, arm: MjcfArm, **changes: Any) -> JointPD:
+        """The gains that the actuators of an arm's file give its joints.
+
+        Those of position and velocity servos, general ones with an affine bias, PID and motors with
+        a controller, with gear and damping ratio, where each pulls at one joint of the arm.
+
+        Args:
+            arm: an arm from a file.
+            **changes: fields of the law that the file does not have, or replace those that it has.
+
+        Raises:
+            ParameterError: the file has no gains.
+        """
+        if not arm.servo.taken:
+            n, names = len(arm.names), ", ".join(arm.names)
+            each = f", or {n} numbers each ({names})" * (n > 1)
+            bound = (
+                "must be given, since the arm's file has none: --gains FILE, or --Kp and --Kd, "
+                f"one number for all joints{each}"
+            )
+            raise ParameterError("gains", None, bound)
+        return cls(**{"Kp": arm.servo.Kp, "Kd": arm.servo.Kd, **changes})
+
+    @classmethod
+    @checked
     def load(
         cls,
         file: str | os.PathLike[str],

@@ -17,7 +17,7 @@ from ..arms.mechanism import Linear
 from ..arms.mjcf_arm import MjcfArm
 from ..display import time_words
 from ..results import Result, Tables
-from . import joint_changes, joint_crossings, roots
+from . import file_servo, joint_changes, joint_crossings, roots
 from .client_loop import Delay, Sample
 from .joint_changes import Edge, Number, slopes
 from .joint_crossings import Crossing
@@ -450,7 +450,8 @@ class Study:
         """What the verdict rests on, a sentence each."""
         held = f"{SMALL}, no hand at the handle"
         law = f"law: {self.law.words}"
-        return (*self.arm.notes, gravity_words(self.compensated), law, held, IGNORED)
+        own = file_servo.words(self.arm, self.law)
+        return (*own, *self.arm.notes, gravity_words(self.compensated), law, held, IGNORED)
 
 
 # ---- present motion, delay and rate --------------------------------------------------------------

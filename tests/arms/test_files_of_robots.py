@@ -334,15 +334,23 @@ def test_an_entity_of_the_system_is_not_read(saved):
         hc.MjcfArm(saved(text))
 
 
-def test_a_key_frame_is_a_pose(saved):
-    body = f'<body><joint name="j1" axis="0 1 0"/>{STATED}<site name="ee" pos="1 0 0"/></body>'
-    keys = '<key name="home" qpos="1"/><key name="ready" qpos="0.5"/><key qpos="0.25"/>'
-    file = saved(
-        f"<mujoco><worldbody>{body}</worldbody><keyframe>{keys}</keyframe></mujoco>", "k.xml"
-    )
-    for pose, q in ((None, 1.0), ("home", 1.0), ("ready", 0.5), ("2", 0.25), (2, 0.25), (1, 0.5)):
-        assert hc.MjcfArm(file, pose=pose).q.tolist() == [q]
+@pytest.mark.parametrize("n", [1, 2])
+def test_a_key_frame_is_a_pose(saved, n):
+    """By name, or number; text that is a number is the position of an arm with one joint."""
+    body = f'<body>{{}}{STATED}<site name="ee" pos="1 0 0"/></body>'
+    joints = "".join(f'<joint name="j{i}" axis="0 {i} 1"/>' for i in range(n))
+    values = ("home", 1.0), ("ready", 0.5), ("", 0.25)
+    keys = "".join(f'<key name="{name}" qpos="{" ".join(n * [str(q)])}"/>' for name, q in values)
+    text = f"<worldbody>{body.format(joints)}</worldbody><keyframe>{keys}</keyframe>"
+    file = saved(f'<mujoco><compiler angle="radian"/>{text}</mujoco>', "keys.xml")
+    for pose, q in ((None, 1.0), ("home", 1.0), ("ready", 0.5), (2, 0.25), (1, 0.5)):
+        assert hc.MjcfArm(file, pose=pose).q.tolist() == n * [q]
+    number = [2.0] if n == 1 else [0.25, 0.25]
+    assert hc.MjcfArm(file, pose="2").q.tolist() == number
+    assert "pose: key frame ready of the file" in hc.MjcfArm(file, pose="ready").notes
     with pytest.raises(hc.ParameterError, match="did you mean 'ready'"):
         hc.MjcfArm(file, pose="redy")
     with pytest.raises(hc.ParameterError, match="no key frames"):
         hc.MjcfArm(saved(robot(*TWO)), site="lb", pose="home")
+    arm = hc.MjcfArm(file, armature=0.1, pose="0.2 rad" if n == 1 else None)
+    assert arm.armature == n * (0.1,) and (n == 2 or arm.q.tolist() == [0.2])
