@@ -160,7 +160,8 @@ def nearest(word: str, names: Collection[str]) -> list[str]:
     same = SYNONYMS.get(word)
     if same is not None and same in names:
         return [same]
-    return difflib.get_close_matches(word[:MOST_COMPARED], names, n=1)
+    alike = [name for name in names if name.lower() == word.lower()]
+    return alike[:1] or difflib.get_close_matches(word[:MOST_COMPARED], names, n=1)
 
 
 def quantity(field: str, text: str, unit: str = "") -> float | None:

@@ -9,6 +9,8 @@ from ..display import one_line
 from ..errors import ParameterError, nearest
 from . import islands, limbs
 
+MOST_TIPS = 8  # that are named
+
 
 class Handle(NamedTuple):
     """The handle of an arm, and the chain of joints that ends there.
@@ -96,13 +98,13 @@ def _unnamed(model: Any, sites: list[int]) -> Handle:
         return Handle(None, list(chains.pop()), names)
     try:
         limb = limbs.arm_limb(model)
-    except ParameterError:
+    except limbs.Several as several:
         if loop := islands.loop_on_base(model):
             return Handle(None, loop, names)
-        if names:
-            bound = f"must be named: there are {', '.join(names)}"
-            raise ParameterError("site", None, bound) from None
-        raise
+        ends = f"bodies such as {', '.join(several.tips[:MOST_TIPS])}"
+        shown = [", ".join(names)] * bool(names) + [ends]
+        bound = f"must be named, since the file has several limbs: there are {' and '.join(shown)}"
+        raise ParameterError("site", None, bound) from None
     if limb is None:
         return Handle(None, [], names)
     at_tip = [i for i in sites if _chain(model, i) == limb.joints]

@@ -29,9 +29,9 @@ def quantize(x, bits, span):
     return min(level, half - 1.0) * span / half
 
 
-def encode(q, counts):
-    """Joint angle as an encoder reads it [rad]; 0 counts per turn for an exact reading."""
-    return round_to_even(q, math.tau / counts) if counts else q
+def encode(q, count):
+    """Joint position as an encoder reads it, in counts of a size [rad or m]; 0 for exactly."""
+    return round_to_even(q, count) if count else q
 
 
 def velocity_difference(then, old, k, q, Ts):
