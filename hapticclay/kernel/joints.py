@@ -5,7 +5,6 @@ Only hand and muscle act along z, which is eliminated: in the plane all laws of 
 of another mobility (docs/equations.md).
 """
 
-
 from ..formulas import numbers
 from . import dynamics, hand
 
