@@ -221,7 +221,19 @@ def test_lerobots_layout(tmp_path):
     assert hc.studies.log_report(hc.Log.read(file)).stamps.backward.tolist() == [75]
 
 
-@pytest.mark.parametrize("size", [4, -1])  # -1: of any length
+@pytest.mark.parametrize(
+    "size",
+    [
+        pytest.param(
+            4,
+            marks=pytest.mark.skipif(
+                int(pa.__version__.split(".")[0]) < 26,
+                reason="pyarrow before 26 reads no absent lists of a fixed length",
+            ),
+        ),
+        -1,  # of any length
+    ],
+)
 def test_rows_without_a_list_are_empty_and_the_others_stay_whole(size, tmp_path):
     """Two lists of four in four rows are not four lists of two."""
     lists = [[1.0, 2.0, 3.0, 4.0], None, [5.0, 6.0, 7.0, 8.0], None]

@@ -148,18 +148,14 @@ class Mechanism:
             return np.zeros((len(self.dofs),) * 2)
         return passive.viscous(self._model, self._data, self._follow())
 
-    def at_handle(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Position of the handle and its Jacobian at joint positions, and what holds the weight.
-
-        [m], shape (3,); [m], shape (3, n); torques [N.m], shape (n,).
+    def at_handle(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Position of the handle and its Jacobian at joint positions, [m], (3,) and (3, n).
 
         Raises:
             ParameterError: constraints cannot be satisfied there.
         """
         self._at(q)
-        follow = self._follow()
-        weights = (self._data.qfrc_bias - self._data.qfrc_gravcomp) @ follow
-        return self.handle_place(), self._jacobian() @ follow, weights
+        return self.handle_place(), self._jacobian() @ self._follow()
 
     def handle(self, q: np.ndarray) -> np.ndarray:
         """Position of the handle in the frame of the world [m], shape (3,)."""

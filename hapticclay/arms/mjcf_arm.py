@@ -14,8 +14,10 @@ from ..arguments import named
 from ..errors import ParameterError, array_of, choice
 from .loading import load
 from .mechanism import Linear, Mechanism
+from .servo_gains import ServoGains
 
-PerJoint = Mapping[str, float] | Sequence[float] | None
+PerJoint = Mapping[str, float] | Sequence[float] | float | None
+Pose = Mapping[str, float] | Sequence[float] | str | int | None
 
 
 @named
@@ -43,8 +45,8 @@ class MjcfArm:
         damping: viscous damping of the joints [N.m.s/rad], 0 to 1e6, likewise.
         friction: Coulomb friction of the joints [N.m], 0 to 1e6, likewise; that of joints which
             follow them included.
-        gravity: "compensated" if the controller holds the arm against gravity, by the torque for
-            the measured joint positions; "acts" if nothing does.
+        gravity: "compensated" if the host holds the arm against gravity under any controller, by
+            the torque for the measured joint positions; "acts" if nothing does.
         torque_limit: largest torque of each joint's motor [N.m], > 0, likewise; None for that of
             the file's joints and actuators, or none.
         plane: in runs, the axes of the world, such as "xy" or "zx", in which clay and forces lie
@@ -55,7 +57,7 @@ class MjcfArm:
     file: Any
     site: str | None = None
     joints: Sequence[str] | None = None
-    pose: PerJoint = None
+    pose: Pose = None
     armature: PerJoint = None
     damping: PerJoint = None
     friction: PerJoint = None
@@ -105,6 +107,11 @@ class MjcfArm:
     def ranges(self) -> np.ndarray:
         """Least and largest position of each joint [rad or m], infinite for none, shape (n, 2)."""
         return self._loaded.ranges.copy()  # type: ignore[attr-defined]
+
+    @property
+    def servo(self) -> ServoGains:
+        """Gains that the file's actuators give the joints; zeros if there are none."""
+        return self._loaded.servo  # type: ignore[attr-defined]
 
     @property
     def mechanism(self) -> Mechanism:
@@ -187,7 +194,9 @@ class MjcfArm:
             ParameterError: neither `site` nor the file names one.
         """
         if self.site is None:
-            bound = "must name a site or body at the handle: the file has no site on a moving body"
+            names = self._loaded.handles  # type: ignore[attr-defined]
+            such = f", such as {', '.join(names)}" * bool(names)
+            bound = f"must name a site or body at the handle{such}: the file leaves it open"
             raise ParameterError("site", None, bound)
 
     def _place(self, q: Sequence[float] | np.ndarray | None) -> np.ndarray:

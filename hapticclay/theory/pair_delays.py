@@ -10,7 +10,6 @@ eigenvalue of H is larger than 1 at z = -1, more and more eigenvalues of the pai
 
 from __future__ import annotations
 
-import cmath
 import itertools
 import math
 from functools import cached_property
@@ -19,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import joint_crossings
-from .joint_loop import AT_REST, MOST_STATES, ROUNDING, near_resonances
+from .joint_loop import MOST_STATES, ROUNDING, near_resonances
 from .pair_loop import PairLoop
 from .rest import FREE, NO_DRAG
 
@@ -29,7 +28,6 @@ EVEN, BY_FACTORS = 300, 300  # angles of the search
 REAL = 1e-9  # imaginary part over size of an eigenvalue that counts as real
 AXIS = 1e-6  # of a sample: how long an eigenvalue on the negative axis is one
 AROUND = 9  # angles around an edge of another loop
-TOPS, REFINED = 16, 30  # eigenvalues that are refined, and rounds of it
 
 
 class Edge(NamedTuple):
@@ -176,59 +174,3 @@ class Delays:
         samples = (np.angle(x) + 2.0 * math.pi * turns) / theta
         i = int(np.abs(samples - edge.samples).argmin())
         return Edge(float(samples[i]), float(theta[i]), edge.change)
-
-    def largest(self, samples: float) -> complex:
-        """The largest eigenvalue at a large number of samples there and back.
-
-        With many samples eigenvalues lie near |z| = |eigenvalue of H|^(1/N), dense along the
-        circle: where the phase of z^N fits. The largest, and those on the real axis, are refined by
-        z = (eigenvalue of H)^(1/N). Where nothing goes around, as of a force measured in free
-        motion, they are those of both ends.
-        """
-        starts = sorted(self._starts(samples), key=lambda x: -abs(x[1]))[:TOPS]
-        found = [_refined(self.loop, *start, samples) for start in starts]
-        found += self._on_axis(samples)
-        found = found or self.loop.open_poles().tolist()
-        return max((z for z in found if abs(z - 1.0) > AT_REST), key=abs, default=0j)
-
-    def _starts(self, samples: float) -> list[tuple[complex, complex, int]]:
-        """Points z of the circle, eigenvalues of H there, and turns of z^N."""
-        values = joint_crossings.branches(np.linalg.eigvals(self.loop.around(self.angles)))
-        out = []
-        for branch in values.T:
-            turns = (samples * self.angles - np.unwrap(np.angle(branch))) / (2.0 * math.pi)
-            for i, (a, b) in enumerate(itertools.pairwise(turns.tolist())):
-                some = abs(branch[i]) > joint_crossings.NO_SIZE
-                for k in range(math.ceil(a), math.floor(b) + 1) if some else ():
-                    theta = float(np.interp(k, (a, b), self.angles[i : i + 2]))
-                    out.append((cmath.exp(1j * theta), complex(branch[i]), k))
-        return out
-
-    def _on_axis(self, samples: float) -> list[complex]:
-        """Real eigenvalues between 0.7 and 1.3."""
-        off = np.geomspace(AT_REST, 0.3, BY_FACTORS // 4)
-        found: list[complex] = []
-        for z in (1.0 - off, 1.0 + off):
-            values = np.linalg.eigvals(self.loop.around(-1j * np.log(z.astype(complex))))
-            values = joint_crossings.branches(values)
-            gap = joint_crossings.log_size(values) - samples * np.log(z)[:, None]
-            real = (np.abs(values.imag) <= REAL * np.abs(values)) & (values.real > 0.0)
-            below = gap < 0.0  # a zero on the grid counts once
-            i, branch = np.nonzero((below[:-1] != below[1:]) & real[:-1] & real[1:])
-            starts = zip(z[i].tolist(), values[i, branch].tolist(), strict=True)
-            found += [_refined(self.loop, at, x, 0, samples) for at, x in starts]
-        return found
-
-
-def _refined(loop: PairLoop, z: complex, x: complex, turns: int, samples: float) -> complex:
-    """The eigenvalue near z, where x is an eigenvalue of H, with some turns of z^N."""
-    for _ in range(REFINED):
-        values = np.linalg.eigvals(loop.around(np.array([-1j * cmath.log(z)])))[0]
-        x = complex(values[np.argmin(np.abs(values - x))])
-        argument, size = cmath.phase(x), math.log(abs(x))
-        extra = round((samples * cmath.phase(z) - argument) / (2.0 * math.pi)) if turns else 0
-        turned = argument + 2.0 * math.pi * extra
-        before, z = z, cmath.exp((size + 1j * turned) / samples)
-        if abs(z - before) <= 1e-14:
-            break
-    return z

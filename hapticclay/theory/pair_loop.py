@@ -18,6 +18,8 @@ from .joint_loop import MOST_STATES, is_stable
 from .pair_end import End
 from .rest import FREE, Rest, balanced
 
+BESIDE, SINGULAR = 1e-4, 1e-5  # of an eigenvalue: a distance, and the size of equations there
+
 
 @dataclass(frozen=True, eq=False)
 class PairLoop:
@@ -183,6 +185,12 @@ class PairLoop:
         X = columns * np.linalg.svd(whole)[2][-1].conj()
         start = self.leader.size
         return X[: self.leader.n], X[start : start + self.follower.n]
+
+    def singular(self, z: complex) -> bool:
+        """Whether z is an eigenvalue, rather than a little beside one."""
+        beside = [balanced(self.equations(x))[0] for x in (z, z * (1.0 + BESIDE))]
+        sizes = np.linalg.svd(np.array(beside), compute_uv=False)[:, -1]
+        return bool(sizes[0] < SINGULAR * sizes[1])
 
     @property
     def free(self) -> int:

@@ -12,19 +12,21 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
+from ..arms.joint_units import Joints, table_of
 from ..display import time_words
 from ..results import Result, Tables
 from ..scene.pair import Pair
-from . import joint_crossings, roots
+from ..scene.pair_hardware import slides_of
+from . import joint_crossings, pair_roots, roots
 from .held_words import pair_words
 from .joint_families import NEAR
-from .joint_loop import MOST_STATES, grid
+from .joint_loop import grid, is_stable
 from .pair_build import Build
-from .pair_delays import SLOWEST, Delays
+from .pair_delays import SLOWEST
 from .pair_loop import PairLoop
 from .pair_onset import LATEST, Onset, onset
 
-LARGE = 500  # states of a map whose eigenvalues are not worth their time
+LARGE = 200  # states of a map whose eigenvalues are not worth their time
 HIGHEST = 64.0  # factor of all Kp up to which gains are tried
 EXACT = 1e-4  # relative width within which that factor is found
 COARSE = 1e-2  # the same for a map that is LARGE
@@ -35,7 +37,7 @@ GONE = 1e-3  # size of an eigenvalue whose motion is over at the next sample
 
 @named
 @dataclass(frozen=True, repr=False, eq=False)
-class PairLimits(Result):
+class PairLimits(Joints, Result):
     """What a pair of arms carries at its pose, all joints of both arms coupled.
 
     Attributes:
@@ -43,7 +45,7 @@ class PairLimits(Result):
         names: joints of the leader, shape (n,).
         stable: whether the pair is stable as it is.
         radius: largest eigenvalue of the map over a sample, without those of rest: below 1 if
-            stable. With more than 1,200 states, that found nearest to the circle or beyond it.
+            stable.
         structural: directions in which the free pair rests anywhere, whose eigenvalues are 1.
         delay: least one-way delay of the link, both ways alike, at which the pair is unstable [s]:
             below it all are stable; 0 if it is unstable without delay; inf for more than 2 s. Waves
@@ -63,6 +65,7 @@ class PairLimits(Result):
         budget: what the torque from the other arm is late by, cause by cause, one way [s].
         Ts: control sample [s].
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
+        slides: whether each joint slides; then its units are those of forces and lengths.
     """
 
     drawn_by = "hapticclay.views.pair_plots:limits_plot"
@@ -87,6 +90,7 @@ class PairLimits(Result):
     budget: Mapping[str, float]
     Ts: float
     assumed: tuple[str, ...] = ()
+    slides: tuple[bool, ...] = ()
 
     @property
     def delay_left(self) -> float:
@@ -157,6 +161,7 @@ class PairLimits(Result):
             "largest factor of all Kp": self.gain,
             "largest share of friction": self.friction_fraction,
         }
+        joints = table_of(joints, self.turning)
         return {"joints": joints, "budget": budget, "pair": {k: [v] for k, v in pair.items()}}
 
 
@@ -165,8 +170,9 @@ def pair_limits(pair: Pair) -> PairLimits:
     """Whether a leader and a follower are stable, and how much delay, gain and friction they carry.
 
     Both arms are linear about their poses, with hand and contact; torques are held between samples.
-    With messages on their way as states the map over a sample is exact; where they are many,
-    eigenvalues are counted on the unit circle instead. Eigenvalues of rest (z = 1), which a free
+    With messages on their way as states the map over a sample is exact; where they are many, its
+    largest eigenvalue is sought without them, and a count beyond it says that there is no larger
+    one. Eigenvalues of rest (z = 1), which a free
     pair has by its structure, are no verdict.
 
     Args:
@@ -197,6 +203,7 @@ def pair_limits(pair: Pair) -> PairLimits:
         study.budget(),
         pair.Ts,
         (pair_words(pair), *study.build.assumed()),
+        slides_of(pair.leader),
     )
 
 
@@ -213,9 +220,9 @@ class Study:
     @cached_property
     def worst(self) -> complex:
         """The largest eigenvalue."""
-        if self.loop.states <= MOST_STATES:
+        if self.loop.states <= LARGE:
             return complex(self.loop.eigenvalues[0])
-        return self._delays(1.0).largest(self.loop.there + self.loop.back)
+        return pair_roots.largest(self.loop, self.loop.there + self.loop.back)
 
     @cached_property
     def radius(self) -> float:
@@ -225,18 +232,11 @@ class Study:
     @cached_property
     def stable(self) -> bool:
         """Whether the pair is stable."""
-        return self.holds(1.0)
+        return is_stable(self.radius)
 
     def holds(self, gain: float) -> bool:
         """Whether it is stable with a factor of all Kp."""
-        if self.loop.states <= LARGE:
-            return self.build.loop(gain=gain).stable()
-        return self._delays(gain).count(self.loop.there + self.loop.back) == 0
-
-    def _delays(self, gain: float) -> Delays:
-        """The pair at all whole delays of its link, with the shares of its own."""
-        shares = [self.build.samples(x)[1] * self.pair.Ts for x in self.build.delays]
-        return Delays(self.build.loop((shares[0], shares[1]), gain))
+        return _holds(self.build.loop(gain=gain))
 
     def gain(self) -> float:
         """Largest factor of all Kp."""
@@ -288,7 +288,7 @@ class Study:
         """Largest slope at each joint of both arms, and largest share of the laws' friction."""
         n, none = self.pair.n, np.zeros(self.pair.n)
         loop = self.build.loop(friction=(none, none))
-        if not self._is_stable(loop):
+        if not _holds(loop):
             return none, 0.0
         angles = grid(loop)
         angles = angles[angles >= SLOWEST]  # below, rounding hides the imaginary part
@@ -314,13 +314,6 @@ class Study:
         slope = np.array([largest(unit[j] + unit[n + partner[j]]) for j in range(n)])
         return slope, largest(np.concatenate([law.slopes for law in self.pair.laws]))
 
-    def _is_stable(self, loop: PairLoop) -> bool:
-        if loop.states <= LARGE:
-            return loop.stable()
-        none = np.zeros(self.pair.n)
-        least = self.build.loop((loop.follower.share, loop.leader.share), friction=(none, none))
-        return Delays(least).count(loop.there + loop.back) == 0
-
     # ---- where the time goes
 
     def budget(self) -> dict[str, float]:
@@ -336,6 +329,13 @@ class Study:
             read = [self.build.samples(x)[0] * pair.Ts - x for x in self.build.delays]
             causes["wait for a sample"] = 0.5 * sum(read)
         return {cause: late for cause, late in causes.items() if late > 0.0}
+
+
+def _holds(loop: PairLoop) -> bool:
+    """Whether a pair is stable."""
+    if loop.states <= LARGE:
+        return loop.stable()
+    return pair_roots.beyond(loop, loop.there + loop.back) <= 0
 
 
 def _steady(matrix: np.ndarray) -> list[float]:

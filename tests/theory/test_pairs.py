@@ -5,15 +5,16 @@ import math
 import os
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hapticclay as hc
 from hapticclay.scene.link import KINDS
+from hapticclay.theory import pair_roots
 from hapticclay.theory.pair_build import Build
 from hapticclay.theory.pair_delays import Delays
 from tests.hunt import HUNTS, examples, some
@@ -354,22 +355,68 @@ def test_poles_of_yokokohji_and_yoshikawa():
     np.testing.assert_allclose(2.0 * found[1] - found[0], np.sort_complex(want), atol=1e-4)
 
 
+def rounded(z, w):
+    """Whether two eigenvalues are one: Newton's method ends at 1e-13, those of a map at 1e-12."""
+    return abs(abs(z) - abs(w)) < 1e-10
+
+
+@given(seed=st.integers(0, 10**6))
+@examples(25)
+def test_the_largest_eigenvalue_without_states_is_that_of_the_map(seed):
+    """At up to 80 samples there and back; and how many lie beyond circles between two sizes."""
+    from benchmarks.pair_agreement import drawn as with_arms
+
+    for draw in (drawn, with_arms):
+        pair, rng = draw(seed), np.random.default_rng(seed)
+        loop = Build(pair).loop(tuple(pair.Ts * rng.uniform(0.0, 40.0, 2)))
+        if loop.states > 350:  # whose map takes seconds
+            continue
+        samples = loop.there + loop.back
+        assert rounded(pair_roots.largest(loop, samples), loop.eigenvalues[0])
+        size = np.sort(np.abs(np.linalg.eigvals(loop.map())))[::-1]
+        apart = np.flatnonzero((size[:-1] - size[1:] > 1e-6) & (size[1:] > 0.3))[:6]
+        for i in apart:
+            r = math.sqrt(size[i] * size[i + 1])
+            assert pair_roots.beyond(loop, samples, r) == i + 1
+
+
+@pytest.mark.parametrize("N", [2, 100, 300, 605])
+def test_two_arms_alike_are_the_roots_of_a_polynomial(N):
+    """z^N (d + n) = n and -n, with n/d the law's torque on an arm by its motion."""
+    M, D, Kp, Kd, Ts = 1.0, 2.0, 12.0, 1.0, 1e-3
+    step = scipy.linalg.expm(Ts * np.array([[0, 1, 0], [0, -D / M, 1 / M], [0, 0, 0]]))
+    F, g = step[:2, :2], step[:2, 2]
+    d = np.poly(F)
+    n = np.poly(F - np.outer(g, [Kp, Kd])) - d
+    late = np.concatenate([d + n, np.zeros(N)])
+    z = np.concatenate([np.roots(np.polysub(late, side * n)) for side in (1.0, -1.0)])
+    z = np.delete(z, np.abs(z - 1.0).argmin())
+    want = z[np.abs(z).argmax()]
+    device = hc.Device(M, D)
+    pair = hc.Pair(device, device, hc.JointPD((Kp,), (Kd,)), hc.Link(delay=N * Ts), Ts=Ts)
+    found = hc.theory.pair_limits(pair)
+    assert found.radius == pytest.approx(abs(want), abs=1e-10)
+    assert found.stable is bool(abs(want) < 1.0)
+    if not found.stable:
+        assert found.frequency == pytest.approx(abs(np.angle(want)) / (math.tau * Ts), rel=1e-7)
+
+
 def test_a_long_delay_is_judged_without_states(monkeypatch):
-    """The same verdict, and the same unstable eigenvalue, as by the map."""
+    """The same verdict, motion and eigenvalue as by the map."""
     from hapticclay.theory import pair_verdict
 
-    pair = one(Ts=2e-3)
-    for delay in (0.1, 0.3):
-        late = replace(pair, link=replace(pair.link, delay=delay))
-        by_map = hc.theory.pair_limits(late)
-        monkeypatch.setattr(pair_verdict, "LARGE", 10)
-        monkeypatch.setattr(pair_verdict, "MOST_STATES", 10)
-        counted = hc.theory.pair_limits(late)
-        monkeypatch.undo()
-        assert counted.stable is by_map.stable
-        if not counted.stable:
-            assert counted.radius == pytest.approx(by_map.radius, abs=1e-9)
-        assert (counted.radius < 1.0) is counted.stable
+    arm = hc.MjcfArm("planar_2r")
+    two = hc.Pair(arm, arm, hc.JointPD((20.0, 20.0), (0.5, 0.5)), Ts=2e-3)
+    for pair in (one(Ts=2e-3), two):
+        for delay in (0.04, 0.1, 0.2):
+            late = replace(pair, link=replace(pair.link, delay=delay))
+            monkeypatch.setattr(pair_verdict, "LARGE", 10_000)
+            by_map = hc.theory.pair_limits(late)
+            monkeypatch.setattr(pair_verdict, "LARGE", 10)
+            counted = hc.theory.pair_limits(late)
+            monkeypatch.undo()
+            assert counted.stable is by_map.stable and counted.mode == by_map.mode
+            assert rounded(counted.radius, by_map.radius)
 
 
 def test_a_force_that_is_never_met_goes_around_at_no_delay():
@@ -653,20 +700,6 @@ def test_a_file_that_a_pair_names_is_told_by_its_table(tmp_path):
     )
     with pytest.raises(hc.ParameterError, match=r"^follower\.file = 'leader7'"):
         hc.Pair.load(tmp_path / "pair.toml")
-
-
-def test_a_real_eigenvalue_on_the_grid_is_found():
-    """A loop around whose only eigenvalue is z^N at an angle of the search, to the last bit."""
-    from hapticclay.theory import pair_delays
-
-    grid = 1.0 + np.geomspace(pair_delays.AT_REST, 0.3, pair_delays.BY_FACTORS // 4)
-    pairs = ((z, z**n, n) for n in (10, 20, 30) for z in grid[10:-1].tolist())
-    z, x, samples = next(p for p in pairs if np.log(p[1]) == p[2] * np.log(p[0]))
-    loop = SimpleNamespace(
-        free=False, there=1, back=1, around=lambda angles: np.full((len(angles), 1, 1), x)
-    )
-    found = pair_delays.Delays(loop)._on_axis(samples)
-    assert found == [pytest.approx(z, abs=1e-13)]
 
 
 @pytest.mark.parametrize(
