@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -446,11 +446,19 @@ class Study:
             "rate_per_delay": float(by_rate[-1]),
         }
 
+    def _elsewhere(self) -> tuple[str, float]:
+        """Where else the law may run, the host or drives, and the radius of its loop there."""
+        if self.law.runs == "drive":
+            at = timing_words(self.Ts, self.delay)
+            return f"in a host at {at}", self.remade(law=replace(self.law, runs="host")).radius()
+        loop = self.remade(law=replace(self.law, runs="drive"))
+        return "in drives, whose own loops count as continuous (runs drive)", loop.radius()
+
     def assumed(self) -> tuple[str, ...]:
         """What the verdict rests on, a sentence each."""
         held = f"{SMALL}, no hand at the handle"
         law = f"law: {self.law.words}"
-        own = file_servo.words(self.arm, self.law)
+        own = file_servo.words(self.arm, self.law, self._elsewhere())
         return (*own, *self.arm.notes, gravity_words(self.compensated), law, held, IGNORED)
 
 
