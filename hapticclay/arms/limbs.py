@@ -86,6 +86,16 @@ def depth_behind(model: Any, body: int) -> int:
     return max(behind, default=0)
 
 
+def branches(model: Any, body: int, inner: int) -> list[int]:
+    """Depths of what a body carries, but for what carries a body behind it."""
+    path = set(bodies_to_root(model, inner))
+    out = []
+    for child in range(body + 1, model.nbody):
+        if int(model.body_parentid[child]) == body and child not in path:
+            out.append(int(model.body_jntnum[child]) + depth_behind(model, child))
+    return out
+
+
 def arm_limb(model: Any) -> Limb | None:
     """The arm of a file that names no handle: the limb from the base to where a hand branches.
 

@@ -290,6 +290,12 @@ class Mechanism:
         """Torques that hold the arm against its weight where `at` put it [N.m], shape (n,)."""
         return (self._data.qfrc_bias - self._data.qfrc_gravcomp) @ self._follow()
 
+    def taken(self, q: np.ndarray, w: np.ndarray) -> float:
+        """Power that dampers and a fluid take at positions and rates of the joints [W]."""
+        self._at(q)
+        moving = self.moving(w)
+        return float(w @ (moving.damping @ w - moving.drag))
+
     def energy(self, q: np.ndarray, w: np.ndarray) -> float:
         """Energy of motion, weight and springs at positions and rates of the joints [J]."""
         self._at(q)

@@ -31,8 +31,8 @@ class ArmCommand:
     Attributes:
         file: MJCF or URDF file of the arm, or the name of one of the package: planar_2r, five_bar,
             haptic_3, leader_7.
-        gains: File of the gains, .toml, .json or .yaml, as teleoperation projects keep them; by
-            default those of the actuators of the arm's file.
+        gains: File of the gains, .toml, .json or .yaml, as projects keep them, FILE:TABLE for one
+            of several tables; by default those of the actuators of the arm's file.
         Kp: Stiffness of each joint, or one for all [N.m/rad], in place of the file's.
         Kd: Damping of each joint, or one for all [N.m.s/rad], likewise.
         rate: Control rate [Hz], by default 1000.
@@ -165,7 +165,7 @@ class ArmCommand:
             if getattr(self, name) is not None
         }
         if self.gains:
-            return JointPD.load(self.gains, **given)
+            return JointPD.load(self.gains, arm.names, **given)
         n = max(len(self.Kp), len(self.Kd)) if len(self.Kp) + len(self.Kd) > 2 else len(arm.names)
         for name in ("Kp", "Kd"):
             if values := getattr(self, name):

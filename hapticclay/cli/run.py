@@ -177,7 +177,8 @@ def run_table(record: Record, paced: bool = False) -> str:
 
 def _joint_table(record: Record) -> str:
     """What the joints of an arm from a file did."""
-    from ..scene.joint_numbers import references, torque_limits
+    from ..arms.joint_units import table_of
+    from ..scene.joint_numbers import references, torque_limits, turning
 
     s, some = record.scenario, len(record.t) > 0
     pulled, limits = references(s), torque_limits(s)
@@ -191,6 +192,7 @@ def _joint_table(record: Record) -> str:
         table["largest torque [N.m]"] = abs(record.tau).max(axis=0).tolist()
     if any(map(math.isfinite, limits)):
         table["limit [N.m]"] = [x if math.isfinite(x) else math.nan for x in limits]
+    table = table_of(table, turning(s))
     return text_table(table, dict.fromkeys(table, "z.4g"))
 
 
