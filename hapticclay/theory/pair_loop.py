@@ -213,9 +213,16 @@ class PairLoop:
         """
         if not self.structural:
             return np.zeros((self.n, self.n))
-        Y = self._rest.drift(self._inputs)[1]
+        return self._rates(self._rest.drift(self._inputs)[1])
+
+    def unresisted(self) -> np.ndarray:
+        """Measured rates of steady motions that nothing resists, shape (n, free)."""
+        return self._rates(self._rest.unresisted()) if self.free else np.zeros((self.n, 0))
+
+    def _rates(self, X: np.ndarray) -> np.ndarray:
+        """Measured rates of leader and follower in unknowns of the equations."""
         v = self.leader.columns["v"], self.follower.columns["v"]
-        return np.vstack([Y[v[0]], Y[self.leader.size :][v[1]]])
+        return np.vstack([X[v[0]], X[self.leader.size :][v[1]]])
 
     # ---- on the unit circle
 

@@ -23,6 +23,7 @@ from .pair_build import Build
 from .pair_delays import SLOWEST
 from .pair_loop import PairLoop
 from .pair_onset import LATEST, Onset, onset
+from .rest import FREE
 
 LARGE = 200  # states of a map whose eigenvalues are not worth their time
 HIGHEST = 64.0  # factor of all Kp up to which gains are tried
@@ -287,6 +288,8 @@ class Study:
         angles = grid(loop)
         angles = angles[angles >= SLOWEST]  # below, rounding hides the imaginary part
         rates, steady = loop.responses(angles)[1], loop.drift()
+        free = np.abs(loop.unresisted()).max(1, initial=0.0)
+        runs_away = free > FREE * free.max()  # under any friction that is fed forward there
         partner = np.abs(self.pair.mapping).argmax(0)
 
         def largest(weights: np.ndarray) -> float:
@@ -294,6 +297,8 @@ class Study:
             used = np.flatnonzero(weights)
             if not len(used):
                 return math.inf
+            if runs_away[used].any():
+                return 0.0
             at, gains = np.ix_(used, used), weights[used][:, None]
 
             def response(theta: np.ndarray) -> np.ndarray:

@@ -56,6 +56,21 @@ class Rest:
         size = np.linalg.svd(self.drag, compute_uv=False)
         return int(np.sum(size <= max(FREE * size[0], NO_DRAG)))
 
+    def unresisted(self) -> np.ndarray:
+        """Y of the steady motions X = R u/(z - 1) + Y that nothing resists, shape (k, free).
+
+        T Y = -T' R u, where drag u = 0.
+        """
+        R = self._vectors[1]
+        null = np.linalg.svd(self.drag)[2][self.directions - self.free :].T
+        return self._beside(-self._slope() @ R @ null)
+
+    def _beside(self, pushed: np.ndarray) -> np.ndarray:
+        """The least Y of T(1) Y = pushed."""
+        whole, rows, columns = balanced(self.equations(1.0).real)
+        Y = np.linalg.lstsq(whole, rows[:, None] * pushed, rcond=FREE)[0]
+        return columns[:, None] * Y
+
     def trend(self, later: Rest) -> int:
         """What a change does where drag is singular: 1 if the real eigenvalue 1 leaves, else -1.
 
@@ -81,9 +96,7 @@ class Rest:
         """
         L, R = self._vectors
         moved = R @ np.linalg.lstsq(self.drag, L.T @ inputs, rcond=NO_DRAG)[0]
-        whole, rows, columns = balanced(self.equations(1.0).real)
-        pushed = rows[:, None] * (inputs - self._slope() @ moved)
-        return moved, columns[:, None] * np.linalg.lstsq(whole, pushed, rcond=FREE)[0]
+        return moved, self._beside(inputs - self._slope() @ moved)
 
 
 def balanced(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

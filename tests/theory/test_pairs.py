@@ -482,6 +482,42 @@ def test_friction_is_held_by_the_lag_of_the_reference(runs, lag, ripple):
     assert hc.theory.pair_limits(pair).slope[0] == pytest.approx(0.1 + 400.0 * lag, rel=ripple)
 
 
+@pytest.mark.parametrize("D", [0.0, 1e-4, 0.05])
+@pytest.mark.parametrize("velocity", ["exact", "difference"])
+def test_waves_leave_common_motion_to_the_damping_of_the_devices(D, velocity):
+    """No link resists it, so a slope of D at both arms is the limit: none without damping."""
+    law = hc.JointPD((900.0,), (60.0,), velocity=velocity, friction=[(0.0, 1.0, 0.5)])
+    device = hc.Device(1.0, D)
+    found = hc.theory.pair_limits(hc.Pair(device, device, law, hc.Link("waves", 1e-3)))
+    assert found.slope[0] == pytest.approx(D, rel=1e-6, abs=1e-12)
+    assert found.friction_fraction == pytest.approx(D / 0.5, rel=1e-6, abs=1e-12)
+
+
+@given(seed=st.integers(0, 10**6))
+@examples(10)
+def test_the_share_of_friction_flips_any_map(seed):
+    """Waves and others, devices with and without damping: the map is stable up to the share."""
+    rng = np.random.default_rng(seed)
+    kind = str(rng.choice(KINDS))
+    devices = [hc.Device(10.0 ** rng.uniform(-1, 1), rng.choice([0.0, 0.01, 0.3])) for _ in "lf"]
+    law = hc.JointPD(
+        (10.0 ** rng.uniform(0.0, 3.0),), (10.0 ** rng.uniform(-1.0, 1.5),), friction=[(0, 1, 0.5)]
+    )
+    pair = hc.Pair(*devices, law, hc.Link(kind, 4e-3), Ts=2e-3)
+    build, share = Build(pair), hc.theory.pair_limits(pair).friction_fraction
+
+    def radius(x):
+        return build.loop(friction=(np.array([0.5 * x]),) * 2).radius()
+
+    if share == 0.0:  # at once, or without friction already
+        assert max(radius(0.0), radius(1e-2)) > 1.0 + 1e-10
+        return
+    top = min(share, 100.0)
+    below = [0.9999 * top, *(top * np.geomspace(1e-4, 0.95, 8))]
+    assert max(map(radius, below)) < 1.0 + 1e-10
+    assert share > 100.0 or max(radius(1.001 * share), radius(2.0 * share)) > 1.0
+
+
 def test_less_stiffness_and_more_damping_do_not_help():
     """An undamped common motion: half the Kp and 1.5 times the Kd leave its growth."""
     law = replace(DRIVE, friction=FRICTION)
