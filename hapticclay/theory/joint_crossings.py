@@ -45,7 +45,7 @@ def zeros(response: Response, angles: np.ndarray, sign: Sign) -> tuple[np.ndarra
     below = sign(values) < 0.0  # a zero on the grid counts once
     i, branch = np.nonzero(below[:-1] != below[1:])
     ends = angles[i], angles[i + 1]
-    return _refined(response, sign, ends, (values[i, branch], values[i + 1, branch]))
+    return refined(response, sign, ends, (values[i, branch], values[i + 1, branch]))
 
 
 def log_size(values: np.ndarray) -> np.ndarray:
@@ -77,7 +77,7 @@ def branches(values: np.ndarray) -> np.ndarray:
     return np.take_along_axis(values, order, axis=1)
 
 
-def _refined(
+def refined(
     response: Response,
     sign: Sign,
     ends: tuple[np.ndarray, np.ndarray],

@@ -313,6 +313,39 @@ def test_no_delay_below_the_limit_is_unstable(seed, kind):
         assert build.loop((late, late)).radius() < 1.0 + 1e-9
 
 
+def test_a_window_between_two_whole_samples_is_a_limit():
+    """Stable at 0, 1, 2, 3 and 4 samples, unstable from 0.064 to 0.969 of one: by the map."""
+    law = hc.JointPD((2.702e6,), (114.05,), runs="drive")
+    other = hc.JointPD((120656.0,), (836.33,), runs="drive")
+    devices = hc.Device(2.0738, 0.58687), hc.Device(1.3487, 2.9628)
+    pair = hc.Pair(*devices, law, hc.Link(rates=False), other, Ts=6.7727e-4, delay=2.709e-4)
+    build, limit = Build(pair), hc.theory.pair_limits(pair).delay
+    late = pair.Ts * np.arange(0.0, 6.0, 0.02)
+    size = np.array([build.loop((x, x)).radius() for x in late.tolist()])
+    first = int(np.argmax(size > 1.0 + 1e-9))
+    assert late[first - 1] <= limit <= late[first]
+
+
+@pytest.mark.parametrize("runs", ["host", "drive"])
+def test_no_factor_of_the_gains_below_the_largest_is_unstable(runs):
+    """Random stiff pairs, whose stability comes and goes with the gains: by 80 maps each."""
+    for seed in some(range(20), 6):
+        rng = np.random.default_rng((seed, 11))
+        Ts, mass = 1e-3, 10.0 ** rng.uniform(-1.0, 0.5, 2)
+        laws = []
+        for m in mass.tolist():
+            omega, zeta = rng.uniform(0.02, 0.9) / Ts, 10.0 ** rng.uniform(-2.0, 0.2)
+            laws.append(hc.JointPD((m * omega**2,), (2.0 * zeta * omega * m,), runs=runs))
+        devices = [hc.Device(m, 0.1 * m) for m in mass.tolist()]
+        link = hc.Link(delay=Ts * rng.uniform(0.0, 6.0))
+        pair = hc.Pair(*devices, laws[0], link, laws[1], Ts)
+        build, gain = Build(pair), hc.theory.pair_limits(pair).gain
+        factors = np.geomspace(1.0, min(gain, 64.0) * (1.0 - 2e-4), 80) if gain else [1.0]
+        size = max(build.loop(gain=x).radius() for x in factors)
+        assert (size < 1.0 + 1e-9) is (gain > 0.0)
+        assert not 0.0 < gain < 64.0 or build.loop(gain=gain * (1.0 + 2e-4)).radius() > 1.0
+
+
 def test_only_the_round_trip_matters():
     pair = one()
     for there, back in ((0.3, 0.02), (0.02, 0.3), (0.16, 0.16)):
