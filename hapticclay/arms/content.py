@@ -124,11 +124,15 @@ CONTENT = (
         "actuator", "ctrlrange ctrllimited gaintype gainprm", USED,
         "the same of a motor, whose force is its control times the gain",
     ),
+    Content(
+        "actuator", "biastype biasprm", USED,
+        "gains of its joint: the law of `hapticclay arm FILE` and `hc.JointPD.of(arm)`",
+    ),
     Content("actuator", "joint jointinparent tendon group", USED, "what it drives"),
     Content(
         "actuator",
         "name class nsample interp delay actlimited actrange lengthrange cranklength site refsite "
-        "body cranksite slidersite user actdim dyntype biastype dynprm biasprm velrange ffrange "
+        "body cranksite slidersite user actdim dyntype dynprm velrange ffrange "
         "inheritrange input actearly",
         NOTED, "actuators give no torque: the law that is judged does",
     ),

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ..display import one_line
+import numpy as np
+
+from ..display import names_words
 from .places import place_of
 
-MOST_NAMES = 6  # of files that are not there
 READ = (".stl", ".obj", ".msh")  # endings of meshes that MuJoCo reads
 
 
@@ -36,8 +38,9 @@ def drop(spec: Any, path: Path | None) -> tuple[tuple[str, ...], dict[str, str]]
             if not gives or geom.meshname in gone:
                 dropped.append(geom)
             if gives and geom in dropped:
-                lacking[body.name or "a body"] = meshes[geom.meshname].file
-        delete(spec, body, dropped)
+                body.name = body.name or _free_name(spec, "unnamed body")
+                lacking[body.name] = meshes[geom.meshname].file
+        delete(spec, body, dropped + [g for g in body.geoms if _is_flat(g)])
     absent = [Path(meshes[x].file.replace("\\", "/")).name for x in places if x in gone]
     for name, place in places.items():
         if place is not None:
@@ -80,6 +83,25 @@ def _gives_inertia(body: Any, geom: Any) -> bool:
     return low <= geom.group <= high and geom.mass != 0.0 and geom.density != 0.0
 
 
+def _is_flat(geom: Any) -> bool:
+    """Whether a geom has no volume, nor a mass of its own; MuJoCo refuses it."""
+    from ..physics import mujoco
+
+    kinds = mujoco.mjtGeom
+    sizes = {kinds.mjGEOM_SPHERE: 1, kinds.mjGEOM_ELLIPSOID: 3, kinds.mjGEOM_BOX: 3}
+    ends = 2 if np.isnan(geom.fromto[0]) else 1  # sizes of what lies between two points
+    sizes |= {kinds.mjGEOM_CAPSULE: ends, kinds.mjGEOM_CYLINDER: ends}
+    count = 0 if geom.mass > 0.0 else sizes.get(geom.type, 0)
+    return any(x == 0.0 for x in geom.size[:count])
+
+
+def _free_name(spec: Any, name: str) -> str:
+    """A name that no body has."""
+    taken = {body.name for body in spec.bodies}
+    numbers = (f"{name} {i}" for i in itertools.count(2))
+    return next(x for x in itertools.chain([name], numbers) if x not in taken)
+
+
 def _place(mesh: Any, spec: Any, path: Path | None) -> Path | None:
     """The file of a mesh; None if it is not there, or none that MuJoCo reads."""
     if mesh is None or not mesh.file or Path(mesh.file).suffix.lower() not in READ:
@@ -112,6 +134,4 @@ def absent_words(absent: list[str]) -> Iterator[str]:
     """A sentence about files that are not there."""
     names = list(dict.fromkeys(absent))
     if names:
-        more = f" and {len(names) - MOST_NAMES} more" * (len(names) > MOST_NAMES)
-        shown = one_line(", ".join(names[:MOST_NAMES]), 300)
-        yield f"not there, and take no part: {shown}{more}"
+        yield f"not there, and take no part: {names_words(names)}"

@@ -7,6 +7,7 @@ object) ends a chain, as the world does.
 from __future__ import annotations
 
 import copy
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -251,7 +252,7 @@ def hold(
         The model without them, compiled again; the number of each joint in it, by that before;
         sentences about what is held.
     """
-    from ..physics import mujoco
+    from ..physics import mujoco, warnings_caught
 
     kept = [j for j in range(model.njnt) if limbs.is_scalar(model, j)]
     numbers = {j: i for i, j in enumerate(kept)}
@@ -270,7 +271,9 @@ def hold(
     kind, number = handle or ("body", 0)
     tip = int(model.site_bodyid[number]) if kind == "site" else number
     words = list(_held_words(model, held, tip))
-    return spec.compile(), numbers, words
+    with warnings_caught(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # they were heard when it was compiled first
+        return spec.compile(), numbers, words
 
 
 def _put(body: Any, model: Any, data: Any, number: int) -> None:

@@ -20,9 +20,9 @@ class JointPD:
     """The torque -Kp (q - q_ref) - Kd w of each joint, held from sample to sample.
 
     Attributes:
-        Kp: stiffness of each joint [N.m/rad], 0 to 1e9.
-        Kd: damping of each joint [N.m.s/rad], 0 to 1e9; negative values are refused, since a
-            friction feed-forward is given as such.
+        Kp: stiffness of each joint [N.m/rad], 0 to 1e9; of joints that slide [N/m], as numbers.
+        Kd: damping of each joint [N.m.s/rad], likewise [N.s/m], 0 to 1e9; negative values are
+            refused, since a friction feed-forward is given as such.
         velocity: how the rate w is had: "exact"; "difference" of the measured positions over a
             sample; or that behind a low-pass "filter":
             w_k = (w_k-1 + wc (q_k - q_k-1))/(1 + wc Ts).
@@ -90,22 +90,55 @@ class JointPD:
 
     @classmethod
     @checked
-    def load(cls, file: str | os.PathLike[str], **changes: Any) -> JointPD:
+    def of(cls, arm: MjcfArm, **changes: Any) -> JointPD:
+        """The gains that the actuators of an arm's file give its joints.
+
+        Those of position and velocity servos, general ones with an affine bias, PID and motors with
+        a controller, with gear and damping ratio, where each pulls at one joint of the arm.
+
+        Args:
+            arm: an arm from a file.
+            **changes: fields of the law that the file does not have, or replace those that it has.
+
+        Raises:
+            ParameterError: the file has no gains.
+        """
+        if not arm.servo.taken:
+            n, names = len(arm.names), ", ".join(arm.names)
+            each = f", or {n} numbers each ({names})" * (n > 1)
+            bound = (
+                "must be given, since the arm's file has none: --gains FILE, or --Kp and --Kd, "
+                f"one number for all joints{each}"
+            )
+            raise ParameterError("gains", None, bound)
+        return cls(**{"Kp": arm.servo.Kp, "Kd": arm.servo.Kd, **changes})
+
+    @classmethod
+    @checked
+    def load(
+        cls,
+        file: str | os.PathLike[str],
+        joints: tuple[str, ...] | None = None,
+        **changes: Any,
+    ) -> JointPD:
         """Reads gains from a file, under the names that projects give them.
 
         A table with `Kp` and `Kd` (OpenArm's LeaderArmParam and FollowerArmParam, with Fc, k, Fv:
         its friction torque is Fc tanh(0.1 k w) + Fv w; its eighth joint, the gripper, is left
-        out), with `position_kp` and `position_kd`, or with `position_p_coefficient` and
-        `position_d_coefficient` (LeRobot).
+        out), `position_kp` and `position_kd`, or `position_p_coefficient` and
+        `position_d_coefficient` (LeRobot), `k_gains` and `d_gains` (Franka), `kps` and `kds`
+        (Unitree), or with `p`, `i` = 0 and `d` of each joint (ros2_control).
 
         Args:
-            file: .toml, .json, .yaml or .yml.
+            file: .toml, .json, .yaml or .yml; with several tables of gains FILE:TABLE.
+            joints: the arm's joints, in whose order gains by name are put; None for the file's.
             **changes: fields of the law that are not in the file, or replace those that are.
 
         Raises:
-            ParameterError: the file cannot be read, or holds no gains or two sets of them.
+            ParameterError: the file cannot be read, or holds no gains, or several tables of them
+                and none is chosen.
         """
-        return cls(**{**gain_files.read_gains(file), **changes})
+        return cls(**{**gain_files.read_gains(file, joints), **changes})
 
 
 def rate_filter(cutoff: float | None, Ts: float) -> tuple[float, float]:

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from ..errors import ParameterError
 
-MOST_TIPS = 8  # that are named
+class Several(Exception):
+    """A file has several limbs, none of which is the arm.
+
+    Args:
+        tips: names of the bodies at their ends.
+    """
+
+    def __init__(self, tips: list[str]):
+        super().__init__(tips)
+        self.tips = tips
 
 
 class Limb(NamedTuple):
@@ -78,6 +86,16 @@ def depth_behind(model: Any, body: int) -> int:
     return max(behind, default=0)
 
 
+def branches(model: Any, body: int, inner: int) -> list[int]:
+    """Depths of what a body carries, but for what carries a body behind it."""
+    path = set(bodies_to_root(model, inner))
+    out = []
+    for child in range(body + 1, model.nbody):
+        if int(model.body_parentid[child]) == body and child not in path:
+            out.append(int(model.body_jntnum[child]) + depth_behind(model, child))
+    return out
+
+
 def arm_limb(model: Any) -> Limb | None:
     """The arm of a file that names no handle: the limb from the base to where a hand branches.
 
@@ -85,7 +103,7 @@ def arm_limb(model: Any) -> Limb | None:
     beside a head), and ends where what it carries is no longer than itself (fingers).
 
     Raises:
-        ParameterError: there are several; the message names their ends.
+        Several: there are several.
     """
     limbs = _limbs(model)
     if not limbs:
@@ -95,20 +113,11 @@ def arm_limb(model: Any) -> Limb | None:
         first = max(limbs, key=lambda limb: limb.depth)
         rivals = [limb for limb in limbs if 2 * limb.depth > first.depth]
         if len(rivals) > 1:
-            raise _several(model, rivals)
+            raise Several([_name(model, tip) for limb in rivals for tip in _tips(limb)])
         joints += first.joints
         if not first.branches or max(limb.depth for limb in first.branches) <= len(joints):
             return Limb(joints, first.tip, first.branches)
         limbs = first.branches
-
-
-def _several(model: Any, limbs: Sequence[Limb]) -> ParameterError:
-    """The refusal of a file with several limbs, with the bodies at their ends."""
-    tips = [_name(model, tip) for limb in limbs for tip in _tips(limb)]
-    more = f" and {len(tips) - MOST_TIPS} more" * (len(tips) > MOST_TIPS)
-    shown = f"{', '.join(tips[:MOST_TIPS])}{more}"
-    bound = f"must be named: the file has several limbs; name a site or a body such as {shown}"
-    return ParameterError("site", None, bound)
 
 
 def _tips(limb: Limb) -> list[int]:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import ParameterError, choice, is_series, number
+from ..units import is_quantity
 from . import actuators, content, handles, islands, limbs, model_file, passive
 from .joint_ranges import outside_words
 from .mechanism import Mechanism
+from .servo_gains import ServoGains, servo_gains
 
 LIGHTEST = 1e-12  # [kg.m^2] least eigenvalue of M of a mechanism with an inverse
 BOUNDS = {  # least and largest value, units at a hinge and at a slide
@@ -40,6 +44,7 @@ class Loaded(NamedTuple):
         ranges: range of each joint [rad or m], shape (n, 2).
         notes: what the file leaves open.
         handles: sites and bodies that may be the handle, where there is none.
+        servo: gains of the file's actuators.
     """
 
     name: str
@@ -48,6 +53,7 @@ class Loaded(NamedTuple):
     ranges: np.ndarray
     notes: tuple[str, ...]
     handles: tuple[str, ...]
+    servo: ServoGains
 
 
 def load(arm: Any) -> Loaded:
@@ -59,15 +65,18 @@ def load(arm: Any) -> Loaded:
     file = model_file.opened(arm.file)
     grip = handles.handle(file.model, arm.site, _named_joints(file.model, arm.joints))
     joints = _arm_joints(file.model, arm.joints, grip.chain)
-    _refuse_lacking(file, joints)
-    key = keyframe(file.model, arm.pose)
+    without = _without_mass(file, joints)
+    wanted = _wanted_pose(arm.pose, joints)
+    key = keyframe(file.model, wanted)
     position = file.model.qpos0 if key is None else file.model.key_qpos[key]
     model, numbers, locked = islands.hold(file.spec, file.model, position, grip.site)
+    file.finish(model)
+    whole = copy.copy(file.model)  # as the file's own simulation has it
     joints, site = [numbers[j] for j in joints], grip.site
     outside = [*locked, *islands.release(model, joints), *content.off(model)]
     passive.settle(model)
     content.refuse(model)
-    pose = _pose(model, arm.pose, joints)
+    pose = _pose(model, wanted, joints)
     names = tuple(model.joint(j).name for j in joints)
     dofs = [int(model.jnt_dofadr[j]) for j in joints]
     fields: dict[str, Any] = {
@@ -89,28 +98,75 @@ def load(arm: Any) -> Loaded:
     fields["torque_limit"] = tuple(given)
     _check_inertia(mechanism, names)
     fields["pose"] = {model.joint(j).name: float(q) for j, q in enumerate(mechanism.pose)}
-    own = _notes(model, arm, mechanism, joints)
+    own = _notes(model, arm, mechanism, joints, wanted)
     return Loaded(
         file.name,
         mechanism,
         fields,
         _ranges(model, joints),
-        (*own, *grip.notes, *outside, *_moved(model, arm, mechanism, pose), *file.notes),
+        (
+            *_guessed(file, without),
+            *own,
+            *grip.notes,
+            *outside,
+            *_moved(model, wanted, mechanism, pose),
+            *file.notes,
+        ),
         grip.names,
+        _servo(whole, position, numbers, mechanism, names),
     )
 
 
-def _refuse_lacking(file: model_file.Opened, joints: Sequence[int]) -> None:
-    """Refuses an arm with a link whose inertia is in a mesh that is not there."""
-    island = islands.island(file.model, joints)
+def _servo(
+    whole: Any,
+    start: np.ndarray,
+    numbers: dict[int, int],
+    mechanism: Mechanism,
+    names: Sequence[str],
+) -> ServoGains:
+    """Gains of the file's actuators at the arm's pose, from the model of the whole file."""
+    position, follow = np.array(start), np.zeros((whole.nv, len(names)))
+    moves = mechanism.follow()
+    for before, now in numbers.items():
+        position[whole.jnt_qposadr[before]] = mechanism.pose[now]
+        follow[whole.jnt_dofadr[before]] = moves[now]
+    return servo_gains(whole, position, follow, names)
+
+
+def _guessed(file: model_file.Opened, without: Sequence[str]) -> Iterator[str]:
+    """Sentences about mass that the file does not state."""
+    if links := [x for x in file.guessed if x not in without]:
+        names = ", ".join(links)
+        yield f"no inertia in the file, computed from geometry at 1000 kg/m^3: {names}"
+    if without:
+        names = ", ".join(without)
+        yield f"no inertia in the file, nor the mesh that gives it, counted as none: {names}"
+
+
+def _without_mass(file: model_file.Opened, joints: Sequence[int]) -> list[str]:
+    """What an arm carries whose inertia is in a mesh that is not there.
+
+    Raises:
+        ParameterError: it is a link of the arm itself.
+    """
+    model, carried = file.model, []
+    island = islands.island(model, joints)
+    links = {int(model.jnt_bodyid[j]) for j in island}
     for link, mesh in file.lacking.items():
-        body = file.model.body(link).id if link else 0
-        if island.intersection(limbs.joints_to_root(file.model, body)):
+        body = model.body(link).id
+        if not island.intersection(limbs.joints_to_root(model, body)):
+            continue
+        weld = int(model.body_weldid[body])
+        if body in links or (
+            weld in links and not model.body_mass[model.body_weldid == weld].sum() > LIGHTEST
+        ):
             bound = (
                 f"must be there, as STL, OBJ or MSH: the inertia of {link} comes from it; or state "
                 f"<inertial> for {link}"
             )
             raise ParameterError("mesh", mesh, bound)
+        carried.append(link)
+    return carried
 
 
 # ---- joints --------------------------------------------------------------------------------------
@@ -151,12 +207,14 @@ def _per_joint(
     names = [model.joint(j).name for j in joints]
     if given is None:
         pairs: dict[int, Any] = {}
+    elif _is_one(given):
+        pairs = dict.fromkeys(range(len(names)), given)
     elif isinstance(given, Mapping):
         pairs = {names.index(full_name(field, word, names)): x for word, x in given.items()}
     elif is_series(given) and len(list(given)) == len(names):
         pairs = dict(enumerate(given))
     else:
-        bound = f"must be a number for each joint ({', '.join(names)}), or by name"
+        bound = f"must be a number for each joint ({', '.join(names)}), for all, or by name"
         raise ParameterError(field, given, bound)
     low, high, *units = BOUNDS[field]
     out = [float(x) for x in old]
@@ -167,6 +225,11 @@ def _per_joint(
         unit = units[int(model.jnt_type[joints[i]]) == SLIDE]
         out[i] = number(f"{field}[{names[i]}]", x, low, high, unit=unit)
     return out
+
+
+def _is_one(given: Any) -> bool:
+    """Whether a value is one number, or text of one, for all joints."""
+    return isinstance(given, str) or (isinstance(given, Real) and not isinstance(given, bool))
 
 
 def full_name(field: str, word: Any, names: Sequence[str]) -> str:
@@ -189,6 +252,16 @@ def _refuse_negative(field: str, values: np.ndarray, model: Any) -> None:
         name = model.joint(model.dof_jntid[j]).name
         bound = f"must be >= 0 in the file ({IN_MODEL[field].removeprefix('dof_')})"
         raise ParameterError(f"{field}[{name}]", float(values[j]), bound)
+
+
+def _wanted_pose(pose: Any, joints: Sequence[int]) -> Any:
+    """A pose as it is given; of an arm with one joint a text may be its position."""
+    if len(joints) > 1 or not isinstance(pose, str):
+        return pose
+    try:
+        return [float(pose)]
+    except ValueError:
+        return [pose] if is_quantity(pose) else pose
 
 
 def keyframe(model: Any, pose: Any) -> int | None:
@@ -259,7 +332,8 @@ def _check_inertia(mechanism: Mechanism, names: Sequence[str]) -> None:
     if not np.linalg.eigvalsh(inertia).min() > LIGHTEST:
         light = names[int(np.diag(inertia).argmin())]
         bound = (
-            "must have an inertia: the links behind it have none along its axis, nor has a rotor"
+            "must have an inertia: the links behind it have none along its axis, nor has a rotor: "
+            f"state <inertial> in the file, or armature of {light} [kg.m^2]"
         )
         raise ParameterError("joint", light, bound)
 
@@ -280,9 +354,9 @@ def _shown(point: np.ndarray) -> str:
     return "(" + ", ".join(f"{x:.4g}" for x in np.round(point, 9) + 0.0) + ")"
 
 
-def _moved(model: Any, arm: Any, mechanism: Mechanism, pose: np.ndarray) -> Iterator[str]:
+def _moved(model: Any, wanted: Any, mechanism: Mechanism, pose: np.ndarray) -> Iterator[str]:
     """A sentence if the pose of the file does not close the arm's chain."""
-    if arm.pose is None and mechanism.following:
+    if wanted is None and mechanism.following:
         i = max(mechanism.following, key=lambda i: abs(mechanism.pose[i] - pose[i]))
         gap = float(mechanism.pose[i] - pose[i])
         if abs(gap) > OPEN:
@@ -290,10 +364,10 @@ def _moved(model: Any, arm: Any, mechanism: Mechanism, pose: np.ndarray) -> Iter
             yield f"the pose of the file does not close the chain: {name} was moved by {gap:.3g}"
 
 
-def _pose_notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> Iterator[str]:
+def _pose_notes(model: Any, wanted: Any, mechanism: Mechanism, joints: list[int]) -> Iterator[str]:
     """Whose the pose is, unless it is given, and whether the arm can take it."""
-    by_key = arm.pose is None or isinstance(arm.pose, str | int)
-    key = keyframe(model, arm.pose) if by_key else None
+    by_key = wanted is None or isinstance(wanted, str | int)
+    key = keyframe(model, wanted) if by_key else None
     whose = (
         "zero position of the file"
         if key is None
@@ -311,7 +385,7 @@ def _key_name(model: Any, key: int) -> str:
     return model.key(key).name or str(key)
 
 
-def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> list[str]:
+def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int], wanted: Any) -> list[str]:
     """Sentences about what the file leaves open, and what of it takes no part."""
     names = [model.joint(j).name for j in joints]
     rotors = model.dof_armature[mechanism.dofs]
@@ -323,7 +397,7 @@ def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> lis
             f"no rotor inertia (armature) at {', '.join(bare)}: limits of geared joints are then "
             "far too low"
         )
-    notes += _pose_notes(model, arm, mechanism, joints)
+    notes += _pose_notes(model, wanted, mechanism, joints)
     used = {*mechanism.dofs, *mechanism.following}
     locked = [model.joint(j).name for j in range(model.njnt) if j not in used]
     if locked:
@@ -333,7 +407,7 @@ def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> lis
         notes.append(f"constraints, taken as rigid, move {', '.join(tied)}")
         notes += _anchors(model)
     if model.nactuator:
-        notes.append(f"{model.nactuator} actuators of the file take no part")
+        notes.append(f"{model.nactuator} actuators of the file give no torque beside the law")
     if np.any(model.geom_contype | model.geom_conaffinity):
         notes.append("contacts of the file take no part")
     if arm.torque_limit is None:

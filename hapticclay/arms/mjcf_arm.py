@@ -14,6 +14,7 @@ from ..arguments import named
 from ..errors import ParameterError, array_of, choice
 from .loading import load
 from .mechanism import Linear, Mechanism
+from .servo_gains import ServoGains
 
 PerJoint = Mapping[str, float] | Sequence[float] | float | None
 Pose = Mapping[str, float] | Sequence[float] | str | int | None
@@ -106,6 +107,11 @@ class MjcfArm:
     def ranges(self) -> np.ndarray:
         """Least and largest position of each joint [rad or m], infinite for none, shape (n, 2)."""
         return self._loaded.ranges.copy()  # type: ignore[attr-defined]
+
+    @property
+    def servo(self) -> ServoGains:
+        """Gains that the file's actuators give the joints; zeros if there are none."""
+        return self._loaded.servo  # type: ignore[attr-defined]
 
     @property
     def mechanism(self) -> Mechanism:

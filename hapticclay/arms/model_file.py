@@ -6,7 +6,9 @@ Nothing of a file is run. Of its geometry only that stays from which inertia is 
 from __future__ import annotations
 
 import os
+import re
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,14 +32,32 @@ class Opened(NamedTuple):
         model: compiled.
         name: of the model.
         notes: what was left out, and what MuJoCo warned of.
+        guessed: links whose inertia the file does not state.
         lacking: links whose inertia comes from a mesh that is not there, and its file.
+        tensors: inertia that MuJoCo refuses, by link, in its frame [kg.m^2], shape (3, 3).
     """
 
     spec: Any
     model: Any
     name: str
     notes: tuple[str, ...]
-    lacking: dict[str, str]
+    guessed: tuple[str, ...] = ()
+    lacking: Mapping[str, str] = {}
+    tensors: Mapping[str, np.ndarray] = {}
+
+    def finish(self, model: Any) -> None:
+        """Gives links of a compiled model the inertia that MuJoCo refuses to read."""
+        from ..physics import mujoco
+
+        bodies = {model.body(i).name: i for i in range(model.nbody)}
+        for link in self.tensors.keys() & bodies.keys():
+            moments, axes = np.linalg.eigh(self.tensors[link])
+            axes[:, 0] *= np.linalg.det(axes)  # a rotation
+            body = bodies[link]
+            model.body_inertia[body] = moments
+            mujoco.mju_mat2Quat(model.body_iquat[body], axes.ravel())
+            model.body_simple[body] = 0  # its axes may be those of no joint
+            model.body_sameframe[body] = 0
 
 
 def opened(file: Any) -> Opened:
@@ -51,8 +71,8 @@ def opened(file: Any) -> Opened:
     with warnings_caught() as caught, warnings.catch_warnings(record=True) as shown:
         warnings.simplefilter("always")
         try:
-            spec, name, notes, lacking = _read(file)
-            model, more = compiled(spec)
+            read = _read(file)
+            model, more = compiled(read.spec)
         except ValueError as error:
             if isinstance(error, ParameterError):
                 raise
@@ -62,7 +82,8 @@ def opened(file: Any) -> Opened:
             raise bad_file(file, f"{array} is not finite")
     told = [one_line(x, MOST_OF_FAULT) for x in (*caught, *(w.message for w in shown))]
     heard = [f"MuJoCo warns: {x}" for x in dict.fromkeys(told) if not _is_of_saving(x)]
-    return Opened(spec, model, name, (*notes, *more, *heard), lacking)
+    read.finish(model)
+    return read._replace(model=model, notes=(*read.notes, *more, *heard))
 
 
 def spec_of(file: Any) -> tuple[Any, str]:
@@ -71,8 +92,8 @@ def spec_of(file: Any) -> tuple[Any, str]:
     Raises:
         ParameterError: as `opened`.
     """
-    spec, name, _, _ = _read(file)
-    return spec, name
+    read = _read(file)
+    return read.spec, read.name
 
 
 def kept(file: Any) -> Any:
@@ -87,27 +108,29 @@ def bad_file(file: Any, why: str) -> ParameterError:
     return ParameterError("file", shown, f"must be a file that MuJoCo loads ({why})")
 
 
-def _read(file: Any) -> tuple[Any, str, tuple[str, ...], dict[str, str]]:
-    """The spec, its name, notes, and links that lack the mesh of their inertia."""
+def _read(file: Any) -> Opened:
+    """A file that is not compiled yet."""
     from ..physics import mujoco
 
     if isinstance(file, mujoco.MjSpec):
         spec, name = file.copy(), file.modelname
         name_joints(spec)
-        return spec, name, *geometry.drop(spec, None)
-    path = _path(file)
+        notes, lacking = geometry.drop(spec, None)
+        return Opened(spec, None, name, notes, lacking=lacking)
+    path, more = _path(file), dict[str, Any]()
     if file_kinds.is_urdf(path):
-        text, notes, armature = urdf_text.prepared(path)
+        text, guessed, notes, armature, tensors = urdf_text.prepared(path)
         spec = mujoco.MjSpec.from_string(text)
         for joint in spec.joints:
             joint.armature = armature.get(joint.name, joint.armature)
+        more = {"guessed": guessed, "tensors": tensors}
     else:
         spec, notes = includes.spec_of(path)
     spec.compiler.fusestatic = False  # a URDF's tool keeps its name
     name = spec.modelname if spec.modelname != UNNAMED else path.stem
     name_joints(spec)
-    more, lacking = geometry.drop(spec, path)
-    return spec, name, (*notes, *more), lacking
+    absent, lacking = geometry.drop(spec, path)
+    return Opened(spec, None, name, (*notes, *absent), lacking=lacking, **more)
 
 
 def compiled(spec: Any) -> tuple[Any, list[str]]:
@@ -129,8 +152,23 @@ def compiled(spec: Any) -> tuple[Any, list[str]]:
                 compiler.balanceinertia = True
                 notes = ["inertia of no body (A + B < C): the mean of its three moments is taken"]
             else:
+                _refuse_mesh(spec, fault)
                 raise
     raise AssertionError
+
+
+def _refuse_mesh(spec: Any, fault: str) -> None:
+    """Refuses a mesh that MuJoCo cannot take, with the link whose inertia comes from it."""
+    named = re.search(r"Element name '([^']+)'", fault)
+    for mesh in [x for x in spec.meshes if named and x.name == named[1]]:
+        geom = next(x for x in spec.geoms if x.meshname == mesh.name)
+        link = geom.parent.name or "a body"
+        what = one_line(fault.removeprefix("Error: ").partition("Element name")[0], MOST_OF_FAULT)
+        bound = (
+            f"must be one that MuJoCo reads ({what.strip()}): the inertia of {link} comes from it; "
+            f"or state <inertial> for {link}"
+        )
+        raise ParameterError("mesh", mesh.file, bound)
 
 
 def _is_of_saving(text: str) -> bool:

@@ -21,6 +21,8 @@ from . import file_kinds, geometry
 from .places import place_of
 
 KEPT = ("mujoco", "link", "joint")  # children of <robot> that MuJoCo reads
+ZERO = 1e-9  # [kg.m^2] moments of rounding
+ROUNDING = 1e-6  # of moments: files have some six digits
 POINT = 2e-14  # [kg.m^2] moments of a mass in a point: MuJoCo wants more than 1e-14
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 HELD = ("floating", "planar")
@@ -31,13 +33,17 @@ class Prepared(NamedTuple):
 
     Attributes:
         text: what MuJoCo loads.
+        guessed: links whose inertia is computed from geometry.
         notes: what was changed, and what it says of reductions.
         armature: reflected inertia of rotors that transmissions state [kg.m^2], by joint.
+        tensors: inertia that MuJoCo refuses, by link, in its frame [kg.m^2], shape (3, 3).
     """
 
     text: str
+    guessed: tuple[str, ...]
     notes: tuple[str, ...]
     armature: dict[str, float]
+    tensors: dict[str, np.ndarray]
 
 
 def prepared(path: Path) -> Prepared:
@@ -53,9 +59,17 @@ def prepared(path: Path) -> Prepared:
     notes, armature = _transmissions(robot)
     for element in [x for x in robot if x.tag not in KEPT]:
         robot.remove(element)
+    notes = [*_undeclared(robot), *notes]
     static = _static(robot)
-    notes = [*_links(robot, static, path), *_joints(robot), *notes]
-    return Prepared(ElementTree.tostring(robot, encoding="unicode"), tuple(notes), armature)
+    tensors = _tensors(robot)
+    guessed, absent = _drop_geometry(robot, static, path)
+    odd = [name for name, (_, is_odd) in tensors.items() if is_odd]
+    if odd:
+        notes.append(f"inertia of no body (A + B < C), taken as the file has it: {', '.join(odd)}")
+    notes = [*_joints(robot), *notes, *geometry.absent_words(absent)]
+    text = ElementTree.tostring(robot, encoding="unicode")
+    own = {name: tensor for name, (tensor, _) in tensors.items()}
+    return Prepared(text, tuple(guessed), tuple(notes), armature, own)
 
 
 def _refuse_xacro(path: Path, robot: Element) -> None:
@@ -94,55 +108,79 @@ def _name(element: Element | None, attribute: str = "name") -> str:
     return "" if element is None else element.get(attribute, "")
 
 
-def _links(robot: Element, static: set[str], path: Path) -> Iterator[str]:
-    """Drops geometry beside inertia; makes inertia one of a body. Yields notes."""
-    guessed, evened, dropped = [], [], list[str]()
+def _undeclared(robot: Element) -> Iterator[str]:
+    """Declares links that joints name and the file does not have. Yields notes."""
+    names = {_name(link) for link in robot.findall("link")}
+    ends = [(x.find("parent"), x.find("child")) for x in robot.findall("joint")]
+    lacking = {_name(end, "link") for pair in ends for end in pair if end is not None} - names
+    for name in sorted(lacking):
+        ElementTree.SubElement(robot, "link", name=name)
+    if shown := ", ".join(sorted(lacking - {"world"})):
+        yield f"links that joints name and the file does not have, taken as empty: {shown}"
+
+
+def _drop_geometry(robot: Element, static: set[str], path: Path) -> tuple[list[str], list[str]]:
+    """Drops geometry that gives no inertia; links that it gives it to, files that are not there."""
+    guessed, dropped = [], list[str]()
     for link in robot.findall("link"):
-        name, inertial = _name(link), link.find("inertial")
-        if inertial is not None and inertial.find("mass") is None:
-            link.remove(inertial)
-            inertial = None
-        if inertial is not None and _set_moments(inertial):
-            evened.append(name)
-        if inertial is not None or name in static:
+        name = _name(link)
+        if link.find("inertial") is not None or name in static:
             for element in link.findall("visual") + link.findall("collision"):
                 dropped += [x.get("filename", "") for x in element.iter("mesh")]
                 link.remove(element)
         elif link.find("collision") is not None:
             guessed.append(name)
-    dropped = [x for x in dict.fromkeys(dropped) if place_of(x, path, path.parent) is None]
-    yield from geometry.absent_words([x.rpartition("/")[2] for x in dropped])
-    if guessed:
-        yield f"no inertia in the file, computed from geometry at 1000 kg/m^3: {', '.join(guessed)}"
-    if evened:
-        yield (
-            "inertia of no body (A + B < C), the mean of its three moments is taken: "
-            f"{', '.join(evened)}"
-        )
+    absent = [x for x in dict.fromkeys(dropped) if place_of(x, path, path.parent) is None]
+    return guessed, [x.rpartition("/")[2] for x in absent]
 
 
-def _set_moments(inertial: Element) -> bool:
-    """Makes moments those of a body, as MuJoCo's balanceinertia does; whether they were others."""
+def _tensors(robot: Element) -> dict[str, tuple[np.ndarray, bool]]:
+    """Inertia that MuJoCo refuses, by link, with a sphere's in its place; whether it is no body's.
+
+    Links of mass 0 may have inertia, and masses in a point have none: both are bodies.
+    """
+    out = dict[str, tuple[np.ndarray, bool]]()
+    for link in robot.findall("link"):
+        inertial = link.find("inertial")
+        if inertial is not None and inertial.find("mass") is None:
+            link.remove(inertial)
+        elif inertial is not None and (tensor := _refused_tensor(inertial)) is not None:
+            turn, (least, middle, most) = _turn(inertial), np.linalg.eigvalsh(tensor)
+            is_odd = least < -ROUNDING * most or least + middle < (1.0 - ROUNDING) * most
+            out[_name(link)] = turn @ tensor @ turn.T, bool(is_odd and most > ZERO)
+    return out
+
+
+def _refused_tensor(inertial: Element) -> np.ndarray | None:
+    """The tensor of an inertia if MuJoCo refuses it, which then is a sphere's in the element."""
     inertia = inertial.find("inertia")
     if inertia is None:
         inertia = ElementTree.SubElement(inertial, "inertia")
     try:
         xx, yy, zz, xy, xz, yz = (float(inertia.get(name, 0.0)) for name in MOMENTS)
     except ValueError:  # MuJoCo says which
-        return False
+        return None
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if not np.isfinite(tensor).all():
-        return False
+        return None
     least, middle, most = np.linalg.eigvalsh(tensor).tolist()
-    if least > 0.0 and least + middle >= most:
-        return False
-    is_point = not tensor.any()
-    if not is_point and least + middle + most <= 0.0:
-        return False  # MuJoCo refuses it
-    mean = max((least + middle + most) / 3.0, POINT)
+    if (least >= POINT and least + middle >= most) or most < -ZERO:
+        return None
     for name in MOMENTS:
-        inertia.set(name, repr(mean) if name[1] == name[2] else "0")
-    return not is_point
+        inertia.set(name, repr(max(most, POINT)) if name[1] == name[2] else "0")
+    return tensor
+
+
+def _turn(inertial: Element) -> np.ndarray:
+    """Rotation from the frame of an inertia to that of its link, shape (3, 3)."""
+    origin = inertial.find("origin")
+    words = "0 0 0" if origin is None else origin.get("rpy", "0 0 0")
+    roll, pitch, yaw = (float(x) for x in words.split())
+    (a, b), (c, d), (e, f) = ((math.cos(x), math.sin(x)) for x in (roll, pitch, yaw))
+    x = np.array([[1, 0, 0], [0, a, -b], [0, b, a]])
+    y = np.array([[c, 0, d], [0, 1, 0], [-d, 0, c]])
+    z = np.array([[e, -f, 0], [f, e, 0], [0, 0, 1]])
+    return z @ y @ x
 
 
 # ---- joints --------------------------------------------------------------------------------------

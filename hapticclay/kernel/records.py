@@ -242,7 +242,7 @@ class Model:
     chances: floats  # four numbers a sample
     chance_first: whole
     encoder: whole  # joints have encoders
-    counts: whole[12]  # per turn
+    count: real[12]  # step of their readings [rad, m of slides], 0 for exact ones
     window: whole  # samples of the difference, 0 for exact rates
     cutoff: real  # of the low-pass after it [Hz], 0 for none
     angles: floats  # ring of past angles

@@ -17,6 +17,7 @@ from ..model import compensator, controller, regions
 from ..model import hardware as devices
 from ..model.controller import Servo
 from ..model.sampled_controller import Controller, LawCaller
+from ..scene.joint_numbers import turning
 from ..scene.scenario import Scenario
 from . import hardware, methods, modes, pace, records, sampled, user_laws
 from .march import GROWTH_BLOCK
@@ -249,8 +250,8 @@ def put_memory(m: Any, s: Scenario) -> None:
 
 def put_hardware(m: Any, arrays: dict[str, np.ndarray], s: Scenario, io: Any) -> None:
     """The hardware between computer and arm."""
-    counts = io.encoder if isinstance(io.encoder, tuple) else (io.encoder or 0,) * m.joints
-    m.encoder, m.counts[: m.joints] = int(any(counts)), map(int, counts)
+    counts = io.count_sizes(turning(s))
+    m.encoder, m.count[: m.joints] = int(any(counts)), counts
     if io.jitter > 0.0 or io.dropout_probability > 0.0 or io.force_noise > 0.0:
         n = min(int(s.t_max / m.Ts), NOISE_AHEAD) + 8
         m.chance, arrays["chances"] = 1, devices.SampleNoise(io).table(0, n).ravel()

@@ -338,10 +338,8 @@ class Scenario:
             return
         number("hardware.jitter", given.jitter, 0.0, 0.28 * Ts, unit="s")
         number("hardware.delay", given.delay, 0.0, 100.0 * Ts, unit="s")
-        n = len(self.joints)
-        if isinstance(given.encoder, tuple) and len(given.encoder) != n:
-            bound = f"must be one number, or one for each of {n} joints"
-            raise ParameterError("hardware.encoder", given.encoder, bound)
+        turning = [True, True] if self.is_closed_form else self.file_arm.mechanism.turning
+        given.check_encoders(turning, self.joints, "hardware.")
 
     @property
     def rotated(self) -> bool:

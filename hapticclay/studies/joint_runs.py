@@ -1,8 +1,7 @@
 """Runs of an arm from a file at its gains and beside their limit, against the exact map.
 
 The runs are those of the map: small motion about the pose, without Coulomb friction and torque
-limits. Modes are read from samples of all joints by linear prediction of low rank (ESPRIT: Roy,
-Kailath, IEEE Trans. ASSP 37, 1989).
+limits.
 """
 
 from __future__ import annotations
@@ -27,6 +26,7 @@ from ..simulation.simulate import simulate
 from ..theory.client_loop import Delay, Sample
 from ..theory.joint_gains import Study
 from ..theory.joint_loop import JointLoop, timing_words
+from .joint_motion import Mode, modes_of_motion
 
 BESIDE = 0.005  # share of the common limit at which runs are made on either side
 PARTS = 8, 4  # physics steps a control sample, of a serial arm and of a closed chain
@@ -35,9 +35,6 @@ SIZE, LEAST_SIZE = 1e-4, 1e-8  # [rad] of the motion at the start; of one that g
 GROWN, DECAYED = 30.0, 150.0  # a run ends where the motion has grown or decayed by so much ...
 PERIODS, LONGEST = 30.0, 4.0  # ... or after so many periods, or at this time [s]
 FEWEST = 80  # control samples of a run
-A_PERIOD = 12  # samples of a period from which modes are read
-ROWS, LEAST_ROWS = 96, 12  # of the Hankel matrix, of all joints and of one
-RANKED = 1e-5  # smaller singular values are nonlinear motion
 AGREEMENT = 0.1  # of the expected growth or decay ...
 SLACK = 1e-4  # ... and of the angular frequency: what such a step leaves, of damped light joints
 ALIKE = 0.95  # of the largest motion: a joint that moves so much is not another one
@@ -125,18 +122,6 @@ class JointRuns(Result):
         """The table, with both limits and the run as built."""
         more = {"scale": self.scale, "limit": self.limit, "built": self.built}
         return {**more, "tables": self.tables(), "assumed": self.assumed}
-
-
-class Mode(NamedTuple):
-    """One motion of all joints: log of its factor a second, and shares of the joints."""
-
-    s: complex  # [1/s, rad/s]
-    shares: np.ndarray
-
-    @property
-    def frequency(self) -> float:
-        """Frequency [Hz]."""
-        return abs(self.s.imag) / (2.0 * math.pi)
 
 
 @checked
@@ -329,26 +314,10 @@ def mode_of_run(record: Record, loop: JointLoop, expected: Mode) -> Mode:
     """The motion of a run that is nearest to an expected one; NaN if the run is too short."""
     held = round(loop.Ts / record.scenario.dt)
     q = record.q[:-1:held]  # the last step may be short
-    skip = max(1, len(q) // 600)
-    if expected.frequency > 0.0:
-        skip = max(1, min(len(q) // 60, int(1.0 / (A_PERIOD * expected.frequency * loop.Ts))))
-    x = np.diff(q[::skip], axis=0)
-    if len(x) < 24:
+    modes, _ = modes_of_motion(q, loop.Ts, expected.frequency)
+    if not modes:
         return Mode(complex(math.nan, math.nan), np.zeros(loop.n))
-    rows, period = min(len(x) // 2, max(ROWS // loop.n, LEAST_ROWS)), skip * loop.Ts
-    windows = np.lib.stride_tricks.sliding_window_view(x, rows, axis=0)
-    hankel = windows.transpose(2, 1, 0).reshape(rows * loop.n, -1)
-    u, size, _ = np.linalg.svd(hankel, full_matrices=False)
-    r = max(1, min(int(np.sum(size > RANKED * size[0])), len(size) // 2))
-    u = u[:, :r]
-    z = np.linalg.eigvals(np.linalg.lstsq(u[: -loop.n], u[loop.n :])[0])
-    z = z[np.abs(z) > 1e-6]
-    s = np.log(z.astype(complex)) / period
-    i = int(np.abs(s - expected.s).argmin())
-    late = np.where(np.abs(z) > 1.0, len(x) - 1, 0)  # one that grows fast would hide the others
-    powers = np.exp((np.arange(len(x))[:, None] - late) * np.log(z.astype(complex)))
-    shares = np.abs(np.linalg.lstsq(powers, x.astype(complex))[0])
-    return Mode(complex(s[i].real, abs(s[i].imag)), shares[i])
+    return min(modes, key=lambda mode: abs(mode.s - expected.s))
 
 
 def _limit(factors: list[float], growth: np.ndarray) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,11 +12,12 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..arms.joint_law import JointPD, checked_law, compensated
+from ..arms.joint_units import Joints, of_joint, table_of
 from ..arms.mechanism import Linear
 from ..arms.mjcf_arm import MjcfArm
 from ..display import time_words
 from ..results import Result, Tables
-from . import joint_changes, joint_crossings, roots
+from . import file_servo, joint_changes, joint_crossings, roots
 from .client_loop import Delay, Sample
 from .joint_changes import Edge, Number, slopes
 from .joint_crossings import Crossing
@@ -34,7 +35,7 @@ IGNORED = "joint friction, counts, converters, torque limits, backlash, elastic 
 
 @named
 @dataclass(frozen=True, repr=False, eq=False)
-class JointLimits(Result):
+class JointLimits(Joints, Result):
     """What the joints of an arm carry at a pose, all coupled.
 
     A pair (least, largest) is the interval of a gain around the present one in which the loop is
@@ -77,6 +78,7 @@ class JointLimits(Result):
             shape (n, 2).
         rate_per_delay: change of the lowest rate with the delay [Hz/s].
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
+        slides: whether each joint slides; then its units are those of forces and lengths.
     """
 
     drawn_by = "hapticclay.views.joint_plots:limits_plot"
@@ -122,6 +124,7 @@ class JointLimits(Result):
     rate_change: np.ndarray
     rate_per_delay: float
     assumed: tuple[str, ...] = ()
+    slides: tuple[bool, ...] = ()
 
     @property
     def stable(self) -> bool:
@@ -164,10 +167,12 @@ class JointLimits(Result):
             slope, most = self.slope[j], self.friction_slope[j]
             if slope > 0.0 and not slope < most:
                 limit = "" if math.isnan(most) else f", at most {most:.4g}"
-                return f"friction fed forward at {self.joint}: slope {slope:.4g} N.m.s/rad{limit}"
+                unit = of_joint("N.m.s/rad", self.turning[j])
+                return f"friction fed forward at {self.joint}: slope {slope:.4g} {unit}{limit}"
             low, high = self.Kp[j]
             if high > low and high < self.stiffness[j]:
-                return f"Kp of {self.joint}, {self.stiffness[j]:.4g} to {high:.4g} N.m/rad or less"
+                unit = of_joint("N.m/rad", self.turning[j])
+                return f"Kp of {self.joint}, {self.stiffness[j]:.4g} to {high:.4g} {unit} or less"
             return "delay and rate: no Kp of one joint is stable" if math.isnan(high) else "Kp"
         if math.isinf(self.scale):
             return "nothing: no factor of Kp buzzes"
@@ -222,7 +227,9 @@ class JointLimits(Result):
             "largest factor of Kd per delay [1/s]": self.Kd_scale_per_delay[1],
             "lowest rate per delay [Hz/s]": self.rate_per_delay,
         }
-        return {"joints": joints, "sensitivity": moves, "arm": {k: [v] for k, v in arm.items()}}
+        by_joint = {"joints": joints, "sensitivity": moves}
+        shown = {name: table_of(table, self.turning) for name, table in by_joint.items()}
+        return {**shown, "arm": {k: [v] for k, v in arm.items()}}
 
 
 def _per(unit: str) -> list[str]:
@@ -305,6 +312,7 @@ def joint_limits(arm: MjcfArm, law: JointPD, Ts: Sample, delay: Delay = 0.0) -> 
         **study.changes(of_Kp, of_Kd, (scale, of_all_Kd)),
         **study.timing_changes(left, rate),
         assumed=study.assumed(),
+        slides=tuple(not turns for turns in arm.mechanism.turning),
     )
 
 
@@ -438,11 +446,20 @@ class Study:
             "rate_per_delay": float(by_rate[-1]),
         }
 
+    def _elsewhere(self) -> tuple[str, float]:
+        """Where else the law may run, the host or drives, and the radius of its loop there."""
+        if self.law.runs == "drive":
+            at = timing_words(self.Ts, self.delay)
+            return f"in a host at {at}", self.remade(law=replace(self.law, runs="host")).radius()
+        loop = self.remade(law=replace(self.law, runs="drive"))
+        return "in drives, whose own loops count as continuous (runs drive)", loop.radius()
+
     def assumed(self) -> tuple[str, ...]:
         """What the verdict rests on, a sentence each."""
         held = f"{SMALL}, no hand at the handle"
         law = f"law: {self.law.words}"
-        return (*self.arm.notes, gravity_words(self.compensated), law, held, IGNORED)
+        own = file_servo.words(self.arm, self.law, self._elsewhere())
+        return (*own, *self.arm.notes, gravity_words(self.compensated), law, held, IGNORED)
 
 
 # ---- present motion, delay and rate --------------------------------------------------------------

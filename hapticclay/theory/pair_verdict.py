@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
+from ..arms.joint_units import Joints, table_of
 from ..display import time_words
 from ..results import Result, Tables
 from ..scene.pair import Pair
+from ..scene.pair_hardware import slides_of
 from . import joint_crossings, pair_branches, pair_roots, roots
 from .held_words import pair_words
 from .joint_families import NEAR
@@ -38,7 +40,7 @@ GONE = 1e-3  # size of an eigenvalue whose motion is over at the next sample
 
 @named
 @dataclass(frozen=True, repr=False, eq=False)
-class PairLimits(Result):
+class PairLimits(Joints, Result):
     """What a pair of arms carries at its pose, all joints of both arms coupled.
 
     Attributes:
@@ -66,6 +68,7 @@ class PairLimits(Result):
         budget: what the torque from the other arm is late by, cause by cause, one way [s].
         Ts: control sample [s].
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
+        slides: whether each joint slides; then its units are those of forces and lengths.
     """
 
     drawn_by = "hapticclay.views.pair_plots:limits_plot"
@@ -90,6 +93,7 @@ class PairLimits(Result):
     budget: Mapping[str, float]
     Ts: float
     assumed: tuple[str, ...] = ()
+    slides: tuple[bool, ...] = ()
 
     @property
     def delay_left(self) -> float:
@@ -160,6 +164,7 @@ class PairLimits(Result):
             "largest factor of all Kp": self.gain,
             "largest share of friction": self.friction_fraction,
         }
+        joints = table_of(joints, self.turning)
         return {"joints": joints, "budget": budget, "pair": {k: [v] for k, v in pair.items()}}
 
 
@@ -201,6 +206,7 @@ def pair_limits(pair: Pair) -> PairLimits:
         study.budget(),
         pair.Ts,
         (pair_words(pair), *study.build.assumed()),
+        slides_of(pair.leader),
     )
 
 

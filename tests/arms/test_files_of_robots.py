@@ -107,6 +107,46 @@ def test_a_link_whose_inertia_is_in_a_missing_mesh_is_named(saved):
     np.testing.assert_allclose(arm.mass_matrix(), M_OF_TWO, rtol=1e-14)
 
 
+@pytest.mark.parametrize("kind", ["fixed", "prismatic"])
+def test_a_tool_whose_mesh_is_not_there_is_counted_as_none(saved, kind):
+    """Texts of robots come without meshes; fingers and mounts often have no inertia in them."""
+    tool = link("tool", None, MESH.format("collision", "package://r/tool.stl"))
+    arm = hc.MjcfArm(saved(robot(*TWO, tool, joint("j3", "lb", "tool", kind=kind))), site="lb")
+    np.testing.assert_allclose(arm.mass_matrix(), M_OF_TWO, rtol=1e-12)  # 2e-15 kg for MuJoCo
+    assert arm.notes[0].startswith("no inertia in the file") and arm.notes[0].endswith(": tool")
+    assert not any("computed from geometry" in x for x in arm.notes)
+    wrist = TWO[0], link("lb", None), TWO[2], TWO[3], tool, joint("j3", "lb", "tool", kind=kind)
+    with pytest.raises(hc.ParameterError, match=r"tool\.stl|j2.*must have an inertia"):
+        hc.MjcfArm(saved(robot(*wrist)), site="lb")
+
+
+@pytest.mark.parametrize(
+    "shape",
+    ['<sphere radius="0"/>', '<box size="0.1 0 0.1"/>', '<cylinder radius="0.1" length="0"/>'],
+)
+def test_geometry_without_volume_gives_no_inertia(saved, shape):
+    """Frames that drawings mark with points."""
+    look = f"<collision><geometry>{shape}</geometry></collision>"
+    tip = link("tip", None, look), joint("j3", "lb", "tip", 0.0, kind="fixed")
+    arm = hc.MjcfArm(saved(robot(*TWO, *tip)), site="tip")
+    np.testing.assert_allclose(arm.mass_matrix(), M_OF_TWO, rtol=1e-14)
+
+
+def test_a_mesh_without_volume_is_named_with_its_link(saved):
+    saved("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 3 4", "flat.obj")
+    part = link("la", None, MESH.format("collision", "flat.obj"))
+    with pytest.raises(hc.ParameterError, match=r"flat\.obj.*<inertial> for la"):
+        hc.MjcfArm(saved(robot(part, joint("j1", "base", "la", 0.0))))
+
+
+def test_a_joint_that_turns_nothing_is_told_what_to_state(saved):
+    parts = (*TWO, link("tip", None), joint("j3", "lb", "tip"))
+    with pytest.raises(hc.ParameterError, match=r"j3.*<inertial>.*armature"):
+        hc.MjcfArm(saved(robot(*parts)), site="tip")
+    arm = hc.MjcfArm(saved(robot(*parts)), site="tip", armature={"j3": 0.01})
+    assert arm.armature == (0.0, 0.0, 0.01)
+
+
 @pytest.mark.parametrize("folder", ["r/urdf", "other/urdf"])
 def test_a_mesh_that_gives_inertia_is_found_in_its_package(saved, folder):
     """A cube of 0.2 m at 1000 kg/m^3: 8 kg, m a^2/6."""
@@ -144,17 +184,38 @@ def test_a_joint_that_nothing_turns_is_held(saved, kind):
     np.testing.assert_allclose(arm.handle(), [1.4, 0.0, 0.0], atol=1e-15)
 
 
-def test_inertia_of_no_body_is_noted(saved):
-    odd = link("la").replace('izz="0.01"', 'izz="0.04"')
+@pytest.mark.parametrize("turned", [0.0, 0.7])
+def test_inertia_of_no_body_is_taken_as_the_file_has_it(saved, turned):
+    """By rotating the tensor: MuJoCo refuses it, though no dynamics needs A + B >= C."""
+    odd = link("la").replace('ixx="0.01"', 'ixx="0.07"').replace('ixz="0"', 'ixz="0.02"')
+    odd = odd.replace('xyz="0.2 0 0"/>', f'xyz="0.2 0 0" rpy="0 0 {turned}"/>')
     arm = hc.MjcfArm(saved(robot(odd, *TWO[1:])), site="lb")
-    assert any("mean of its three moments" in x and x.endswith(": la") for x in arm.notes)
+    assert any("taken as the file has it: la" in x for x in arm.notes)
+    c, s = np.cos(turned), np.sin(turned)
+    own = np.array([0.0, 1.0, 0.0]) @ [[c, -s, 0], [s, c, 0], [0, 0, 1]]  # the axis in its frame
+    about = own @ [[0.07, 0, 0.02], [0, 0.01, 0], [0.02, 0, 0.01]] @ own
     gap = arm.mass_matrix() - M_OF_TWO
-    np.testing.assert_allclose(gap, [[0.01, 0.0], [0.0, 0.0]], atol=1e-15)  # the mean is 0.02
-    point = link("la").replace('"0.01"', '"0"')
-    arm = hc.MjcfArm(saved(robot(point, *TWO[1:])), site="lb")
+    np.testing.assert_allclose(gap, [[about - 0.01, 0.0], [0.0, 0.0]], atol=1e-15)
+
+
+@pytest.mark.parametrize("moment", ["0", "-1e-13"])
+def test_a_mass_in_a_point(saved, moment):
+    arm = hc.MjcfArm(saved(robot(link("la").replace('"0.01"', f'"{moment}"'), *TWO[1:])), site="lb")
     gap = arm.mass_matrix() - M_OF_TWO
-    np.testing.assert_allclose(gap, [[-0.01, 0.0], [0.0, 0.0]], atol=1e-13)
-    assert not any("moments" in x for x in arm.notes)
+    np.testing.assert_allclose(gap, [[-0.01, 0.0], [0.0, 0.0]], atol=2e-13)
+    assert not any("inertia of no body" in x for x in arm.notes)
+    tip = link("tip", (0.0, 0.0, 0.0)), joint("jt", "lb", "tip", kind="fixed", more="")
+    arm = hc.MjcfArm(saved(robot(*TWO, *tip)), site="tip")
+    np.testing.assert_allclose(arm.mass_matrix(), M_OF_TWO, atol=1e-13)
+
+
+def test_links_that_only_joints_name(saved):
+    """An undeclared world is the world; a tool that is not there is a frame."""
+    world = joint("w", "world", "base", 0.0, kind="fixed", more="")
+    tool = joint("t", "lb", "tool", 0.3, kind="fixed", more="")
+    arm = hc.MjcfArm(saved(robot(*TWO, world, tool)), site="tool")
+    np.testing.assert_allclose(arm.handle(), [0.7, 0.0, 0.0], atol=1e-15)
+    assert any(x.endswith("taken as empty: tool") for x in arm.notes)
 
 
 def test_links_without_mass_between_joints(saved):
@@ -188,6 +249,9 @@ def test_an_mjcf_without_its_meshes_and_pictures(saved):
     assert "link.stl" in note and "skin.png" in note
     with pytest.raises(hc.ParameterError, match=r"link\.stl.*inertia of la comes from it"):
         hc.MjcfArm(saved(f"<mujoco>{ASSETS}{BODY.format('')}</mujoco>", "b.xml"))
+    nameless = BODY.format("").replace('body name="la"', "body")
+    with pytest.raises(hc.ParameterError, match=r"link\.stl.*inertia of unnamed body comes from"):
+        hc.MjcfArm(saved(f"<mujoco>{ASSETS}{nameless}</mujoco>", "c.xml"))
 
 
 @pytest.mark.parametrize("name", ["arm.mjcf", "arm.xml", "arm"])
@@ -218,6 +282,8 @@ def test_warnings_of_mujoco_are_notes(saved, recwarn, tmp_path, monkeypatch):
         '<attach model="p" prefix=""/></worldbody></mujoco>'
     )
     assert hc.MjcfArm(saved(whole, "whole.xml")).names == ("j1",)
+    ball = '<worldbody><body><freejoint/><geom size=".1"/></body></worldbody>'
+    assert hc.MjcfArm(saved(whole.replace("</mujoco>", f"{ball}</mujoco>"), "ball.xml")).names
     assert not recwarn.list and not os.path.exists("MUJOCO_LOG.TXT")
 
 
@@ -268,15 +334,23 @@ def test_an_entity_of_the_system_is_not_read(saved):
         hc.MjcfArm(saved(text))
 
 
-def test_a_key_frame_is_a_pose(saved):
-    body = f'<body><joint name="j1" axis="0 1 0"/>{STATED}<site name="ee" pos="1 0 0"/></body>'
-    keys = '<key name="home" qpos="1"/><key name="ready" qpos="0.5"/><key qpos="0.25"/>'
-    file = saved(
-        f"<mujoco><worldbody>{body}</worldbody><keyframe>{keys}</keyframe></mujoco>", "k.xml"
-    )
-    for pose, q in ((None, 1.0), ("home", 1.0), ("ready", 0.5), ("2", 0.25), (2, 0.25), (1, 0.5)):
-        assert hc.MjcfArm(file, pose=pose).q.tolist() == [q]
+@pytest.mark.parametrize("n", [1, 2])
+def test_a_key_frame_is_a_pose(saved, n):
+    """By name, or number; text that is a number is the position of an arm with one joint."""
+    body = f'<body>{{}}{STATED}<site name="ee" pos="1 0 0"/></body>'
+    joints = "".join(f'<joint name="j{i}" axis="0 {i} 1"/>' for i in range(n))
+    values = ("home", 1.0), ("ready", 0.5), ("", 0.25)
+    keys = "".join(f'<key name="{name}" qpos="{" ".join(n * [str(q)])}"/>' for name, q in values)
+    text = f"<worldbody>{body.format(joints)}</worldbody><keyframe>{keys}</keyframe>"
+    file = saved(f'<mujoco><compiler angle="radian"/>{text}</mujoco>', "keys.xml")
+    for pose, q in ((None, 1.0), ("home", 1.0), ("ready", 0.5), (2, 0.25), (1, 0.5)):
+        assert hc.MjcfArm(file, pose=pose).q.tolist() == n * [q]
+    number = [2.0] if n == 1 else [0.25, 0.25]
+    assert hc.MjcfArm(file, pose="2").q.tolist() == number
+    assert "pose: key frame ready of the file" in hc.MjcfArm(file, pose="ready").notes
     with pytest.raises(hc.ParameterError, match="did you mean 'ready'"):
         hc.MjcfArm(file, pose="redy")
     with pytest.raises(hc.ParameterError, match="no key frames"):
         hc.MjcfArm(saved(robot(*TWO)), site="lb", pose="home")
+    arm = hc.MjcfArm(file, armature=0.1, pose="0.2 rad" if n == 1 else None)
+    assert arm.armature == n * (0.1,) and (n == 2 or arm.q.tolist() == [0.2])

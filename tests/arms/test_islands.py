@@ -127,7 +127,9 @@ def test_two_arms_in_one_file(side, by_name):
     np.testing.assert_allclose(arm.mass_matrix(), own_inertia(text, names), rtol=1e-12)
     other = "right/" if side == "left/" else "left/"
     assert f"{other}a" in next(x for x in arm.notes if x.startswith("locked: "))
-    with pytest.raises(hc.ParameterError, match="must be named: there are left/ee, right/ee"):
+    with pytest.raises(
+        hc.ParameterError, match="must be named.* left/ee, right/ee and bodies such as left/l2"
+    ):
         arm_of(text)
     assert arm_of(text, joints=names).site == f"{side}ee"
 
@@ -265,15 +267,41 @@ def test_without_a_site_the_arm_ends_where_its_hand_branches():
 
 def test_several_arms_without_sites_are_named_by_their_ends():
     text = model(limb("left_", 0.3, site="") + limb("right_", -0.3, site=""))
-    with pytest.raises(hc.ParameterError, match="such as left_l2, right_l2"):
+    with pytest.raises(hc.ParameterError, match="bodies such as left_l2, right_l2"):
         arm_of(text)
 
 
 def test_a_torso_that_carries_two_arms_is_no_arm():
     body = '<body name="torso"><joint name="waist"/><geom size=".2"/>{}</body>'
-    with pytest.raises(hc.ParameterError, match="such as l_l2, r_l2"):
+    with pytest.raises(hc.ParameterError, match="bodies such as l_l2, r_l2"):
         arm_of(model(body.format(limb("l_", site="", hand="") + limb("r_", site="", hand=""))))
     assert arm_of(model(body.format(limb("l_", site="", hand="")))).names == ("waist", "l_a", "l_b")
     sensor = '<body name="torso"><joint name="waist"/><geom size=".2"/><site name="imu"/>{}</body>'
-    with pytest.raises(hc.ParameterError, match="such as l_l2, r_l2"):
+    with pytest.raises(hc.ParameterError, match="bodies such as l_l2, r_l2"):
         arm_of(model(sensor.format(limb("l_", site="", hand="") + limb("r_", site="", hand=""))))
+
+
+def test_a_torso_before_an_arm_is_named():
+    """It counts among the joints before the handle, and carries the other arm."""
+    body = '<body name="torso"><joint name="waist"/><geom size=".2"/>{}</body>'
+    text = model(body.format(limb("l_", site="", hand="") + limb("r_", site="", hand="")))
+    arm = arm_of(text, site="r_l2")
+    assert arm.names == ("waist", "r_a", "r_b")
+    assert any("carry other limbs, too: waist;" in x for x in arm.notes)
+    arm = arm_of(text, site="r_l2", joints=("r_a", "r_b"))
+    np.testing.assert_allclose(arm.mass_matrix(), own_inertia(text, arm.names), rtol=1e-12)
+    assert not any("carry other limbs" in x for x in arm_of(model(limb()), site="ee").notes)
+
+
+def test_names_in_refusals_are_whole():
+    """However many there are, the last that is shown is one of the file."""
+    names = [f"a_rather_long_name_of_a_link_{i}" for i in range(30)]
+    bodies = "".join(f'<body name="{x}"><joint/><geom size=".1"/></body>' for x in names)
+    for wanted in ("qqq", None):
+        with pytest.raises(hc.ParameterError) as error:
+            arm_of(model(bodies), site=wanted)
+        words = str(error.value).split(" and ")[-2].replace(",", "").split()
+        assert words[-1] in names and " more" in str(error.value)
+    with pytest.raises(hc.ParameterError) as error:
+        arm_of(model(limb()), joints=[*names, "a", "a"])
+    assert all(x.strip("[]',:") in names for x in str(error.value).split() if "rather" in x)

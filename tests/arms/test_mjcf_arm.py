@@ -145,7 +145,11 @@ def test_what_a_file_leaves_open_is_said():
     assert "joint1, joint2" in notes and "no rotor inertia" in notes
     assert "key frame home" in notes
     notes = " ".join(card("five_bar").notes)
-    assert "constraints" in notes and "right_elbow, left_elbow" in notes and "2 actuators" in notes
+    assert (
+        "constraints" in notes
+        and "right_elbow, left_elbow" in notes
+        and "2 actuators of the file give no torque" in notes
+    )
 
 
 BODY = (
