@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from .threads import one_thread
+
 ASIDE = 0.6 + 0.8j  # a shift by this, times the size of a matrix, takes its eigenvalues elsewhere
 
 # ---- drivers -------------------------------------------------------------------------------------
@@ -138,3 +140,11 @@ def _first(drivers: Drivers, *args: Any) -> Any:
         except np.linalg.LinAlgError:
             continue
     return drivers[-1](*args)
+
+
+def exponential(a: np.ndarray) -> np.ndarray:
+    """The exponential of a matrix: the first one brings SciPy's BLAS, on one thread, too."""
+    from scipy.linalg import expm
+
+    with one_thread:
+        return expm(a)

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from . import joint_crossings, pair_branches
 from .joint_loop import MOST_STATES, ROUNDING, near_resonances
 from .pair_loop import PairLoop
@@ -94,12 +95,12 @@ class Delays:
         return theta, np.angle(x), slope
 
     def _values(self, theta: np.ndarray) -> np.ndarray:
-        return np.linalg.eigvals(self.loop.around(theta))
+        return matrices.eigenvalues(self.loop.around(theta))
 
     def _slope(self, theta: float, x: complex) -> float:
         sides = []
         for turn in (1.0 - TURN, 1.0 + TURN):
-            values = np.linalg.eigvals(self.loop.around(np.array([turn * theta])))[0]
+            values = matrices.eigenvalues(self.loop.around(np.array([turn * theta])))[0]
             sides.append(abs(values[np.argmin(np.abs(values - x))]))
         return sides[1] - sides[0]
 
@@ -118,7 +119,7 @@ class Delays:
 
     def _at_nyquist(self, most: float) -> list[Edge]:
         """Where eigenvalues come up at z = -1, outside the circle: on the axis, then as pairs."""
-        values = np.linalg.eigvals(self.loop.around(np.array([math.pi])))[0]
+        values = matrices.eigenvalues(self.loop.around(np.array([math.pi])))[0]
         out = []
         for x in values[np.abs(values) > 1.0]:
             argument = float(np.angle(x)) / math.pi
@@ -143,7 +144,7 @@ class Delays:
         none = max(FREE, NO_DRAG / max(float(np.linalg.norm(here, 2)), joint_crossings.NO_SIZE))
         if none >= 1.0:
             return []
-        values = np.linalg.eigvals(np.linalg.pinv(here, rcond=none) @ (here - later))
+        values = matrices.eigenvalues(matrices.pseudo_inverse(here, none) @ (here - later))
         real = values[(np.abs(values.imag) <= REAL * np.abs(values)) & (values.real > REAL)]
         return [self._steady_edge(1.0 / x) for x in real.real.tolist()]
 

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from .joint_crossings import NO_SIZE
 from .joint_loop import near_resonances
 from .pair_branches import followed, log_size
@@ -96,9 +97,9 @@ class _Pair:
     def values(self, log: np.ndarray) -> np.ndarray:
         """Eigenvalues of H at z = exp(log), shape (m, k)."""
         try:
-            return np.linalg.eigvals(self.loop.around(-1j * log))
+            return matrices.eigenvalues(self.loop.around(-1j * log))
         except np.linalg.LinAlgError:  # on a pole: beside it, by less than its rounding
-            return np.linalg.eigvals(self.loop.around(-1j * (log + BESIDE_POLE)))
+            return matrices.eigenvalues(self.loop.around(-1j * (log + BESIDE_POLE)))
 
     def at_rest(self, r: float) -> int:
         """Eigenvalues of rest beyond a circle."""

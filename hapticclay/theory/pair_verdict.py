@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
 from ..arms.joint_units import Joints, table_of
 from ..display import time_words
@@ -369,6 +370,6 @@ def _holds(loop: PairLoop) -> bool:
 
 def _steady(matrix: np.ndarray) -> list[float]:
     """Factors at which steady motion has no resistance."""
-    values = np.linalg.eigvals(matrix)
+    values = matrices.eigenvalues(matrix)
     real = values[(np.abs(values.imag) <= NEAR * np.abs(values)) & (values.real > 0.0)]
     return (1.0 / real.real).tolist()

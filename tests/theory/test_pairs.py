@@ -463,6 +463,32 @@ def test_a_force_that_is_never_met_goes_around_at_no_delay():
     assert soon.radius == pytest.approx(found.radius, abs=1e-12)
 
 
+def test_what_is_over_at_once_has_a_motion_at_any_delay():
+    """A free leader that decays to a third in a sample, at 2000 of them: z^-N is beyond floats."""
+    device = hc.Device(0.5, 550.0)
+    pair = hc.Pair(device, device, hc.JointPD((400.0,), (900.0,)), hc.Link("position-force", 1.0))
+    found = hc.theory.pair_limits(pair)
+    assert found.stable and "x" in found.mode and math.isfinite(found.radius)
+
+
+@pytest.mark.parametrize("seed", some(range(41), 2))
+def test_random_pairs_of_seven_joints_and_late_links_are_judged(seed):
+    """More than 1,000 states: the largest eigenvalue solves the equations, and none lies beyond."""
+    rng = np.random.default_rng((seed, 41))
+    factor = 10.0 ** rng.uniform(-1.5, 0.5)
+    law = hc.JointPD(
+        tuple(factor * x for x in KP), tuple(math.sqrt(factor) * x for x in KD), "exact", None,
+        str(rng.choice(["host", "drive"])),
+    )  # fmt: skip
+    pair = seven(law=law, link=hc.Link(delay=rng.uniform(0.08, 0.2)), Ts=1e-3)
+    found = hc.theory.pair_limits(pair)
+    loop = Build(pair).loop()
+    assert loop.states > 1000 and found.stable is (found.radius < 1.0 + 1e-10)
+    beyond = pair_roots.beyond(loop, loop.there + loop.back, found.radius * (1.0 + 1e-8))
+    within = pair_roots.beyond(loop, loop.there + loop.back, found.radius * (1.0 - 1e-8))
+    assert beyond < within and (beyond == 0 or found.stable)
+
+
 # ---- rest, and friction that is fed forward ------------------------------------------------------
 
 
