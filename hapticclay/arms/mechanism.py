@@ -7,6 +7,7 @@ Constraints are projected out exactly, where the engine's own are soft.
 from __future__ import annotations
 
 import copy
+import hashlib
 import threading
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -112,6 +113,22 @@ class Mechanism:
         if not hasattr(self._own, "data"):
             self._own.data = self._mujoco.MjData(self._model)
         return self._own.data
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it moves as another one does: models of the same numbers, the same joints."""
+        if not isinstance(other, Mechanism):
+            return NotImplemented
+        return self.dofs == other.dofs and self._numbers == other._numbers
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.dofs))
+
+    @cached_property
+    def _numbers(self) -> bytes:
+        """A digest of the compiled model as the engine stores it."""
+        out = np.empty(self._mujoco.mj_sizeModel(self._model), np.uint8)
+        self._mujoco.mj_saveModel(self._model, None, out)
+        return hashlib.blake2b(out.tobytes()).digest()
 
     # ---- one pose
 
