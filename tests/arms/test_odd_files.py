@@ -52,7 +52,7 @@ ODD = {  # text, words
     ),
     "a vast memory": (model(head='<size memory="10E"/>'), "MuJoCo loads .*allocate memory"),
     "a vast mass": (
-        model(BODY.replace('size=".1"', 'size=".1" mass="1e308"')), "body_mass must be at most 1e.09"
+        model(BODY.replace('size=".1"', 'size=".1" mass="1e308"')), "body_mass must be at mo"
     ),
     "a vast damper": (joint('damping="1e308"'), "dof_damping must be at most"),
     "a vast spring": (joint('stiffness="1 1e300"'), "jnt_stiffnesspoly must be at most"),
