@@ -83,6 +83,19 @@ class MjcfArm:
             fields["file"] = self.file.to_xml()
         return _arm_of, (fields, isinstance(self.file, str))
 
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same arm, from whatever file."""
+        if not isinstance(other, MjcfArm):
+            return NotImplemented
+        return self._given == other._given and self.mechanism == other.mechanism
+
+    def __hash__(self) -> int:
+        return hash((self.site, self.joints))
+
+    @property
+    def _given(self) -> list[Any]:
+        return [getattr(self, x.name) for x in dataclasses.fields(self) if x.name != "file"]
+
     def __repr__(self) -> str:
         return f"<MjcfArm {self.name}: {', '.join(self.names)}>"
 
