@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from .display import one_line
+from .display import names_words, one_line
 from .units import from_unit, is_quantity
 
 if TYPE_CHECKING:
@@ -135,16 +135,9 @@ def _end_of_path(path: str | bytes) -> str:
 
 def _names(names: list[str] | tuple[str, ...]) -> str:
     """Names, none of them cut."""
-    text = one_line(_bounded.repr(names), MOST_OF_NAME)
-    shown, length = 0, 0
-    for name in names[: MOST_OF_VALUE // 2]:
-        length += len(name) + 4  # quotes and ", "
-        if length > MOST_OF_NAME:
-            break
-        shown += 1
-    if shown == len(names) or not shown:
-        return text
-    return f"[{', '.join(map(repr, names[:shown]))} and {len(names) - shown} more]"
+    if len(_bounded.repr(names)) <= MOST_OF_NAME or len(names) < 2:
+        return one_line(_bounded.repr(names), MOST_OF_NAME)
+    return f"[{names_words([repr(x) for x in names], MOST_OF_NAME)}]"
 
 
 def _middle_cut(text: str) -> str:

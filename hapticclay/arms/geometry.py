@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..display import one_line
+from ..display import names_words
 from .places import place_of
 
-MOST_NAMES = 6  # of files that are not there
 READ = (".stl", ".obj", ".msh")  # endings of meshes that MuJoCo reads
 
 
@@ -135,6 +134,4 @@ def absent_words(absent: list[str]) -> Iterator[str]:
     """A sentence about files that are not there."""
     names = list(dict.fromkeys(absent))
     if names:
-        more = f" and {len(names) - MOST_NAMES} more" * (len(names) > MOST_NAMES)
-        shown = one_line(", ".join(names[:MOST_NAMES]), 300)
-        yield f"not there, and take no part: {shown}{more}"
+        yield f"not there, and take no part: {names_words(names)}"

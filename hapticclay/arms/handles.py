@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
-from ..display import one_line
+from ..display import names_words
 from ..errors import ParameterError, nearest
 from . import islands, limbs
-
-MOST_TIPS = 8  # that are named
 
 
 class Handle(NamedTuple):
@@ -37,7 +35,7 @@ def handle(model: Any, wanted: Any, joints: Sequence[int] | None) -> Handle:
     if wanted is not None:
         site = _named(model, wanted)
         body = _body(model, site)
-        return Handle(site, limbs.joints_to_root(model, body), ())
+        return Handle(site, limbs.joints_to_root(model, body), (), tuple(_shared(model, body)))
     sites = [i for i in range(model.nsite) if _ends_an_arm(model, int(model.site_bodyid[i]))]
     if joints is not None:
         island = islands.island(model, joints)
@@ -48,6 +46,21 @@ def handle(model: Any, wanted: Any, joints: Sequence[int] | None) -> Handle:
         site = "site", sites[0]
         return Handle(site, _chain(model, sites[0]), ())
     return _unnamed(model, sites)
+
+
+def _shared(model: Any, body: int) -> Iterator[str]:
+    """A sentence on joints before a handle that carry other limbs, as a torso's."""
+    chain, shared, inner = limbs.joints_to_root(model, body), list[int](), body
+    for place in limbs.bodies_to_root(model, body):
+        before = limbs.joints_to_root(model, place)
+        branches = limbs.branches(model, place, inner)
+        if before and 2 * max(branches, default=0) > len(chain) - len(before) > 0:
+            shared = before
+            break
+        inner = place
+    if shared:
+        names = ", ".join(model.joint(j).name for j in shared)
+        yield f"joints before the handle that carry other limbs, too: {names}; joints may omit them"
 
 
 def name(model: Any, site: tuple[str, int]) -> str:
@@ -76,7 +89,7 @@ def _named(model: Any, wanted: Any) -> tuple[str, int]:
 def unknown(field: str, word: Any, names: Sequence[str], kind: str) -> ParameterError:
     """The refusal of a name that the file does not have, with the nearest."""
     near = nearest(word, names) if isinstance(word, str) else []
-    hint = f"; did you mean {near[0]!r}?" if near else f": {one_line(', '.join(names), 200)}"
+    hint = f"; did you mean {near[0]!r}?" if near else f": {names_words(names)}"
     return ParameterError(field, word, f"must be {kind} of the file{hint}")
 
 
@@ -101,9 +114,11 @@ def _unnamed(model: Any, sites: list[int]) -> Handle:
     except limbs.Several as several:
         if loop := islands.loop_on_base(model):
             return Handle(None, loop, names)
-        ends = f"bodies such as {', '.join(several.tips[:MOST_TIPS])}"
-        shown = [", ".join(names)] * bool(names) + [ends]
-        bound = f"must be named, since the file has several limbs: there are {' and '.join(shown)}"
+        shown = [names_words(names)] * bool(names) + [f"bodies such as {names_words(several.tips)}"]
+        bound = (
+            "must be named (--site NAME), since the file has several limbs: there are "
+            f"{' and '.join(shown)}"
+        )
         raise ParameterError("site", None, bound) from None
     if limb is None:
         return Handle(None, [], names)

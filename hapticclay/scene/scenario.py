@@ -447,6 +447,12 @@ def _check_arm(s: Scenario) -> None:
             raise ParameterError(name, getattr(s, name), bound)
     if len(arm.names) > MOST_JOINTS:
         raise ParameterError("arm", arm.name, f"must have at most {MOST_JOINTS} joints in runs")
+    if isinstance(law, JointPD) and law.drive_rate is not None:
+        bound = (
+            "must be None in runs: a drive that samples runs as a host of its rate, "
+            f"JointPD(..., runs='host') with Ts={1.0 / law.drive_rate:g}"
+        )
+        raise ParameterError("controller.drive_rate", law.drive_rate, bound)
     limits: Any = arm.torque_limit
     if isinstance(law, JointPD) and law.runs == "drive" and any(map(math.isfinite, limits)):
         bound = (

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import matrices
 from ..arms.servo_gains import without_gains
 from ..display import time_words
 from .joint_loop import is_stable
@@ -36,7 +37,7 @@ def radius(arm: Any, Kp: Sequence[float], Kd: Sequence[float], dt: float, integr
         for k in range(1, 5):
             term = term @ rates * (dt / k)
             step = step + term
-        return float(np.abs(np.linalg.eigvals(step)).max())
+        return float(np.abs(matrices.eigenvalues(step)).max())
     ahead = D if integrator in IMPLICIT else linear.damping  # at the end of the step
     late = np.zeros_like(S)
     if integrator == "discrete":
@@ -45,11 +46,17 @@ def radius(arm: Any, Kp: Sequence[float], Kd: Sequence[float], dt: float, integr
     push = -dt * np.linalg.solve(whole, np.hstack([S, D + dt * late]))
     w = np.hstack([np.zeros((n, n)), eye]) + push
     q = np.hstack([eye, np.zeros((n, n))]) + dt * w
-    return float(np.abs(np.linalg.eigvals(np.vstack([q, w]))).max())
+    return float(np.abs(matrices.eigenvalues(np.vstack([q, w]))).max())
 
 
-def words(arm: Any, law: Any) -> Iterator[str]:
-    """Sentences on gains that are the file's own, and what they do in its simulation."""
+def words(arm: Any, law: Any, elsewhere: tuple[str, float]) -> Iterator[str]:
+    """Sentences on gains that are the file's own, and what they do elsewhere.
+
+    Args:
+        arm: an arm from a file.
+        law: that is judged.
+        elsewhere: where else the law may run, and the radius of its loop there.
+    """
     gains = arm.servo
     if not gains.taken or (law.Kp, law.Kd) != (gains.Kp, gains.Kd):
         return
@@ -57,6 +64,11 @@ def words(arm: Any, law: Any) -> Iterator[str]:
     yield from without_gains(gains, arm.names)
     yield from gains.notes
     size = radius(arm, gains.Kp, gains.Kd, gains.dt, gains.integrator)
-    verdict = "stable" if is_stable(size) else f"unstable, radius {size:.4g}"
     step = f"at each step of {time_words(gains.dt)} ({gains.integrator}), undelayed"
-    yield f"in the file's own simulation they act {step}: {verdict}"
+    yield f"in the file's own simulation they act {step}: {_verdict(size)}"
+    where, size = elsewhere
+    yield f"{where}: {_verdict(size)}"
+
+
+def _verdict(size: float) -> str:
+    return "stable" if is_stable(size) else f"unstable, radius {size:.4g}"

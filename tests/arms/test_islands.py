@@ -1,6 +1,8 @@
 """What hangs on an arm is locked: inertia against the engine's own, of the joints that move."""
 
+import dataclasses
 import math
+import pickle
 
 import mujoco
 import numpy as np
@@ -160,6 +162,32 @@ def test_a_floating_base_is_held_where_it_is():
     np.testing.assert_allclose(again.handle(), arm.handle(), atol=1e-15)
 
 
+@pytest.mark.parametrize("root", ["root", ""])
+def test_the_place_of_a_base_is_part_of_the_pose(root, tmp_path):
+    """An arm of another key frame stays there in copies, pickles and files."""
+    rest = '<keyframe><key name="lying" qpos="1 2 3 0.6 0 0.8 0 .3 .2"/></keyframe>'
+    text = model(f"{BASE}{limb(hand='')}</body>", rest=rest).replace('"root"', f'"{root}"')
+    file = tmp_path / "robot.xml"
+    file.write_text(text)
+    arm = hc.MjcfArm(file, pose="lying")
+    law = hc.JointPD((20.0, 10.0), (1.0, 0.5))
+    run = hc.Scenario(arm=arm, controller=law, Ts=1e-3, dt=1e-3, t_max=0.1)
+    for other in (
+        dataclasses.replace(arm),
+        pickle.loads(pickle.dumps(arm)),
+        hc.Scenario.load(run.save(tmp_path / "run.toml")).arm,
+    ):
+        np.testing.assert_array_equal(other.handle(), arm.handle())
+        np.testing.assert_array_equal(other.mechanism.weights(), arm.mechanism.weights())
+    name = root or "joint 1"
+    up = hc.MjcfArm(file, pose={name: (0, 0, 0, 1, 0, 0, 0), "a": 0.3})
+    alone = arm_of(model(limb(hand="")), pose={"a": 0.3})
+    np.testing.assert_allclose(up.handle(), alone.handle(), atol=1e-15)
+    for bad in ((0, 0, 0), (0, 0, 0, 0, 0, 0, 0), (0, 0, 0, 1, 0, 0, np.nan), 1.0):
+        with pytest.raises(hc.ParameterError, match="pose"):
+            hc.MjcfArm(file, pose={name: bad})
+
+
 def test_a_run_holds_what_is_locked():
     """The same motion as of the arm alone, its hand made one with the last link."""
     arms = [arm_of(SCENES["fingers tied"]), arm_of(SCENES["a loose cube first"])]
@@ -279,3 +307,29 @@ def test_a_torso_that_carries_two_arms_is_no_arm():
     sensor = '<body name="torso"><joint name="waist"/><geom size=".2"/><site name="imu"/>{}</body>'
     with pytest.raises(hc.ParameterError, match="bodies such as l_l2, r_l2"):
         arm_of(model(sensor.format(limb("l_", site="", hand="") + limb("r_", site="", hand=""))))
+
+
+def test_a_torso_before_an_arm_is_named():
+    """It counts among the joints before the handle, and carries the other arm."""
+    body = '<body name="torso"><joint name="waist"/><geom size=".2"/>{}</body>'
+    text = model(body.format(limb("l_", site="", hand="") + limb("r_", site="", hand="")))
+    arm = arm_of(text, site="r_l2")
+    assert arm.names == ("waist", "r_a", "r_b")
+    assert any("carry other limbs, too: waist;" in x for x in arm.notes)
+    arm = arm_of(text, site="r_l2", joints=("r_a", "r_b"))
+    np.testing.assert_allclose(arm.mass_matrix(), own_inertia(text, arm.names), rtol=1e-12)
+    assert not any("carry other limbs" in x for x in arm_of(model(limb()), site="ee").notes)
+
+
+def test_names_in_refusals_are_whole():
+    """However many there are, the last that is shown is one of the file."""
+    names = [f"a_rather_long_name_of_a_link_{i}" for i in range(30)]
+    bodies = "".join(f'<body name="{x}"><joint/><geom size=".1"/></body>' for x in names)
+    for wanted in ("qqq", None):
+        with pytest.raises(hc.ParameterError) as error:
+            arm_of(model(bodies), site=wanted)
+        words = str(error.value).split(" and ")[-2].replace(",", "").split()
+        assert words[-1] in names and " more" in str(error.value)
+    with pytest.raises(hc.ParameterError) as error:
+        arm_of(model(limb()), joints=[*names, "a", "a"])
+    assert all(x.strip("[]',:") in names for x in str(error.value).split() if "rather" in x)

@@ -153,3 +153,9 @@ def test_a_step_of_the_file_s_simulation(integrator, dt, kv):
     notes = hc.theory.joint_limits(arm, hc.JointPD.of(arm), 1e-3).assumed
     (said,) = [x for x in notes if x.startswith("in the file's own simulation")]
     assert f"({integrator})" in said and ("unstable" in said) == (found > 1.0)
+    assert "in drives, whose own loops count as continuous (runs drive): stable" in notes
+    other = hc.theory.joint_limits(arm, hc.JointPD.of(arm, runs="drive"), dt, dt)
+    host = hc.theory.joint_limits(arm, hc.JointPD.of(arm), dt, dt)
+    assert other.stable
+    (said,) = [x for x in other.assumed if x.startswith("in a host at")]
+    assert ("unstable" in said) == (not host.stable)
