@@ -65,7 +65,10 @@ CONTENT = (
     Content("body", "plugin flexcomp", NOTED, "elastic parts take no part"),
     Content("body", "name", USED, "the handle may be a body: `site`"),
     Content("body", "mocap sleep simple fuse user camera light", IGNORED, "nothing of mechanics"),
-    Content("joint", "type", USED, "hinge or slide"),
+    Content(
+        "joint", "type", USED,
+        "hinge or slide. A free joint is held where it is, a ball that is not of the arm is locked",
+    ),
     Content("joint", "name", USED, "without one: joint 1, joint 2, ... in the order of the file"),
     Content("joint", "pos axis ref class", USED, "as MuJoCo compiles them"),
     Content(
@@ -94,7 +97,7 @@ CONTENT = (
     Content("joint", "actuatorgravcomp group user", IGNORED, "the sum of torques is the same"),
     Content("tendon", "springlength stiffness damping armature", USED, "as those of joints"),
     Content("tendon", "springyield", NOTED, "the spring stays elastic"),
-    Content("tendon", "frictionloss", REFUSED, "give the friction of joints"),
+    Content("tendon", "frictionloss", REFUSED, "of the arm's joints: give their friction"),
     Content("tendon", "limited range", NOTED, "a tendon's limits take no part"),
     Content("tendon", "site geom pulley joint class name", USED, "as MuJoCo compiles them"),
     Content(

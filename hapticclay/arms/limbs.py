@@ -44,7 +44,8 @@ def bodies_to_root(model: Any, body: int) -> Iterator[int]:
         body = int(model.body_parentid[body])
 
 
-def _free_joint() -> int:
+def free_joint() -> int:
+    """MuJoCo's number of a free joint."""
     from ..physics import mujoco
 
     return int(mujoco.mjtJoint.mjJNT_FREE)
@@ -60,7 +61,7 @@ def is_scalar(model: Any, joint: int) -> bool:
 
 def joints_to_root(model: Any, body: int) -> list[int]:
     """Joints between a body and the nearest free body or the world, from the base on."""
-    out, free = list[int](), _free_joint()
+    out, free = list[int](), free_joint()
     for place in bodies_to_root(model, body):
         first, count = int(model.body_jntadr[place]), int(model.body_jntnum[place])
         if count and model.jnt_type[first] == free:
@@ -140,7 +141,7 @@ def _limbs(model: Any) -> list[Limb]:
 
 def _moving_children(model: Any) -> dict[int, list[int]]:
     """Bodies with joints by the nearest body with joints that carries them; 0 for a base."""
-    carrier, out, free = {0: 0}, dict[int, list[int]](), _free_joint()
+    carrier, out, free = {0: 0}, dict[int, list[int]](), free_joint()
     for body in range(1, model.nbody):
         above = carrier[int(model.body_parentid[body])]
         first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])

@@ -14,6 +14,7 @@ from typing import Annotated
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
 from ..errors import Bound, ParameterError, array_of, integer, number
 from ..formulas.constants import B_MAX
@@ -490,12 +491,12 @@ def moving_modes(loop: np.ndarray) -> np.ndarray:
 
     loop = matrix_balance(loop, permute=False)[0]
     while len(loop):
-        _, size, vectors = np.linalg.svd(loop - np.eye(len(loop)))
+        _, size, vectors = matrices.svd(loop - np.eye(len(loop)))
         moving = vectors[: np.count_nonzero(size > FREE * size[0])]
         if len(moving) == len(loop):
             break
         loop = moving @ loop @ moving.T
-    return np.linalg.eigvals(loop)
+    return matrices.eigenvalues(loop)
 
 
 def growth(loop: np.ndarray, Ts: float) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
 from ..arms.joint_law import JointPD, checked_law, compensated
 from ..arms.joint_units import Joints, of_joint, table_of
@@ -472,7 +473,7 @@ class Study:
 
 def worst_motion(loop: JointLoop) -> tuple[float, float, int]:
     """Size of the largest eigenvalue, its frequency [Hz], and the joint that moves most in it."""
-    values, vectors = np.linalg.eig(loop.map())
+    values, vectors = matrices.eigenvectors(loop.map())
     size = loop.radius()
     i = int(np.argmin(np.abs(np.abs(values) - size)))
     frequency = abs(np.angle(values[i])) / (2.0 * math.pi * loop.Ts)

@@ -16,6 +16,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from ..arms import joint_law
 from ..display import time_words
 from ..errors import ParameterError
@@ -104,14 +105,12 @@ class JointLoop:
     def _transition(
         self, t: float, damping: np.ndarray, stiffness: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        from scipy.linalg import expm
-
         n, inverse = self.n, np.linalg.inv(self.inertia)
         a = np.zeros((3 * n, 3 * n))
         a[:n, n : 2 * n] = np.eye(n)
         a[n : 2 * n] = np.hstack([-inverse @ stiffness, -inverse @ damping, inverse])
         with np.errstate(over="ignore", invalid="ignore"):
-            e = expm(a * t)
+            e = matrices.exponential(a * t)
         if not np.isfinite(e).all():
             bound = f"must be smaller at this rate: motion over {t:g} s is beyond all numbers"
             raise ParameterError("damping", float(np.abs(damping).max()), bound)
@@ -171,14 +170,14 @@ class JointLoop:
     def structural(self) -> int:
         """Directions of motion without stiffness, which rest anywhere."""
         total = self.stiffness + self.position
-        size = np.linalg.svd(total, compute_uv=False)
+        size = matrices.singular_values(total)
         scale = max(np.abs(self.stiffness).max(), np.abs(self.position).max())
         return int(np.sum(size <= FREE * scale)) if scale else self.n
 
     @cached_property
     def eigenvalues(self) -> np.ndarray:
         """Eigenvalues of the map, largest first, without those of rest anywhere (z = 1)."""
-        z = np.linalg.eigvals(self.map())
+        z = matrices.eigenvalues(self.map())
         for _ in range(2 * self.structural):
             i = int(np.abs(z - 1.0).argmin())
             if abs(z[i] - 1.0) > AT_REST:
@@ -240,7 +239,7 @@ class JointLoop:
 
     def at_rest(self) -> np.ndarray:
         """Position per constant torque added to the host's [rad/(N.m)], shape (n, n)."""
-        return np.linalg.pinv(self.stiffness + self.position, FREE)
+        return matrices.pseudo_inverse(self.stiffness + self.position, FREE)
 
     # ---- the same with other numbers
 
@@ -284,7 +283,7 @@ def resonant_grid(loop: Any) -> np.ndarray:
     """Angles of a search around eigenvalues near the unit circle, > 0 and <= pi."""
     if loop.states > MOST_STATES // 3:
         return np.empty(0)
-    near = near_resonances(np.linalg.eigvals(loop.map()))
+    near = near_resonances(matrices.eigenvalues(loop.map()))
     return near[(near > 0.0) & (near <= math.pi)]
 
 

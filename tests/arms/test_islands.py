@@ -1,6 +1,8 @@
 """What hangs on an arm is locked: inertia against the engine's own, of the joints that move."""
 
+import dataclasses
 import math
+import pickle
 
 import mujoco
 import numpy as np
@@ -158,6 +160,32 @@ def test_a_floating_base_is_held_where_it_is():
     np.testing.assert_allclose(arm.mechanism.weights(), data.qfrc_bias[6:], rtol=1e-12)
     again = hc.MjcfArm(arm.file, pose=arm.pose)
     np.testing.assert_allclose(again.handle(), arm.handle(), atol=1e-15)
+
+
+@pytest.mark.parametrize("root", ["root", ""])
+def test_the_place_of_a_base_is_part_of_the_pose(root, tmp_path):
+    """An arm of another key frame stays there in copies, pickles and files."""
+    rest = '<keyframe><key name="lying" qpos="1 2 3 0.6 0 0.8 0 .3 .2"/></keyframe>'
+    text = model(f"{BASE}{limb(hand='')}</body>", rest=rest).replace('"root"', f'"{root}"')
+    file = tmp_path / "robot.xml"
+    file.write_text(text)
+    arm = hc.MjcfArm(file, pose="lying")
+    law = hc.JointPD((20.0, 10.0), (1.0, 0.5))
+    run = hc.Scenario(arm=arm, controller=law, Ts=1e-3, dt=1e-3, t_max=0.1)
+    for other in (
+        dataclasses.replace(arm),
+        pickle.loads(pickle.dumps(arm)),
+        hc.Scenario.load(run.save(tmp_path / "run.toml")).arm,
+    ):
+        np.testing.assert_array_equal(other.handle(), arm.handle())
+        np.testing.assert_array_equal(other.mechanism.weights(), arm.mechanism.weights())
+    name = root or "joint 1"
+    up = hc.MjcfArm(file, pose={name: (0, 0, 0, 1, 0, 0, 0), "a": 0.3})
+    alone = arm_of(model(limb(hand="")), pose={"a": 0.3})
+    np.testing.assert_allclose(up.handle(), alone.handle(), atol=1e-15)
+    for bad in ((0, 0, 0), (0, 0, 0, 0, 0, 0, 0), (0, 0, 0, 1, 0, 0, np.nan), 1.0):
+        with pytest.raises(hc.ParameterError, match="pose"):
+            hc.MjcfArm(file, pose={name: bad})
 
 
 def test_a_run_holds_what_is_locked():
