@@ -7,7 +7,7 @@ would name as the handle (- for none; + for a file that the one above includes).
 as OWNER+NAME/PATH; meshes that lie there are used, and with --fetch the files that are missing are
 got, without meshes. Each is loaded in a process of its own, as it is and without any option; if the
 answer is that the handle must be named, once more with it. Writes robot_files.md and
-robot_files.json; some ten minutes of processor time. The files are no part of this project.
+robot_files.json; some five minutes of processor time. The files are no part of this project.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ import hapticclay as hc
 from hapticclay import files
 from hapticclay.errors import ParameterError
 from hapticclay.results import json_ready
+from hapticclay.theory.joint_gains import Study, first_joint
 
 from . import common
 from .peers.held_arm import HeldArm, urdf_inertia
@@ -38,6 +39,7 @@ TS = 1e-3  # [s] control sample, and delay
 FREQUENCY, RATIO = 5.0, 0.7  # [Hz] and damping ratio of each joint alone under its gains
 BESIDE = 0.005  # share of the common limit, to either side
 ROUNDING = 1e-12  # relative, of M
+MOST_NAMES = 4  # in a cell
 
 
 class RobotFile(NamedTuple):
@@ -85,8 +87,8 @@ def loaded(file: Path, handle: str) -> tuple[hc.MjcfArm, str]:
     """An arm from a file without any option, or with its handle if that must be named."""
     try:
         return hc.MjcfArm(file), "answered"
-    except ParameterError as error:
-        if handle == "-" or error.field != "site":
+    except ParameterError:
+        if handle == "-":
             raise
     return hc.MjcfArm(file, site=handle), "answered, handle named"
 
@@ -99,17 +101,18 @@ def judged(file: Path, handle: str) -> dict[str, Any]:
     except ParameterError as error:
         return {"result": "refused", "why": str(error), "seconds": time.perf_counter() - begin}
     law = gains(arm)
-    limits = hc.theory.joint_limits(arm, law, TS, TS)
+    family = Study(arm, law, TS, TS).family("Kp")
+    limit = family.limit()
     return {
         "result": result,
         "seconds": time.perf_counter() - begin,
         "joints": list(arm.names),
         "handle": arm.site,
         "notes": list(arm.notes),
-        "scale": limits.scale,
-        "joint": limits.joint,
-        "buzz": limits.buzz,
-        **compared(file, arm, law, limits.scale),
+        "scale": limit.high,
+        "joint": arm.names[first_joint(family, limit)],
+        "buzz": limit.frequency(TS),
+        **compared(file, arm, law, limit.high),
     }
 
 
@@ -178,8 +181,18 @@ def cells(row: dict[str, Any]) -> list[str]:
         first if row["scale"] and math.isfinite(row["scale"]) else "none",
         _inertia(row),
         _limit(row),
-        "; ".join(x for x in row["notes"] if x.startswith(("locked", "held"))),
+        "; ".join(_short(x) for x in row["notes"] if "locked" in x or "held" in x),
     ]
+
+
+def _short(note: str) -> str:
+    """A note without the most of a long list of names."""
+    names = note.split(", ")
+    return (
+        note
+        if len(names) <= MOST_NAMES
+        else ", ".join(names[:MOST_NAMES]) + f", ... ({len(names)})"
+    )
 
 
 def _inertia(row: dict[str, Any]) -> str:

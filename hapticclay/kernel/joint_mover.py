@@ -52,6 +52,7 @@ class JointMover(Mover):
         terms = ComputedTerms(scenario, self.places)
         self.places["handle"], self.places["scratch_handle"] = terms.handle, terms.scratch_handle
         self.computed = terms.at_pose, terms.at_rates, terms.at_scratch
+        self.failed, self.calls_python = terms.failed, True
 
     def build(self, scenario: Scenario) -> Any:
         return scenario.file_arm.mechanism.runnable()
@@ -94,3 +95,4 @@ class JointMover(Mover):
         for data in (self.data, self.scratch):
             mujoco.mj_resetData(self.model, data)
             data.qpos[:] = self.home
+        self.failed.clear()

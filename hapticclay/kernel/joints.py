@@ -5,8 +5,7 @@ Only hand and muscle act along z, which is eliminated: in the plane all laws of 
 of another mobility (docs/equations.md).
 """
 
-import math
-
+from ..formulas import numbers
 from . import dynamics, hand
 
 
@@ -196,7 +195,7 @@ def factor(A, at, n):
             x = A[p + j]
             for r in range(j):
                 x -= A[p + r] * A[q + r]
-            A[p + j] = 1.0 / math.sqrt(x) if i == j else x * A[q + j]
+            A[p + j] = numbers.ratio(1.0, numbers.root(x)) if i == j else x * A[q + j]
 
 
 def solve(L, of, x, at, n):
@@ -232,7 +231,7 @@ def mobility(m, i, j):
 def eliminate(k, d):
     """Eliminates z, where the law is n u = a + W (f - d u), from the law of the plane."""
     x, y, z = k.x, k.y, k.z
-    per = d / (z.n + k.Wzz * d)
+    per = numbers.ratio(d, z.n + k.Wzz * d)
     force = z.f - per * (z.a + k.Wzz * z.f)
     x.a, y.a = x.a + k.Wxz * force, y.a + k.Wyz * force
     x.rest, y.rest = x.rest + k.Wxz * force, y.rest + k.Wyz * force
@@ -246,7 +245,7 @@ def answer(m, k):
     if m.axes > 2:
         z = k.z
         total = z.a + k.Wxz * k.x.net + k.Wyz * k.y.net + k.Wzz * z.f
-        z.u = total / (z.n + k.Wzz * z.d)
+        z.u = numbers.ratio(total, z.n + k.Wzz * z.d)
         z.net, z.fe = z.f - z.d * z.u, 0.0
     for j in range(n):
         x = 0.0

@@ -235,13 +235,14 @@ class Model:
     Ts: real  # [s]
     uneven: whole  # events may lie between the steps
     drops_events: whole  # crossings and stops are overwritten, since nothing reads them
+    halts: whole  # no further step is made: another thread may say so while steps are made
     records_clay_force: whole  # fe is recorded, since it is not b v
     records_held_force: whole  # as the motors hold it
     chance: whole
     chances: floats  # four numbers a sample
     chance_first: whole
     encoder: whole  # joints have encoders
-    counts: whole[12]  # per turn
+    count: real[12]  # step of their readings [rad, m of slides], 0 for exact ones
     window: whole  # samples of the difference, 0 for exact rates
     cutoff: real  # of the low-pass after it [Hz], 0 for none
     angles: floats  # ring of past angles

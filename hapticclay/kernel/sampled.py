@@ -8,7 +8,7 @@ new torques.
 import math
 
 from ..formulas import arm as arm_law
-from ..formulas import compensator, controller
+from ..formulas import compensator, controller, numbers
 from . import (
     arm,
     friction,
@@ -122,7 +122,7 @@ def event(m, s, samples, now):
         across(m, s, e, 0.0)
         for i in range(m.axes):
             s.fh[i] = hand.force(m, e, i)
-        ledger.add_work(m, s.work, s.work_at_event, e, e.o, s.now)
+        ledger.add_work(m, s.work, s.work_at_event, e, e.o, s.now, s.q)
     else:
         rest(m, s, e)
         memory.copied(s.work_at_event, s.work)
@@ -274,9 +274,9 @@ def acceleration(m, s, k, fx, fy):
     gx, gy = ax + k.Wxx * fx + k.Wxy * fy, ay + k.Wxy * fx + k.Wyy * fy
     a, b = 1.0 + k.Wxx * m.x.mass, k.Wxy * m.y.mass
     c, d = k.Wxy * m.x.mass, 1.0 + k.Wyy * m.y.mass
-    r = c / a
-    uy = (gy - r * gx) / (d - r * b)
-    return (gx - b * uy) / a, uy
+    r = numbers.ratio(c, a)
+    uy = numbers.ratio(gy - r * gx, d - r * b)
+    return numbers.ratio(gx - b * uy, a), uy
 
 
 def reaction(m, s, k, fx, fy):

@@ -109,7 +109,7 @@ class Pair:
             raise ParameterError("pair.delay", self.delay, bound)
         for i in range(2):
             _check_touched(self, i)
-            check_hardware(self, i)
+            check_hardware(self, i, joint_names(self.arms[i]))
 
     def __repr__(self) -> str:
         names = (type(arm).__name__ for arm in self.arms)

@@ -338,10 +338,8 @@ class Scenario:
             return
         number("hardware.jitter", given.jitter, 0.0, 0.28 * Ts, unit="s")
         number("hardware.delay", given.delay, 0.0, 100.0 * Ts, unit="s")
-        n = len(self.joints)
-        if isinstance(given.encoder, tuple) and len(given.encoder) != n:
-            bound = f"must be one number, or one for each of {n} joints"
-            raise ParameterError("hardware.encoder", given.encoder, bound)
+        turning = [True, True] if self.is_closed_form else self.file_arm.mechanism.turning
+        given.check_encoders(turning, self.joints, "hardware.")
 
     @property
     def rotated(self) -> bool:
@@ -449,6 +447,12 @@ def _check_arm(s: Scenario) -> None:
             raise ParameterError(name, getattr(s, name), bound)
     if len(arm.names) > MOST_JOINTS:
         raise ParameterError("arm", arm.name, f"must have at most {MOST_JOINTS} joints in runs")
+    if isinstance(law, JointPD) and law.drive_rate is not None:
+        bound = (
+            "must be None in runs: a drive that samples runs as a host of its rate, "
+            f"JointPD(..., runs='host') with Ts={1.0 / law.drive_rate:g}"
+        )
+        raise ParameterError("controller.drive_rate", law.drive_rate, bound)
     limits: Any = arm.torque_limit
     if isinstance(law, JointPD) and law.runs == "drive" and any(map(math.isfinite, limits)):
         bound = (

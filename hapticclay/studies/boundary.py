@@ -10,6 +10,7 @@ from typing import Annotated, TypeVar
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
 from ..errors import Bound, ParameterError, Real, number
 from ..formulas.constants import B_MAX
@@ -290,9 +291,9 @@ def pose_limit(loop: PushedLoop, most: float = 200.0) -> float:
 
     def stable(K: float) -> bool:
         if straight and not loop.Ts:
-            z = np.linalg.eigvals(pose_matrix(replace(loop, K=K)))
+            z = matrices.eigenvalues(pose_matrix(replace(loop, K=K)))
         else:
-            z = np.linalg.eigvals(first + (K - 1.0) * (second - first))
+            z = matrices.eigenvalues(first + (K - 1.0) * (second - first))
         if loop.Ts:
             return bool(np.all(np.abs(z[np.abs(z - 1.0) > 1e-4 * loop.Ts]) <= 1.0))
         return bool(np.all(z.real[np.abs(z) > 1e-4] <= 0.0))

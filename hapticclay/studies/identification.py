@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import function_of, named, part
 from ..display import fields_of, table_of
 from ..errors import Bound, ParameterError, Real, integer, numbers_of
@@ -564,7 +565,7 @@ def _linear(what: str, frequency: np.ndarray, H: np.ndarray, dt: float | None) -
         A = np.stack((1.0 / H, -s, -np.ones_like(s)), axis=1) / size[:, None]
         b = s2 / size + 0j
     both = np.concatenate((A.real, A.imag)), np.concatenate((b.real, b.imag))
-    return np.linalg.lstsq(*both, rcond=None)[0]
+    return matrices.least_squares(*both)
 
 
 def unit_of(unit: str, rotary: bool) -> str:

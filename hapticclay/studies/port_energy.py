@@ -18,6 +18,7 @@ import numpy as np
 from ..arguments import checked, part
 from ..errors import Bound, ParameterError, Real
 from ..formulas import hardware
+from ..model.hardware import Hardware
 from ..model.samples import Samples
 from ..model.spring import STIFFNESS_MAX
 from ..scene.scenario import Scenario
@@ -151,14 +152,14 @@ def imposed(wall: VirtualWall, path: Path, periods: int, steps: int) -> tuple[Sc
 def _wall_force(wall: VirtualWall, place: np.ndarray, t: np.ndarray, h: float) -> np.ndarray:
     """Mean force of the wall over the kicks at t, for given positions at the samples."""
     scenario, Ts, window = wall.scenario(wall.Ts), wall.Ts, wall.velocity_window
-    counts = (scenario.hardware.encoder if scenario.hardware else None) or 0
+    (count, *_) = (scenario.hardware or Hardware()).count_sizes([True])
     assert scenario.controller is not None
     params, state = scenario.controller.params, (0.0, 0.0)
     lever = params[3]
     rate = -(place[1] - place[0]) / Ts / lever  # at which the joint has turned so far, see Sampled
     q = UPRIGHT - np.arcsin(place / lever)
     q = np.concatenate((q[0] + Ts * rate * np.arange(-window, 0), q))
-    q = [hardware.encode(x, counts) for x in q.tolist()]
+    q = [hardware.encode(x, count) for x in q.tolist()]
     w, held = rate, []
     for k in range(len(place)):
         if wall.velocity == "difference":

@@ -16,6 +16,7 @@ from typing import Annotated
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked
 from ..arms.joint_law import compensated
 from ..arms.mechanism import STILL, Linear
@@ -174,7 +175,7 @@ def holds(handle: AnyHandle, K: float, B: float, Ts: float, delay: float) -> boo
 
 def _stable(loops: np.ndarray) -> np.ndarray:
     """Whether maps of shape (..., n, n) are stable."""
-    z = np.linalg.eigvals(loops)
+    z = matrices.eigenvalues(loops)
     moving = np.where(np.abs(z - 1.0) > AT_REST, np.abs(z), 0.0)
     return moving.max(axis=-1) < 1.0 + ROUNDING
 

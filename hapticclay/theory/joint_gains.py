@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
 from ..arms.joint_law import JointPD, checked_law, compensated
+from ..arms.joint_units import Joints, of_joint, table_of
 from ..arms.mechanism import Linear
 from ..arms.mjcf_arm import MjcfArm
 from ..display import time_words
 from ..results import Result, Tables
-from . import joint_changes, joint_crossings, roots
+from . import file_servo, joint_changes, joint_crossings, roots
 from .client_loop import Delay, Sample
 from .joint_changes import Edge, Number, slopes
 from .joint_crossings import Crossing
 from .joint_families import Circle, Family, Limit
-from .joint_loop import JointLoop, grid, is_stable, timing_words
+from .joint_loop import Drive, JointLoop, grid, is_stable, timing_words
 
 LATEST = 2.0  # [s] largest added delay that is looked for
 SLOWEST = 1.0  # [s] largest control sample that is looked for
@@ -34,7 +36,7 @@ IGNORED = "joint friction, counts, converters, torque limits, backlash, elastic 
 
 @named
 @dataclass(frozen=True, repr=False, eq=False)
-class JointLimits(Result):
+class JointLimits(Joints, Result):
     """What the joints of an arm carry at a pose, all coupled.
 
     A pair (least, largest) is the interval of a gain around the present one in which the loop is
@@ -77,6 +79,7 @@ class JointLimits(Result):
             shape (n, 2).
         rate_per_delay: change of the lowest rate with the delay [Hz/s].
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
+        slides: whether each joint slides; then its units are those of forces and lengths.
     """
 
     drawn_by = "hapticclay.views.joint_plots:limits_plot"
@@ -122,6 +125,7 @@ class JointLimits(Result):
     rate_change: np.ndarray
     rate_per_delay: float
     assumed: tuple[str, ...] = ()
+    slides: tuple[bool, ...] = ()
 
     @property
     def stable(self) -> bool:
@@ -164,10 +168,12 @@ class JointLimits(Result):
             slope, most = self.slope[j], self.friction_slope[j]
             if slope > 0.0 and not slope < most:
                 limit = "" if math.isnan(most) else f", at most {most:.4g}"
-                return f"friction fed forward at {self.joint}: slope {slope:.4g} N.m.s/rad{limit}"
+                unit = of_joint("N.m.s/rad", self.turning[j])
+                return f"friction fed forward at {self.joint}: slope {slope:.4g} {unit}{limit}"
             low, high = self.Kp[j]
             if high > low and high < self.stiffness[j]:
-                return f"Kp of {self.joint}, {self.stiffness[j]:.4g} to {high:.4g} N.m/rad or less"
+                unit = of_joint("N.m/rad", self.turning[j])
+                return f"Kp of {self.joint}, {self.stiffness[j]:.4g} to {high:.4g} {unit} or less"
             return "delay and rate: no Kp of one joint is stable" if math.isnan(high) else "Kp"
         if math.isinf(self.scale):
             return "nothing: no factor of Kp buzzes"
@@ -222,7 +228,9 @@ class JointLimits(Result):
             "largest factor of Kd per delay [1/s]": self.Kd_scale_per_delay[1],
             "lowest rate per delay [Hz/s]": self.rate_per_delay,
         }
-        return {"joints": joints, "sensitivity": moves, "arm": {k: [v] for k, v in arm.items()}}
+        by_joint = {"joints": joints, "sensitivity": moves}
+        shown = {name: table_of(table, self.turning) for name, table in by_joint.items()}
+        return {**shown, "arm": {k: [v] for k, v in arm.items()}}
 
 
 def _per(unit: str) -> list[str]:
@@ -239,23 +247,27 @@ def joint_loop(
     compensated: bool,
     gains: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> JointLoop:
-    """The loop of an arm at a pose under a law; what a drive does acts between samples.
+    """The loop of an arm at a pose under a law; what a continuous drive does acts between samples.
 
     Gains, if given, replace Kp and Kd of the law, and may be negative.
     """
     stiffness, damping = (np.diag(x) for x in gains or (law.Kp, law.Kd))
-    held, drive = (1.0, 0.0) if law.runs == "host" else (0.0, 1.0)
+    held, driven = (1.0, 0.0) if law.runs == "host" else (0.0, 1.0)
+    drive = None
+    if law.drive_rate is not None:
+        drive = Drive(stiffness, damping, max(1, round(law.drive_rate * Ts)))
     forward = linear.gravity_stiffness * float(compensated)
     return JointLoop(
         linear.inertia,
-        linear.damping + drive * damping,
-        linear.stiffness + linear.gravity_stiffness + drive * stiffness,
+        linear.damping + driven * damping,
+        linear.stiffness + linear.gravity_stiffness + driven * stiffness,
         held * stiffness - forward,
         held * damping - np.diag(law.slopes),
         Ts,
         delay,
         law.velocity,
         law.cutoff,
+        drive,
     )
 
 
@@ -305,6 +317,7 @@ def joint_limits(arm: MjcfArm, law: JointPD, Ts: Sample, delay: Delay = 0.0) -> 
         **study.changes(of_Kp, of_Kd, (scale, of_all_Kd)),
         **study.timing_changes(left, rate),
         assumed=study.assumed(),
+        slides=tuple(not turns for turns in arm.mechanism.turning),
     )
 
 
@@ -331,6 +344,7 @@ class Study:
         self.Ts, self.delay = Ts, delay
         self._known: dict[tuple[int, float, float], tuple[Linear, JointLoop]] = {}
         self.arm, self.law = arm, checked_law(law, arm.names)
+        law.drive_samples(Ts)  # refuses a rate that is no multiple
         self.compensated = compensated(arm, law)
         self.linear = arm.linear(q)
         self.loop = self.remade()
@@ -438,11 +452,20 @@ class Study:
             "rate_per_delay": float(by_rate[-1]),
         }
 
+    def _elsewhere(self) -> tuple[str, float]:
+        """Where else the law may run, the host or drives, and the radius of its loop there."""
+        if self.law.runs == "drive":
+            at = timing_words(self.Ts, self.delay)
+            return f"in a host at {at}", self.remade(law=replace(self.law, runs="host")).radius()
+        loop = self.remade(law=replace(self.law, runs="drive"))
+        return "in drives, whose own loops count as continuous (runs drive)", loop.radius()
+
     def assumed(self) -> tuple[str, ...]:
         """What the verdict rests on, a sentence each."""
         held = f"{SMALL}, no hand at the handle"
         law = f"law: {self.law.words}"
-        return (*self.arm.notes, gravity_words(self.compensated), law, held, IGNORED)
+        own = file_servo.words(self.arm, self.law, self._elsewhere())
+        return (*own, *self.arm.notes, gravity_words(self.compensated), law, held, IGNORED)
 
 
 # ---- present motion, delay and rate --------------------------------------------------------------
@@ -450,7 +473,7 @@ class Study:
 
 def worst_motion(loop: JointLoop) -> tuple[float, float, int]:
     """Size of the largest eigenvalue, its frequency [Hz], and the joint that moves most in it."""
-    values, vectors = np.linalg.eig(loop.map())
+    values, vectors = matrices.eigenvectors(loop.map())
     size = loop.radius()
     i = int(np.argmin(np.abs(np.abs(values) - size)))
     frequency = abs(np.angle(values[i])) / (2.0 * math.pi * loop.Ts)

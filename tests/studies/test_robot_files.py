@@ -49,15 +49,16 @@ def test_the_list_has_addresses_checksums_and_every_file_once():
 
 def test_files_are_judged_and_the_page_has_them(tmp_path):
     """An arm, one whose handle must be named, one that is no model, and one that is not there."""
-    two = ARM.replace("<site", '<site name="other"/><site')
+    other = ARM[ARM.index("<body") : ARM.rindex("</worldbody>")].replace('name="', 'name="right_')
+    two = ARM.replace("</worldbody>", f"{other}</worldbody>")
     texts = {"arm.xml": ARM, "two.xml": two, "broken.xml": "<mujoco><x/></mujoco>", "far.xml": ""}
-    file = listing(tmp_path, texts, ("-", "other", "-", "-"))
+    file = listing(tmp_path, texts, ("-", "tool", "-", "-"))
     (tmp_path / "one+robots" / "far.xml").unlink()
     rows = robot_files.main(tmp_path, out=tmp_path / "out", listing=file)
     assert [x["path"] for x in rows] == ["arm.xml", "two.xml", "broken.xml"]
     arm, named, broken = rows
     assert arm["result"] == "answered" and arm["joints"] == ["a", "b"]
-    assert named["handle"] in ("other", "tool")
+    assert named["result"] == "answered, handle named" and named["joints"] == ["a", "b"]
     assert broken["result"] == "refused" and "element" in broken["why"]
     for row in (arm, named):
         assert row["inertia"] < robot_files.ROUNDING
