@@ -19,7 +19,7 @@ from ..display import time_words
 from ..results import Result, Tables
 from ..scene.pair import Pair
 from ..scene.pair_hardware import slides_of
-from . import joint_crossings, pair_branches, pair_roots, roots
+from . import joint_crossings, pair_advice, pair_branches, pair_roots, roots
 from .held_words import pair_words
 from .joint_families import NEAR
 from .joint_loop import ROUNDING, grid, is_stable
@@ -70,6 +70,7 @@ class PairLimits(Joints, Result):
         Ts: control sample [s].
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
         slides: whether each joint slides; then its units are those of forces and lengths.
+        remedy: changes of an unstable pair, each of which alone makes it stable by the exact map.
     """
 
     drawn_by = "hapticclay.views.pair_plots:limits_plot"
@@ -95,6 +96,7 @@ class PairLimits(Joints, Result):
     Ts: float
     assumed: tuple[str, ...] = ()
     slides: tuple[bool, ...] = ()
+    remedy: str = ""
 
     @property
     def delay_left(self) -> float:
@@ -117,8 +119,9 @@ class PairLimits(Joints, Result):
         if math.isinf(self.delay):
             return f"any delay of the link up to {LATEST:g} s"
         if self.delay == 0.0:
-            return "no delay of the link is stable"
-        return f"one-way delay up to {time_words(self.delay)}"
+            return "unstable without any delay of the link"
+        again = ", and again here" if self.stable and self.delay < self.present else ""
+        return f"one-way delay up to {time_words(self.delay)}{again}"
 
     def remarks(self) -> Sequence[str]:
         """What to change first, and what the verdict rests on."""
@@ -126,21 +129,15 @@ class PairLimits(Joints, Result):
 
     def advice(self) -> str:
         """The change that gains most, or that brings an unstable pair back."""
-        if 0.0 < self.friction_fraction < 1.0:
-            over = self.names[int(np.argmax(self.law_slope - self.slope))]
-            return (
-                f"friction feed-forward ({over} most), to {self.friction_fraction:.0%} of it or "
-                "less: an undamped common motion, which Kp and Kd cannot touch"
-            )
+        if not self.stable:
+            return self.remedy
+        if math.isinf(self.delay):
+            return f"nothing: no delay of the link up to {LATEST:g} s is too long"
         cause, late = max(self.budget.items(), key=lambda x: x[1])
         lateness = f"{cause} ({time_words(late)} each way"
-        if self.stable and math.isinf(self.delay):
-            return f"nothing: no delay of the link up to {LATEST:g} s is too long"
-        if self.stable:
-            return f"{lateness}; {time_words(self.delay_left)} are left)"
-        if self.delay > 0.0:
-            return f"{lateness}; the link may have {time_words(self.delay)})"
-        return f"gains and rate: unstable without any delay of the link; {lateness})"
+        if self.delay < self.present:
+            return f"{lateness}, and no less: some shorter delays are unstable)"
+        return f"{lateness}; {time_words(self.delay_left)} are left)"
 
     def tables(self) -> Tables:
         """Friction of each joint, lateness by cause, and the whole pair."""
@@ -208,6 +205,7 @@ def pair_limits(pair: Pair) -> PairLimits:
         pair.Ts,
         (pair_words(pair), *study.build.assumed()),
         slides_of(pair.leader),
+        "" if study.stable else pair_advice.remedy(study, fraction),
     )
 
 
@@ -238,9 +236,13 @@ class Study:
         """Whether the pair is stable."""
         return is_stable(self.radius)
 
-    def holds(self, gain: float) -> bool:
-        """Whether it is stable with a factor of all Kp."""
-        return _holds(self.build.loop(gain=gain))
+    def holds(self, gain: float, friction: tuple[np.ndarray, np.ndarray] | None = None) -> bool:
+        """Whether it is stable with a factor of all Kp, and slopes of the friction."""
+        return _holds(self.build.loop(gain=gain, friction=friction))
+
+    def at(self, late: float) -> bool:
+        """Whether it is stable with a one-way delay of the link [s]."""
+        return _holds(self.build.loop((late, late)))
 
     def gain(self) -> float:
         """Largest factor of all Kp: up to it, no eigenvalue reaches the circle between factors."""

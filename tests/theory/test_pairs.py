@@ -3,6 +3,7 @@
 import functools
 import math
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -311,6 +312,31 @@ def test_no_delay_below_the_limit_is_unstable(seed, kind):
         assert max(build.loop((x, x)).radius() for x in beyond) > 1.0
     for late in below.tolist():
         assert build.loop((late, late)).radius() < 1.0 + 1e-9
+
+
+@pytest.mark.parametrize("kind", KINDS[:3])
+def test_slow_motions_at_high_rates_have_the_limit_of_lower_rates(kind):
+    """Motion of 0.4 to 2 Hz turns by 1e-5 to 6e-5 rad in a sample at 200 kHz.
+
+    A hold of 0.1 ms is late by half of it, of limits of 45 ms and more: 2e-3 is twice that.
+    """
+    slow = hc.theory.pair_limits(one(kind=kind, Ts=1e-4, **HELD))
+    fast = hc.theory.pair_limits(one(kind=kind, Ts=5e-6, **HELD))
+    assert fast.delay == pytest.approx(slow.delay, rel=2e-3)
+    assert fast.frequency == pytest.approx(slow.frequency, rel=2e-3)
+
+
+def test_friction_that_feeds_a_slow_motion_is_limited():
+    """A hand's spring and a heavy pair: 6e-5 rad in a sample; the map flips at the share."""
+    law = hc.JointPD((700.0,), (2.0,), friction=[(0.0, 1.0, 0.5)])
+    device = hc.Device(8.0, 0.01)
+    hand = hc.Operator(0.5, 0.3, 0.3)
+    pair = hc.Pair(device, device, law, hc.Link(delay=1e-3), Ts=5e-4, leader_operator=hand)
+    share, build = hc.theory.pair_limits(pair).friction_fraction, Build(pair)
+    for factor, stable in ((0.99, True), (1.01, False)):
+        loop = build.loop(friction=(0.5 * factor * share * np.ones(1),) * 2)
+        assert loop.stable() is stable
+        assert abs(np.angle(loop.eigenvalues[0])) < 1e-4
 
 
 def test_a_window_between_two_whole_samples_is_a_limit():
@@ -714,6 +740,68 @@ def test_a_verdict_says_what_holds_and_touches_the_arms():
     assert first["waves"] == "" and first["position-position"].startswith("arms opposed")
 
 
+def followed(pair, words):
+    """Pairs in which what an advice says is done, each value alone."""
+    for names, x in re.findall(r"all (K\w(?: and K\w)?) times ([\d.e-]+)", words):
+        changes = [
+            {k: tuple(float(x) * y for y in getattr(law, k)) for k in names.split(" and ")}
+            for law in pair.laws
+        ]
+        laws = [replace(law, **c) for law, c in zip(pair.laws, changes, strict=True)]
+        yield replace(pair, law=laws[0], follower_law=laws[1])
+    for x in re.findall(r"a link of ([\d.e-]+) ms", words):
+        yield replace(pair, link=hc.Link(pair.link.kind, 1e-3 * float(x)))
+    for x in re.findall(r"a control rate of ([\d.e+]+) Hz", words):
+        yield replace(pair, Ts=1.0 / float(x))
+    for x in re.findall(r"to ([\d.e-]+)% of it|to (none)", words):
+        share = 0.0 if x[1] else 0.01 * float(x[0])
+        friction = [(0.0, 1.0, share * slope) for slope in pair.law.slopes]
+        yield replace(pair, law=replace(pair.law, friction=friction), follower_law=None)
+
+
+RUB = [(0.0, 1.0, 0.5)]
+BARE, RUBS = hc.Device(1.0, 0.0), hc.Device(1.0, 0.05)
+UNSTABLE = {  # and the number of changes that are offered
+    "late": (hc.Pair(RUBS, RUBS, hc.JointPD((900.0,), (60.0,)), hc.Link(delay=0.07)), 2),
+    "friction": (
+        hc.Pair(RUBS, RUBS, hc.JointPD((900.0,), (60.0,), friction=RUB), hc.Link("waves", 1e-3)),
+        1,
+    ),
+    "nothing resists": (
+        hc.Pair(BARE, BARE, hc.JointPD((900.0,), (60.0,), friction=RUB), hc.Link("waves", 1e-3)),
+        1,
+    ),
+    "too much damping": (
+        hc.Pair(RUBS, RUBS, hc.JointPD((900.0,), (6000.0,)), hc.Link(delay=5e-3)),
+        1,
+    ),
+    "too little": (hc.Pair(RUBS, RUBS, hc.JointPD((900.0,), (0.0,)), hc.Link(delay=5e-3)), 1),
+    "forces": (
+        hc.Pair(
+            RUBS, RUBS, hc.JointPD((400.0,), (20.0,)),
+            hc.Link("position-force", 5e-3, scale=(1.0, 4.0)),
+            follower_clay=hc.Contact(500.0, 1.0, 0.2),
+        ),
+        1,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", UNSTABLE)
+def test_advice_that_is_followed_makes_the_pair_stable(name):
+    pair, changes = UNSTABLE[name]
+    found = hc.theory.pair_limits(pair)
+    assert not found.stable
+    done = list(followed(pair, found.advice()))
+    assert len(done) == changes
+    assert all(Build(x).loop().radius() < 1.0 + 1e-10 for x in done)
+
+
+def test_the_factor_of_the_gains_stands_before_the_link():
+    words = hc.theory.pair_limits(UNSTABLE["late"][0]).advice()
+    assert re.match(r"all Kp times 0\.\d+ or less, or a link of \d+ ms at most each way$", words)
+
+
 def test_hands_of_a_box():
     pair = replace(one(Ts=4e-3), link=hc.Link(delay=0.16))
     hands = hc.theory.Box((0.2, 4.0), (0.5, 10.0), (20.0, 20.0))
@@ -758,6 +846,7 @@ def test_no_pair_is_without_an_answer(start):
         numbers = [found.radius, found.delay, found.frequency, found.gain, found.friction_fraction]
         assert not np.isnan([*numbers, *found.slope]).any()
         assert found.text() and found.tables()
+        assert not re.search(r"\b(nan|inf)\b", f"{found.headline()} {found.advice()}")
 
 
 @pytest.mark.parametrize("kind", KINDS[:3])
