@@ -216,6 +216,7 @@ def page(rows: list[dict[str, Any]], missing: int) -> str:
     """The Markdown page."""
     answered = [r for r in rows if "joints" in r]
     named = [r for r in answered if r["result"] != "answered"]
+    xacro = [r for r in rows if "xacro" in r.get("why", "")]
     exact = [r for r in answered if "inertia" in r]
     held = [r for r in answered if r.get("radii")]
     text = [
@@ -227,7 +228,8 @@ def page(rows: list[dict[str, Any]], missing: int) -> str:
         f"{len(rows)} files of {len({r['repository'] for r in rows})} repositories: "
         f"{len(answered)} are answered ({100.0 * len(answered) / len(rows):.0f} %), {len(named)} "
         "of them once the handle is named, since they hold several arms or tools. The others are "
-        "refused in the line that the table shows.",
+        f"refused in the line that the table shows; {len(xacro)} of them are xacro, a program that "
+        f"makes a URDF ({100.0 * len(answered) / max(1, len(rows) - len(xacro)):.0f} % without).",
         f"Of {len(exact)} there is another M(q), MuJoCo's own of the file as it is, or where "
         "MuJoCo does not load the file, Pinocchio's: "
         f"{sum(r['inertia'] < ROUNDING for r in exact)} agree within {ROUNDING:g} of the largest "

@@ -122,7 +122,10 @@ def urdf_inertia(file: Path, arm: Any) -> np.ndarray | None:
         import pinocchio as pin  # type: ignore[import-not-found]
     except ImportError:
         return None
-    model = pin.buildModelFromXML(text)
+    try:
+        model = pin.buildModelFromXML(text)
+    except ValueError:  # a link that is not declared
+        return None
     data, q = model.createData(), pin.neutral(model)
     for name, value in arm.pose.items():
         if model.existJointName(name):

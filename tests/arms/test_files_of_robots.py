@@ -107,6 +107,15 @@ def test_a_link_whose_inertia_is_in_a_missing_mesh_is_named(saved):
     np.testing.assert_allclose(arm.mass_matrix(), M_OF_TWO, rtol=1e-14)
 
 
+def test_links_without_mass_behind_an_arm_leave_no_log(saved, capfd, tmp_path, monkeypatch):
+    """Eyes and fingers of humanoids: MuJoCo warns of their inertia, in a file where one stands."""
+    monkeypatch.chdir(tmp_path)
+    eyes = link("pan", None), joint("j3", "lb", "pan"), link("eye", None), joint("j4", "pan", "eye")
+    arm = hc.MjcfArm(saved(robot(*TWO, *eyes)), site="lb")
+    np.testing.assert_allclose(arm.linear().inertia, M_OF_TWO, rtol=1e-11)  # 2e-15 kg each
+    assert not os.path.exists("MUJOCO_LOG.TXT") and not "".join(capfd.readouterr())
+
+
 @pytest.mark.parametrize("kind", ["fixed", "prismatic"])
 def test_a_tool_whose_mesh_is_not_there_is_counted_as_none(saved, kind):
     """Texts of robots come without meshes; fingers and mounts often have no inertia in them."""
