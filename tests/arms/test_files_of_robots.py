@@ -347,6 +347,19 @@ def test_what_is_no_model_is_refused_in_one_line(saved, name):
     assert name in str(error.value) or error.value.field == "joints"
 
 
+@pytest.mark.parametrize("folder", [".", "parts"])
+def test_the_model_of_a_part_is_named(saved, folder):
+    body = f'<body><joint name="j1"/>{STATED}</body>'
+    part = saved(f"<mujocoinclude>{body}</mujocoinclude>", "arm (1).xml", folder)
+    saved(f'<mujoco><half><include file="{part.name}"/>', "broken.xml")
+    saved("<mujoco><worldbody/></mujoco>", "other.xml")
+    include = f'<include file="{folder}/arm (1).xml"/>'.replace("./", "")
+    whole = saved(f"<mujoco><worldbody>{include}</worldbody></mujoco>", "scene.xml")
+    with pytest.raises(hc.ParameterError, match=r"that includes it, such as .*scene\.xml"):
+        hc.MjcfArm(part)
+    assert hc.MjcfArm(whole).names == ("j1",)
+
+
 def test_a_long_path_is_shown_to_its_end(saved):
     file = saved("<sdf/>", "the_arm_of_mine.xml", "a_rather_long_folder/" * 6)
     with pytest.raises(hc.ParameterError, match=r"/the_arm_of_mine\.xml': is SDF"):
