@@ -351,7 +351,7 @@ def test_what_is_no_model_is_refused_in_one_line(saved, name):
 def test_the_model_of_a_part_is_named(saved, folder):
     body = f'<body><joint name="j1"/>{STATED}</body>'
     part = saved(f"<mujocoinclude>{body}</mujocoinclude>", "arm (1).xml", folder)
-    saved(f'<mujoco><half><include file="{part.name}"/>', "broken.xml")
+    saved(f'<half><include file="{part.name}"/>', "broken.xml")
     saved("<mujoco><worldbody/></mujoco>", "other.xml")
     include = f'<include file="{folder}/arm (1).xml"/>'.replace("./", "")
     whole = saved(f"<mujoco><worldbody>{include}</worldbody></mujoco>", "scene.xml")
