@@ -10,10 +10,10 @@ class Several(Exception):
     """A file has several limbs, none of which is the arm.
 
     Args:
-        tips: names of the bodies at their ends.
+        tips: bodies at their ends.
     """
 
-    def __init__(self, tips: list[str]):
+    def __init__(self, tips: list[int]):
         super().__init__(tips)
         self.tips = tips
 
@@ -114,7 +114,7 @@ def arm_limb(model: Any) -> Limb | None:
         first = max(limbs, key=lambda limb: limb.depth)
         rivals = [limb for limb in limbs if 2 * limb.depth > first.depth]
         if len(rivals) > 1:
-            raise Several([_name(model, tip) for limb in rivals for tip in _tips(limb)])
+            raise Several([tip for limb in rivals for tip in _tips(limb)])
         joints += first.joints
         if not first.branches or max(limb.depth for limb in first.branches) <= len(joints):
             return Limb(joints, first.tip, first.branches)
@@ -127,10 +127,6 @@ def _tips(limb: Limb) -> list[int]:
         return [limb.tip]
     deepest = max(x.depth for x in limb.branches)
     return [tip for x in limb.branches if 2 * x.depth > deepest for tip in _tips(x)]
-
-
-def _name(model: Any, body: int) -> str:
-    return model.body(body).name or f"body {body}"
 
 
 def _limbs(model: Any) -> list[Limb]:

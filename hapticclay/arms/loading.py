@@ -10,12 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..display import names_words
 from ..errors import ParameterError, is_series, number
 from . import actuators, content, handles, islands, limbs, model_file, passive, poses
 from .joint_ranges import outside_words
 from .mechanism import Mechanism
 from .servo_gains import ServoGains, servo_gains
 
+MOST_LOCKED = 400  # characters of their names; arm.pose has all
 LIGHTEST = 1e-12  # [kg.m^2] least eigenvalue of M of a mechanism with an inverse
 BOUNDS = {  # least and largest value, units at a hinge and at a slide
     "pose": (-1e3, 1e3, "rad", "m"),
@@ -61,6 +63,13 @@ def load(arm: Any) -> Loaded:
     Raises:
         ParameterError: the file cannot be loaded, or holds no arm of this kind.
     """
+    from ..physics import warnings_caught
+
+    with warnings_caught():  # of locked links without mass; those of the file are notes
+        return _loaded(arm)
+
+
+def _loaded(arm: Any) -> Loaded:
     file = model_file.opened(arm.file)
     grip = handles.handle(file.model, arm.site, _named_joints(file.model, arm.joints))
     joints = _arm_joints(file.model, arm.joints, grip.chain)
@@ -190,6 +199,8 @@ def _arm_joints(model: Any, wanted: Any, chain: Sequence[int]) -> list[int]:
     chosen = _named_joints(model, wanted)
     if chosen is None:
         chosen = islands.driven(model, chain)
+    if not model.njnt:
+        raise ParameterError("joints", None, "must be some that move: the file has none")
     if not chosen:
         raise ParameterError("joints", None, "must be named: no joint moves the handle")
     islands.check_kinds(model, chosen)
@@ -368,7 +379,7 @@ def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int], wanted
     used = {*mechanism.dofs, *mechanism.following}
     locked = [model.joint(j).name for j in range(model.njnt) if j not in used]
     if locked:
-        notes.append(f"locked: {', '.join(locked)}")
+        notes.append(f"locked: {names_words(locked, MOST_LOCKED)}")
     if mechanism.following:
         tied = [model.joint(j).name for j in mechanism.following]
         notes.append(f"constraints, taken as rigid, move {', '.join(tied)}")

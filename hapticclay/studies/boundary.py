@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import matrices
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError, number
+from ..errors import Bound, ParameterError, Real, number
 from ..formulas.constants import B_MAX
 from ..model.arm import Arm
 from ..model.cells import Profile
@@ -59,11 +59,11 @@ class PushedLoop(Loop):
         arm: the two-link arm.
     """
 
-    b: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 90.0
-    K: Annotated[float, Bound(0.0, 1e6, "1/kg", above=True)] = 1.0
+    b: Annotated[Real, Bound(0.0, B_MAX, "N.s/m")] = 90.0
+    K: Annotated[Real, Bound(0.0, 1e6, "1/kg", above=True)] = 1.0
     inertia_shaping: bool = True
     pose: Position = (0.0, 0.0)
-    push: Annotated[float, Bound(-10.0, 10.0, "m/s")] = SMALL_PUSH
+    push: Annotated[Real, Bound(-10.0, 10.0, "m/s")] = SMALL_PUSH
     torque_limit: TorqueLimit = TORQUE_LIMIT
     arm: Arm = Arm()
 

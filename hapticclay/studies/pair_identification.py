@@ -16,7 +16,7 @@ import numpy as np
 from .. import matrices
 from ..arguments import checked, named
 from ..display import fields_of, table_of
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..results import Result
 from .block_fit import BlockFit, Unknown, block_fit
 from .coulomb_axis import Axis, follow
@@ -149,7 +149,7 @@ class IdentifiedPair(Result):
 def identify_pair(
     log: PairLog,
     *,
-    band: Annotated[float, Bound(0.1, 1e5, "Hz")] = BAND,
+    band: Annotated[Real, Bound(0.1, 1e5, "Hz")] = BAND,
     level: Annotated[float, Bound(0.5, 0.999)] = 0.95,
 ) -> IdentifiedPair:
     """Finds gains, delays, friction and inertia of a pair from its log, each with an interval.

@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import matrices
 from ..arguments import checked
-from ..errors import Bound, ParameterError, numbers_of
+from ..errors import Bound, ParameterError, Real, numbers_of
 from ..fields import Axis
 from .even_columns import held_rows
 from .identification import (
@@ -52,7 +52,7 @@ USUAL, FAR_BEYOND = 0.99, 2.0  # quantile of a column, and times that an impossi
 NEIGHBOURS = 20  # lines to each side over which noise is averaged, at most
 WEIGHT_ROUNDS = 4  # of fit and noise; the weights settle in two
 
-Delay = Annotated[float, Bound(-1.0, 1.0, "s")]
+Delay = Annotated[Real, Bound(-1.0, 1.0, "s")]
 HELD = "the input changes only every {} rows, as a computer holds it: state it by held (--held)"
 Timing = tuple[bool, float]  # whether the input is held, and the delay of the position [s]
 # frequency [Hz], response, its deviation, coherence

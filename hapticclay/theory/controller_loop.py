@@ -16,7 +16,7 @@ import numpy as np
 
 from .. import matrices
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError, array_of, integer, number
+from ..errors import Bound, ParameterError, Real, array_of, integer, number
 from ..formulas.constants import B_MAX
 from ..model import support
 from ..model.controller import matrix_exponential
@@ -166,7 +166,7 @@ def controller_stability(
     scenario: Scenario,
     *,
     gain: int | None = None,
-    b: Annotated[float | None, Bound(0.0, B_MAX, "N.s/m")] = None,
+    b: Annotated[Real | None, Bound(0.0, B_MAX, "N.s/m")] = None,
     matrices: LinearLaw | None = None,
     size: Annotated[float, Bound(1e-9, 1.0)] = 1e-2,
 ) -> ControllerStability:

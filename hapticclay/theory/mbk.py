@@ -19,7 +19,7 @@ import numpy as np
 from .. import matrices
 from ..arguments import checked, named
 from ..display import brief
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..model.compensator import Compensator
 from ..scene.virtual_wall import VirtualWall
 from . import gain_limits, hand_boxes
@@ -175,7 +175,7 @@ def renderable(
 @checked
 def least_mass(
     loop: Loop,
-    decay: Annotated[float, Bound(0.0, 1e6, "1/s")],
+    decay: Annotated[Real, Bound(0.0, 1e6, "1/s")],
     box: Box | None = None,
     samples: int = 24,
 ) -> tuple[float, float]:
