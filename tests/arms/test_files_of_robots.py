@@ -112,6 +112,15 @@ def test_a_link_whose_inertia_is_in_a_missing_mesh_is_named(saved):
     np.testing.assert_allclose(arm.mass_matrix(), M_OF_TWO, rtol=1e-14)
 
 
+def test_links_without_mass_behind_an_arm_leave_no_log(saved, capfd, tmp_path, monkeypatch):
+    """Eyes and fingers of humanoids: MuJoCo warns of their inertia, in a file where one stands."""
+    monkeypatch.chdir(tmp_path)
+    eyes = link("pan", None), joint("j3", "lb", "pan"), link("eye", None), joint("j4", "pan", "eye")
+    arm = hc.MjcfArm(saved(robot(*TWO, *eyes)), site="lb")
+    np.testing.assert_allclose(arm.linear().inertia, M_OF_TWO, rtol=1e-11)  # 2e-15 kg each
+    assert not os.path.exists("MUJOCO_LOG.TXT") and not "".join(capfd.readouterr())
+
+
 @pytest.mark.parametrize("kind", ["fixed", "prismatic"])
 def test_a_tool_whose_mesh_is_not_there_is_counted_as_none(saved, kind):
     """Texts of robots come without meshes; fingers and mounts often have no inertia in them."""
@@ -345,6 +354,19 @@ def test_what_is_no_model_is_refused_in_one_line(saved, name):
         hc.MjcfArm(saved(text, name))
     assert "\n" not in str(error.value)
     assert name in str(error.value) or error.value.field == "joints"
+
+
+@pytest.mark.parametrize("folder", [".", "parts"])
+def test_the_model_of_a_part_is_named(saved, folder):
+    body = f'<body><joint name="j1"/>{STATED}</body>'
+    part = saved(f"<mujocoinclude>{body}</mujocoinclude>", "arm (1).xml", folder)
+    saved(f'<half><include file="{part.name}"/>', "broken.xml")
+    saved("<mujoco><worldbody/></mujoco>", "other.xml")
+    include = f'<include file="{folder}/arm (1).xml"/>'.replace("./", "")
+    whole = saved(f"<mujoco><worldbody>{include}</worldbody></mujoco>", "scene.xml")
+    with pytest.raises(hc.ParameterError, match=r"that includes it, such as .*scene\.xml"):
+        hc.MjcfArm(part)
+    assert hc.MjcfArm(whole).names == ("j1",)
 
 
 def test_a_long_path_is_shown_to_its_end(saved):
