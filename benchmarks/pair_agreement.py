@@ -26,7 +26,7 @@ import numpy as np
 from tqdm import tqdm
 
 import hapticclay as hc
-from hapticclay.arms import loading
+from hapticclay.arms import model_file
 from hapticclay.scene.link import KINDS
 from hapticclay.theory.pair_build import Build
 
@@ -71,7 +71,7 @@ def arm(joints: int, rng: np.random.Generator) -> hc.MjcfArm | hc.Device:
     """An arm without friction, which theory leaves out, and weight, under which hands fall."""
     if joints == 1:
         return hc.Device(float(10.0 ** rng.uniform(-1.0, 1.0)), float(rng.uniform(0.0, 1.0)))
-    spec = loading.spec_of("planar_2r" if joints == 2 else "haptic_3")[0]
+    spec = model_file.spec_of("planar_2r" if joints == 2 else "haptic_3")[0]
     spec.option.gravity = [0.0, 0.0, 0.0]
     return hc.MjcfArm(spec, site="handle", friction=[0.0] * joints)
 

@@ -1,7 +1,7 @@
-"""Makes the four pictures of the first page and of README.md, docs/home_*.png, all of one size;
+"""Makes the five pictures of the first page and of README.md, docs/home_*.png, all of one size;
 and those of the gallery that show clay, docs/thumbnails/*.png.
 
-python docs/home_pictures.py [cut wall map film thumbnails]
+python docs/home_pictures.py [arm pair cut wall film thumbnails]
 """
 
 import os
@@ -25,7 +25,55 @@ from hapticclay.views.stage import Stage
 DOCS = Path(__file__).parent
 CLAY = "dent groove layers marble rotated smooth sticking".split()  # of examples/clay
 THUMBNAIL = 800, 560  # [pixels]
+KP, KD = (240, 240, 240, 240, 24, 31, 25), (3, 3, 3, 3, 0.2, 0.2, 0.2)  # of leader_7
 SIZE, DPI = (4.4, 3.3), 160  # [inch], [1/inch]: letters stay legible at half of a page's width
+
+
+def arm(ax: Axes) -> None:
+    """The last joint of a leader that is let go 1 mrad off, below and above the gains it carries.
+
+    Args:
+        ax: where it is drawn.
+    """
+    leader = hc.MjcfArm("leader_7", friction=[0.0] * 7)
+    at, push = leader.q.tolist(), [0.0] * 6 + [1e-3]
+    for factor, color in ((1.5, "#d55e00"), (1.0, "#0072b2")):
+        law = hc.JointPD([factor * k for k in KP], KD, velocity="filter", cutoff=90.0)
+        law = replace(law, reference=[q - x for q, x in zip(at, push, strict=True)])
+        record = hc.simulate(
+            hc.Scenario(
+                arm=leader,
+                controller=law,
+                Ts=2e-3,
+                dt=5e-4,
+                t_max=0.8,
+                hardware=hc.Hardware(delay=2e-3),
+                stop_when_unstable=False,
+            )
+        )
+        q = 1e3 * (record.q[:, 6] - law.reference[6])
+        ax.plot(1e3 * record.t, q, color=color, label=f"all Kp times {factor:g}")
+    ax.set(xlabel="time [ms]", ylabel="angle of joint 7 [mrad]", xlim=(0.0, 800.0))
+    ax.legend(loc="upper left")
+
+
+def pair(ax: Axes) -> None:
+    """The delay that two such arms carry between them, over their gains.
+
+    Args:
+        ax: where it is drawn.
+    """
+    leader = hc.MjcfArm("leader_7")
+    both = hc.Pair(leader, leader, hc.JointPD(KP, KD, runs="drive"), hc.Link(), Ts=2e-3)
+    found = hc.theory.pair_map(both, gains=40, delays=2)
+    ax.fill_between(found.gains, 1e3 * found.limits, color="#56b4e9", alpha=0.22, lw=0)
+    ax.plot(found.gains, 1e3 * found.limits, label="largest delay, by theory")
+    ax.text(0.75, 5.0, "stable", ha="center")
+    ax.set(xscale="log", xlabel="factor of all Kp", ylabel="one-way delay [ms]")
+    ax.set(xlim=(0.25, 8.0), ylim=(0.0, 40.0))
+    ax.set_xticks([0.25, 0.5, 1, 2, 4, 8], ["1/4", "1/2", "1", "2", "4", "8"])
+    ax.minorticks_off()
+    ax.legend(loc="upper right")
 
 
 def cut(ax: Axes) -> None:
@@ -67,26 +115,6 @@ def wall(ax: Axes) -> None:
     ax.legend(loc="lower right")
 
 
-def region(ax: Axes) -> None:
-    """The Z-width of a device, by theory and by runs.
-
-    Args:
-        ax: where it is drawn.
-    """
-    wall = hc.VirtualWall(device=hc.Device(mass=0.1, damper=0.5), Ts=1e-3)
-    B = (0.0, 5.0, 15.0, 30.0, 60.0, 90.0, 120.0, 150.0, 180.0)
-    (found,) = hc.walls.zwidth(wall, B=B).regions
-    exact = next(x for x in found.limits if x.name.startswith("exact"))
-    K = 1e-3 * np.asarray(exact.K)
-    ax.fill_between(exact.B, K, color="#56b4e9", alpha=0.22, lw=0)
-    ax.plot(exact.B, K, label="exact limit")
-    ax.plot(found.B, 1e-3 * np.asarray(found.K), "ko", label="limit by runs", clip_on=False)
-    ax.text(85.0, 22.0, "stable walls", ha="center")
-    ax.set(xlabel="virtual damping [N·s/m]", ylabel="virtual stiffness [kN/m]")
-    ax.set(xlim=(0.0, 180.0), ylim=(0.0, 90.0), xticks=(0, 60, 120, 180))
-    ax.legend(loc="upper left")
-
-
 def frame() -> np.ndarray:
     """The last frame of a film of the variable cut, without plots."""
     record = hc.simulate(hc.variable_cut())
@@ -112,7 +140,12 @@ def scene(record: hc.Record) -> np.ndarray:
     return image
 
 
-DRAWN: dict[str, Callable[[Axes], None]] = {"cut": cut, "wall": wall, "map": region}
+DRAWN: dict[str, Callable[[Axes], None]] = {
+    "arm": arm,
+    "pair": pair,
+    "cut": cut,
+    "wall": wall,
+}
 
 
 def main(names: list[str]) -> None:

@@ -22,11 +22,13 @@ from typing import (
 
 from .errors import Bound, ParameterError, nearest
 from .fields import Node, check_fields, field_descriptions, node_of
+from .threads import one_thread
 
 P = ParamSpec("P")
 T = TypeVar("T")
 R = TypeVar("R")
 F = TypeVar("F", bound=Callable[..., Any])
+QUESTIONS = ("hapticclay.theory.", "hapticclay.studies.")  # modules whose matrices are small
 
 
 class UnknownArgument(ParameterError, TypeError):
@@ -120,9 +122,11 @@ def checked(made: F) -> F:
 
     Enforced are bounds, `Annotated[float, Bound(...)]`, words, `Literal[...]`, flags, classes of
     this package, functions, iterables, dictionaries and paths; what is given arrives as its type,
-    "5 cm" as 0.05. A number or an array without a bound is left to the function.
+    "5 cm" as 0.05. A number or an array without a bound is left to the function. A function of
+    theory or studies runs on one thread of BLAS.
     """
     inner: Any = made.__init__ if isinstance(made, type) else made
+    run = _question(inner)
     parameters = list(_parameters(inner).values())
     kinds_of = [p.kind for p in parameters]
     many = inspect.Parameter.VAR_POSITIONAL  # as *changes, to which all further values belong
@@ -137,12 +141,17 @@ def checked(made: F) -> F:
         for name in given:
             if name in nodes:
                 given[name] = nodes[name].check(name, given[name])
-        return inner(*taken, *args[len(taken) :], **given)
+        return run(*taken, *args[len(taken) :], **given)
 
     if isinstance(made, type):
         made.__init__ = entry
         return named(made)  # type: ignore[return-value]
     return named(entry)  # type: ignore[arg-type]
+
+
+def _question(made: F) -> F:
+    """A function, on one thread of BLAS where it is one of theory or studies."""
+    return one_thread(made) if made.__module__.startswith(QUESTIONS) else made  # type: ignore
 
 
 def _parameters(made: Any) -> Mapping[str, inspect.Parameter]:
@@ -163,10 +172,11 @@ def function_of(
     """Makes a function with the fields of a dataclass as arguments, and its description."""
     assert isinstance(kind, type)
     signature, descriptions = inspect.signature(kind), field_descriptions(kind)
+    run = _question(answer)
 
     def make(*args: P.args, **given: P.kwargs) -> R:
         known_names(name, given, signature.parameters)
-        return answer(kind(*args, **given))
+        return run(kind(*args, **given))
 
     made: Any = make
     made.__name__ = made.__qualname__ = name

@@ -28,6 +28,18 @@ def one_line(text: object, most: int = 60) -> str:
     return line if len(line) <= most else f"{line[: most - 3]}..."
 
 
+def names_words(names: Sequence[str], most: int = 200) -> str:
+    """Names with commas, whole ones up to a number of characters, and how many more there are."""
+    shown, length = 0, 0
+    for name in names:
+        length += len(name) + 2
+        if shown and length > most:
+            break
+        shown += 1
+    more = f" and {len(names) - shown} more" * (shown < len(names))
+    return f"{', '.join(names[:shown])}{more}"
+
+
 def printable(text: object) -> str:
     """A text without terminal control characters, except line ends."""
     return "".join(x if x.isprintable() or x == "\n" else " " for x in str(text))

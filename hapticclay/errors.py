@@ -7,12 +7,13 @@ import difflib
 import itertools
 import math
 import numbers
+import os
 import reprlib
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from .display import one_line
+from .display import names_words, one_line
 from .units import from_unit, is_quantity
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 
 MOST_OF_VALUE, MOST_OF_NAME, MOST_OF_BOUND = 60, 120, 600  # characters in a message
+MOST_OF_PATH, MOST_OF_FILE = 4096, 255  # of a path, and the name of a file: none are longer
 MOST_COMPARED = 100  # characters of a word that is compared with known names
 SYNONYMS = {
     **dict.fromkeys(("max_time", "end_time", "t_end", "duration", "sim_time"), "t_max"),
@@ -110,7 +112,32 @@ _bounded = _Bounded()
 
 
 def _short(value: object) -> str:
+    if isinstance(value, str | os.PathLike) and (end := _end_of_path(os.fspath(value))):
+        return end
+    if isinstance(value, list | tuple) and all(type(x) is str for x in value[: MOST_OF_VALUE // 2]):
+        return _names(value)
     return one_line(_bounded.repr(value), MOST_OF_VALUE)
+
+
+def _end_of_path(path: str | bytes) -> str:
+    """The end of a long path, with the whole name of its file; "" of all other texts."""
+    if isinstance(path, bytes) or not MOST_OF_VALUE < len(path) < MOST_OF_PATH:
+        return ""
+    *folders, name = path.split("/")
+    if not folders or len(name) > MOST_OF_FILE or not path.isprintable() or "<" in path:
+        return ""
+    for folder in reversed(folders):
+        if len(folder) + 1 + len(name) > MOST_OF_VALUE:
+            break
+        name = f"{folder}/{name}"
+    return repr(f"...{name}")
+
+
+def _names(names: list[str] | tuple[str, ...]) -> str:
+    """Names, none of them cut."""
+    if len(_bounded.repr(names)) <= MOST_OF_NAME or len(names) < 2:
+        return one_line(_bounded.repr(names), MOST_OF_NAME)
+    return f"[{names_words([repr(x) for x in names], MOST_OF_NAME)}]"
 
 
 def _middle_cut(text: str) -> str:
@@ -126,7 +153,8 @@ def nearest(word: str, names: Collection[str]) -> list[str]:
     same = SYNONYMS.get(word)
     if same is not None and same in names:
         return [same]
-    return difflib.get_close_matches(word[:MOST_COMPARED], names, n=1)
+    alike = [name for name in names if name.lower() == word.lower()]
+    return alike[:1] or difflib.get_close_matches(word[:MOST_COMPARED], names, n=1)
 
 
 def quantity(field: str, text: str, unit: str = "") -> float | None:
@@ -280,9 +308,17 @@ def choice(field: str, value: object, valid: Sequence[str], wants: str = "") -> 
     raise ParameterError(field, value, f"must be {wants}{hint}")
 
 
+if TYPE_CHECKING:  # a caller may write 0.002 or "2 ms", which is checked when it arrives
+    Real: TypeAlias = float | Any
+else:
+    Real = float  # what arrives
+
+
 @dataclass(frozen=True)
 class Bound:
     """Bounds and unit of a number, or of each number in a tuple: `Annotated[float, Bound(...)]`.
+
+    With a unit it is `Annotated[Real, Bound(...)]`, which type checkers let be a text.
 
     Attributes:
         low: smallest value, or the name of the field that holds it.

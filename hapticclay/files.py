@@ -218,10 +218,14 @@ class atomic:
             self.target.parent.mkdir(parents=True, exist_ok=True)
             name = f".{self.target.name}.{os.urandom(4).hex()}"
             self.temporary = self.target.parent / name
-            self.file = self.temporary.open("xb")
+            try:
+                self.file = self.temporary.open("xb")
+                return self.file
+            except BaseException:  # Ctrl-C too
+                self.temporary.unlink(missing_ok=True)
+                raise
         except OSError as error:
             raise self._refusal(error) from None
-        return self.file
 
     def __exit__(self, kind, error, trace):
         try:
@@ -230,13 +234,13 @@ class atomic:
                     self.file.flush()
                     os.fsync(self.file.fileno())
             if kind is None:
-                return os.replace(self.temporary, self.target)
+                os.replace(self.temporary, self.target)
         except OSError as late:
             error = error or late
-        self.temporary.unlink(missing_ok=True)
+        finally:
+            self.temporary.unlink(missing_ok=True)
         if isinstance(error, OSError):
             raise self._refusal(error) from None
-        return None
 
     def _refusal(self, error: OSError) -> ParameterError:
         return ParameterError(

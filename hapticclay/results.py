@@ -55,6 +55,7 @@ class Result:
             the class in lower case.
         summary_units: units of the numbers in `summary` that are in no table.
         printed: tables that `text` shows, with their columns, () for all; by default the first.
+            A column is meant whatever its unit.
         formats: formats of numbers by column, as ".3g", or "+.2f %" for a share; by default four
             significant digits.
     """
@@ -115,7 +116,7 @@ class Result:
         parts = []
         for name, columns in shown.items():
             table = tables[name]
-            kept = {x: table[x] for x in columns if x in table} if columns else table
+            kept = _columns(table, columns) if columns else table
             shape = f"{name}:\n\n{{}}\n" if len(shown) > 1 else "{}"
             parts.append(shape.format(text_table(kept, self.formats, form)))
         return "\n".join([*parts, *self.remarks()])
@@ -199,6 +200,13 @@ class Result:
             bound = f"must hold a {cls.__name__}, has a {type(found).__name__}"
             raise ParameterError("path", str(path), bound)
         return found
+
+
+def _columns(table: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
+    """Columns of a table by their heads, or by these without the unit."""
+    heads = {head.partition(" [")[0]: head for head in table} | {head: head for head in table}
+    found = [heads.get(name) or heads.get(name.partition(" [")[0]) for name in names]
+    return {head: table[head] for head in found if head}
 
 
 def figure_of(found: Any, drawn_by: str = "", tables: Tables | None = None) -> Any:

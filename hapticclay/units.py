@@ -129,6 +129,12 @@ def is_quantity(value: object) -> bool:
     return isinstance(value, str) and QUANTITY.fullmatch(value) is not None
 
 
+def parts_of(text: str) -> tuple[Decimal, str] | None:
+    """The number and the unit of a text like "5 cm"; None for other texts."""
+    match = QUANTITY.fullmatch(text)
+    return match and (Decimal(match[1]), match[2].strip())
+
+
 def from_unit(text: str, unit: str) -> float | None:
     """The number of a text like "5 cm", in the unit of a field; None for other texts."""
     found = QUANTITY.fullmatch(text)

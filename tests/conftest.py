@@ -19,7 +19,8 @@ import pytest
 from hypothesis import Phase, settings
 
 os.environ.setdefault("MPLBACKEND", "agg")
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: workers share the cores
+# before NumPy: workers share the cores, and oracles, which are no questions, have small matrices
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # what is compiled is kept, as on a user's machine: a hundred child processes import the package,
 # and each worker the tests
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)

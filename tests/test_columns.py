@@ -131,9 +131,31 @@ BAD = {
 }
 
 
+MISSING = ("NaN", "NaN at first", "infinite", "a missing cell")
+
+
+@pytest.mark.parametrize("kind", MISSING)
+def test_a_measurement_takes_missing_cells_as_missing_rows(kind, tmp_path):
+    """It is that of the file without the row, in which the note counts it."""
+    (tmp_path / "log.csv").write_bytes(BAD[kind][0])
+    lines = BAD[kind][0].decode().split("\n")
+    row = next(i for i, x in enumerate(lines[1:], 1) if x != table(NUMBERS, HEAD).split("\n")[i])
+    (tmp_path / "without.csv").write_text("\n".join(lines[:row] + lines[row + 1 :]))
+    names = {"t": "t", "input": "x", "output": "y"}
+    with_hole, without = (
+        hc.studies.Measurement.load(tmp_path / x, names) for x in ("log.csv", "without.csv")
+    )
+    for key in names:
+        np.testing.assert_array_equal(getattr(with_hole, key), getattr(without, key))
+    if kind != "NaN at first":  # where the row has no time either
+        assert "1 of 120 rows lack a value of x" in with_hole.notes[0]
+
+
 @pytest.mark.parametrize("reader", READERS)
 @pytest.mark.parametrize("kind", BAD)
 def test_files_that_cannot_be_read_are_refused_in_a_short_line(reader, kind, tmp_path):
+    if reader == "measured" and kind in (*MISSING, "a name twice"):
+        return  # which it reads, and says so
     path = tmp_path / "log.csv"
     data, told = BAD[kind]
     path.write_bytes(data)

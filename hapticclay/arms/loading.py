@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import copy
 import math
-import os
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
+from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..display import one_line
-from ..errors import ParameterError, choice, is_series, nearest, number
+from ..display import names_words
+from ..errors import ParameterError, is_series, number
+from . import actuators, content, handles, islands, limbs, model_file, passive, poses
+from .joint_ranges import outside_words
 from .mechanism import Mechanism
+from .servo_gains import ServoGains, servo_gains
 
+MOST_LOCKED = 400  # characters of their names; arm.pose has all
 LIGHTEST = 1e-12  # [kg.m^2] least eigenvalue of M of a mechanism with an inverse
 BOUNDS = {  # least and largest value, units at a hinge and at a slide
     "pose": (-1e3, 1e3, "rad", "m"),
@@ -23,7 +27,6 @@ BOUNDS = {  # least and largest value, units at a hinge and at a slide
     "torque_limit": (0.0, 1e6, "N.m", "N"),
 }
 OPEN = 1e-3  # [rad or m] by which a pose may miss a closed chain
-UNNAMED = "MuJoCo Model"  # MuJoCo's name of a model without one
 SLIDE = 2  # MuJoCo's number of a joint that slides
 IN_MODEL = {  # fields of the model with a value per degree of freedom
     "armature": "dof_armature",
@@ -41,6 +44,8 @@ class Loaded(NamedTuple):
         fields: fields of the arm, as resolved.
         ranges: range of each joint [rad or m], shape (n, 2).
         notes: what the file leaves open.
+        handles: sites and bodies that may be the handle, where there is none.
+        servo: gains of the file's actuators.
     """
 
     name: str
@@ -48,6 +53,8 @@ class Loaded(NamedTuple):
     fields: dict[str, Any]
     ranges: np.ndarray
     notes: tuple[str, ...]
+    handles: tuple[str, ...]
+    servo: ServoGains
 
 
 def load(arm: Any) -> Loaded:
@@ -56,208 +63,141 @@ def load(arm: Any) -> Loaded:
     Raises:
         ParameterError: the file cannot be loaded, or holds no arm of this kind.
     """
-    model, name = compiled(arm.file)
-    _refuse_joints(model)
-    _refuse_tendons(model)
-    site = _handle(model, arm.site)
-    joints = _arm_joints(model, arm.joints, site)
-    pose = _pose(model, arm.pose, joints)
+    file = model_file.opened(arm.file)
+    grip = handles.handle(file.model, arm.site, _named_joints(file.model, arm.joints))
+    joints = _arm_joints(file.model, arm.joints, grip.chain)
+    without = _without_mass(file, joints)
+    wanted, position = poses.placed(file.model, poses.wanted(arm.pose, joints))
+    floating = poses.floating(file.model, position, joints)
+    model, numbers, locked = islands.hold(file.spec, file.model, position, grip.site)
+    file.finish(model)
+    whole = copy.copy(file.model)  # as the file's own simulation has it
+    joints, site = [numbers[j] for j in joints], grip.site
+    outside = [*locked, *islands.release(model, joints), *content.off(model)]
+    passive.settle(model)
+    content.refuse(model)
+    pose = _pose(model, wanted, joints)
     names = tuple(model.joint(j).name for j in joints)
     dofs = [int(model.jnt_dofadr[j]) for j in joints]
     fields: dict[str, Any] = {
-        "file": _kept(arm.file),
+        "file": model_file.kept(arm.file),
         "joints": names,
-        "site": None if site is None else _name(model, site),
+        "site": None if site is None else handles.name(model, site),
     }
+    mechanism = Mechanism(model, dofs, site, pose)
+    _check_joints(mechanism, names)
+    passive.carry_friction(model, dofs, mechanism.following, mechanism.follow())
     for field, of in IN_MODEL.items():
         values = getattr(model, of)
         values[dofs] = _per_joint(model, field, getattr(arm, field), joints, values[dofs])
         _refuse_negative(field, values, model)
         fields[field] = tuple(values[dofs].tolist())
-    limits = _file_limits(model, joints)
+    limits = actuators.torque_limits(model, joints)
     given = _per_joint(model, "torque_limit", arm.torque_limit, joints, limits)
     _refuse_no_torque(names, given)
     fields["torque_limit"] = tuple(given)
-    mechanism = Mechanism(model, dofs, site, pose)
-    _check_mechanism(mechanism, names)
-    fields["pose"] = {model.joint(j).name: float(q) for j, q in enumerate(mechanism.pose)}
+    _check_inertia(mechanism, names)
+    at = {model.joint(j).name: float(q) for j, q in enumerate(mechanism.pose)}
+    fields["pose"] = at | floating
+    own = _notes(model, arm, mechanism, joints, wanted)
     return Loaded(
-        name,
+        file.name,
         mechanism,
         fields,
         _ranges(model, joints),
-        (*_notes(model, arm, mechanism, joints), *_moved(model, arm, mechanism, pose)),
+        (
+            *_guessed(file, without),
+            *own,
+            *grip.notes,
+            *outside,
+            *_moved(model, wanted, mechanism, pose),
+            *file.notes,
+        ),
+        grip.names,
+        _servo(whole, position, numbers, mechanism, names),
     )
 
 
-# ---- the file ------------------------------------------------------------------------------------
+def _servo(
+    whole: Any,
+    start: np.ndarray,
+    numbers: dict[int, int],
+    mechanism: Mechanism,
+    names: Sequence[str],
+) -> ServoGains:
+    """Gains of the file's actuators at the arm's pose, from the model of the whole file."""
+    position, follow = np.array(start), np.zeros((whole.nv, len(names)))
+    moves = mechanism.follow()
+    for before, now in numbers.items():
+        position[whole.jnt_qposadr[before]] = mechanism.pose[now]
+        follow[whole.jnt_dofadr[before]] = moves[now]
+    return servo_gains(whole, position, follow, names)
 
 
-def compiled(file: Any) -> tuple[Any, str]:
-    """The model of a file or spec, and its name."""
-    from ..physics import warnings_caught
-
-    with warnings_caught() as caught:
-        try:
-            spec, name = spec_of(file)
-            model = spec.compile()
-        except ValueError as error:
-            if isinstance(error, ParameterError):
-                raise
-            raise _bad_file(file, one_line(error, 200)) from None
-    if caught:
-        raise _bad_file(file, one_line(caught[0], 200))
-    for array in ("body_mass", "body_inertia", "dof_armature", "dof_damping", "jnt_axis"):
-        if not np.isfinite(getattr(model, array)).all():
-            raise _bad_file(file, f"{array} is not finite")
-    return model, name
+def _guessed(file: model_file.Opened, without: Sequence[str]) -> Iterator[str]:
+    """Sentences about mass that the file does not state."""
+    if links := [x for x in file.guessed if x not in without]:
+        names = ", ".join(links)
+        yield f"no inertia in the file, computed from geometry at 1000 kg/m^3: {names}"
+    if without:
+        names = ", ".join(without)
+        yield f"no inertia in the file, nor the mesh that gives it, counted as none: {names}"
 
 
-def spec_of(file: Any) -> tuple[Any, str]:
-    """The spec of a file, or a copy of a spec, and the name of its model."""
-    from ..physics import mujoco
+def _without_mass(file: model_file.Opened, joints: Sequence[int]) -> list[str]:
+    """What an arm carries whose inertia is in a mesh that is not there.
 
-    path = None if isinstance(file, mujoco.MjSpec) else _path(file)
-    if path is None:
-        spec = file.copy()
-        return spec, spec.modelname
-    spec = mujoco.MjSpec.from_file(str(path))
-    spec.compiler.fusestatic = False  # a URDF's tool keeps its name
-    return spec, spec.modelname if spec.modelname != UNNAMED else path.stem
-
-
-def _kept(file: Any) -> Any:
-    """A path as text, which files can hold; of a spec, which its owner may change, a copy."""
-    if isinstance(file, os.PathLike):
-        return os.fspath(file)
-    return file if isinstance(file, str) else file.copy()
-
-
-def _path(file: Any) -> Path:
-    """The path of a file, or of an arm of the package by its name."""
-    from ..physics import mjcf_folder
-
-    if not isinstance(file, str | os.PathLike):
-        raise ParameterError("file", file, "must be an MJCF or URDF file, or an mujoco.MjSpec")
-    path = Path(file)
-    is_name = isinstance(file, str) and not path.suffix and os.sep not in file
-    if is_name and not os.path.isdir(path):  # one of the package's
-        own = {x.stem: x for x in sorted((mjcf_folder() / "arms").glob("*.xml"))}
-        path = own[choice("file", file, tuple(own))]
-    if not os.path.isfile(path):
-        bound = f"must be an MJCF or URDF file ({_lacks(path)})"
-        raise ParameterError("file", one_line(path, 200), bound)
-    return path
+    Raises:
+        ParameterError: it is a link of the arm itself.
+    """
+    model, carried = file.model, []
+    island = islands.island(model, joints)
+    links = {int(model.jnt_bodyid[j]) for j in island}
+    for link, mesh in file.lacking.items():
+        body = model.body(link).id
+        if not island.intersection(limbs.joints_to_root(model, body)):
+            continue
+        weld = int(model.body_weldid[body])
+        if body in links or (
+            weld in links and not model.body_mass[model.body_weldid == weld].sum() > LIGHTEST
+        ):
+            bound = (
+                f"must be there, as STL, OBJ or MSH: the inertia of {link} comes from it; or state "
+                f"<inertial> for {link}"
+            )
+            raise ParameterError("mesh", mesh, bound)
+        carried.append(link)
+    return carried
 
 
-def _lacks(path: Path) -> str:
-    """Why a path is no file."""
-    if str(path).lstrip().startswith("<"):
-        return "this is a model's text: give mujoco.MjSpec.from_string of it"
-    return "this is a folder" if os.path.isdir(path) else "there is none"
+# ---- joints --------------------------------------------------------------------------------------
 
 
-def _bad_file(file: Any, why: str) -> ParameterError:
-    shown = str(file) if isinstance(file, str | os.PathLike) else "MjSpec"
-    return ParameterError("file", shown, f"must be a file that MuJoCo loads ({why})")
-
-
-def _refuse_joints(model: Any) -> None:
-    """Refuses joints that have more than one degree of freedom."""
-    from ..physics import mujoco
-
-    scalar = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
-    for j in range(model.njnt):
-        if model.jnt_type[j] not in scalar:
-            kind = mujoco.mjtJoint(model.jnt_type[j]).name.removeprefix("mjJNT_").lower()
-            body = model.body(model.jnt_bodyid[j]).name
-            bound = f"must be a hinge or a slide, is {kind}: an arm stands on the world"
-            raise ParameterError(f"joint of {body or 'a body'}", model.joint(j).name, bound)
-
-
-def _refuse_tendons(model: Any) -> None:
-    """Tendons may tie joints; a tendon with mechanics of its own is refused."""
-    for i in range(model.ntendon):
-        own = [
-            name
-            for name in ("stiffness", "damping", "frictionloss", "armature")
-            if np.any(getattr(model, f"tendon_{name}")[i])
-        ]
-        if own:
-            bound = f"must have no {own[0]}: an arm's tendons may only tie joints"
-            raise ParameterError("tendon", model.tendon(i).name, bound)
-
-
-# ---- handle and joints ---------------------------------------------------------------------------
-
-
-def _name(model: Any, site: tuple[str, int]) -> str:
-    kind, index = site
-    return (model.site if kind == "site" else model.body)(index).name
-
-
-def _handle(model: Any, wanted: str | None) -> tuple[str, int] | None:
-    """The site or body of the handle; None if the file has no site on a moving body."""
-    sites = {model.site(i).name: i for i in range(model.nsite)}
+def _named_joints(model: Any, wanted: Any) -> list[int] | None:
+    """Joints that are named; None if none are."""
     if wanted is None:
-        moving = [i for i in sites.values() if model.body_weldid[model.site_bodyid[i]]]
-        if len(moving) > 1:
-            bound = f"must be named: there are {', '.join(model.site(i).name for i in moving)}"
-            raise ParameterError("site", None, bound)
-        return ("site", moving[0]) if moving else None
-    bodies = {model.body(i).name: i for i in range(1, model.nbody)}
-    if not isinstance(wanted, str):
-        raise ParameterError("site", wanted, "must be the name of a site or body, or None")
-    if wanted in sites:
-        return "site", sites[wanted]
-    if wanted in bodies:
-        return "body", bodies[wanted]
-    raise _unknown("site", wanted, [*sites, *bodies], "a site or body")
-
-
-def _unknown(field: str, word: Any, names: Sequence[str], kind: str) -> ParameterError:
-    near = nearest(word, names) if isinstance(word, str) else []
-    hint = f"; did you mean {near[0]!r}?" if near else f": {one_line(', '.join(names), 200)}"
-    return ParameterError(field, word, f"must be {kind} of the file{hint}")
-
-
-def _arm_joints(model: Any, wanted: Any, site: tuple[str, int] | None) -> list[int]:
-    """The arm's joints: those named, or those between the handle and the world."""
+        return None
     every = {model.joint(j).name: j for j in range(model.njnt)}
-    if wanted is not None:
-        if not is_series(wanted) or not len(list(wanted)):
-            raise ParameterError("joints", wanted, "must be a list of names of joints")
-        chosen = [every[full_name("joints", word, list(every))] for word in wanted]
-        if len(set(chosen)) < len(chosen):
-            raise ParameterError("joints", list(wanted), "must name each joint once")
-    else:
-        chosen = _driven(model, _chain(model, site))
-    if not chosen:
-        raise ParameterError("joints", None, "must be named: no joint moves the handle")
+    if not is_series(wanted) or not len(list(wanted)):
+        raise ParameterError("joints", wanted, "must be a list of names of joints")
+    chosen = [every[full_name("joints", word, list(every))] for word in wanted]
+    if len(set(chosen)) < len(chosen):
+        raise ParameterError("joints", list(wanted), "must name each joint once")
     return chosen
 
 
-def _chain(model: Any, site: tuple[str, int] | None) -> list[int]:
-    """Joints between the handle and the world, from the base on; all without a handle."""
-    if site is None:
-        return list(range(model.njnt))
-    kind, index = site
-    body, out = int(model.site_bodyid[index]) if kind == "site" else index, []
-    while body:
-        first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
-        out = [*range(first, first + count), *out]
-        body = int(model.body_parentid[body])
-    return out
-
-
-def _driven(model: Any, chain: list[int]) -> list[int]:
-    """Joints that a closed chain's actuators drive; those of the chain if it is open."""
-    if not model.neq:
-        return chain
-    from ..physics import mujoco
-
-    at_joints = model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
-    return [int(j) for j in model.actuator_trnid[at_joints, 0]] or chain
+def _arm_joints(model: Any, wanted: Any, chain: Sequence[int]) -> list[int]:
+    """The arm's joints: those named, or those that drive the chain before the handle."""
+    islands.check_kinds(model, chain if wanted is None else ())
+    chosen = _named_joints(model, wanted)
+    if chosen is None:
+        chosen = islands.driven(model, chain)
+    if not model.njnt:
+        raise ParameterError("joints", None, "must be some that move: the file has none")
+    if not chosen:
+        raise ParameterError("joints", None, "must be named: no joint moves the handle")
+    islands.check_kinds(model, chosen)
+    return chosen
 
 
 # ---- values --------------------------------------------------------------------------------------
@@ -270,12 +210,14 @@ def _per_joint(
     names = [model.joint(j).name for j in joints]
     if given is None:
         pairs: dict[int, Any] = {}
+    elif _is_one(given):
+        pairs = dict.fromkeys(range(len(names)), given)
     elif isinstance(given, Mapping):
         pairs = {names.index(full_name(field, word, names)): x for word, x in given.items()}
     elif is_series(given) and len(list(given)) == len(names):
         pairs = dict(enumerate(given))
     else:
-        bound = f"must be a number for each joint ({', '.join(names)}), or by name"
+        bound = f"must be a number for each joint ({', '.join(names)}), for all, or by name"
         raise ParameterError(field, given, bound)
     low, high, *units = BOUNDS[field]
     out = [float(x) for x in old]
@@ -288,6 +230,11 @@ def _per_joint(
     return out
 
 
+def _is_one(given: Any) -> bool:
+    """Whether a value is one number, or text of one, for all joints."""
+    return isinstance(given, str) or (isinstance(given, Real) and not isinstance(given, bool))
+
+
 def full_name(field: str, word: Any, names: Sequence[str]) -> str:
     """The joint that a word names, in full or by the only ending behind _ or /, as joint4.
 
@@ -298,7 +245,7 @@ def full_name(field: str, word: Any, names: Sequence[str]) -> str:
     if word in names:
         return word
     if len(ends) != 1:
-        raise _unknown(field, word, names, "a joint")
+        raise handles.unknown(field, word, names, "a joint")
     return ends[0]
 
 
@@ -312,20 +259,13 @@ def _refuse_negative(field: str, values: np.ndarray, model: Any) -> None:
 
 def _pose(model: Any, given: Any, joints: list[int]) -> np.ndarray:
     """Positions of all joints [rad or m]."""
-    start = np.array(model.qpos0, float)
-    keys = {model.key(i).name: i for i in range(model.nkey)}
-    if "home" in keys:
-        start = np.array(model.key_qpos[keys["home"]], float)
+    key = poses.keyframe(model, given)
+    start = np.array(model.qpos0 if key is None else model.key_qpos[key], float)
+    if isinstance(given, str | int):
+        return start
     which = range(model.njnt) if isinstance(given, Mapping) else joints
     start[which] = _per_joint(model, "pose", given, which, start[which])
     return start
-
-
-def _file_limits(model: Any, joints: list[int]) -> np.ndarray:
-    """Largest torque of each joint to both sides that the file allows, infinite for none."""
-    low, high = model.jnt_actfrcrange[joints].T
-    limited = model.jnt_actfrclimited[joints] > 0
-    return np.where(limited, np.maximum(np.minimum(-low, high), 0.0), math.inf)
 
 
 def _refuse_no_torque(names: Sequence[str], limits: Sequence[float]) -> None:
@@ -344,8 +284,8 @@ def _ranges(model: Any, joints: list[int]) -> np.ndarray:
 # ---- what is refused, and what is noted ----------------------------------------------------------
 
 
-def _check_mechanism(mechanism: Mechanism, names: Sequence[str]) -> None:
-    """Refuses constraints that leave the arm free or stuck, and joints without inertia."""
+def _check_joints(mechanism: Mechanism, names: Sequence[str]) -> None:
+    """Refuses constraints that leave the arm free or stuck."""
     if mechanism.overclosed():
         bound = "must be free to move each by itself: constraints of the file tie them"
         raise ParameterError("joints", list(names), bound)
@@ -355,11 +295,16 @@ def _check_mechanism(mechanism: Mechanism, names: Sequence[str]) -> None:
             "more can move under the constraints of the file"
         )
         raise ParameterError("joints", list(names), bound)
+
+
+def _check_inertia(mechanism: Mechanism, names: Sequence[str]) -> None:
+    """Refuses joints without inertia."""
     inertia = mechanism.at(mechanism.pose[mechanism.dofs]).inertia
     if not np.linalg.eigvalsh(inertia).min() > LIGHTEST:
         light = names[int(np.diag(inertia).argmin())]
         bound = (
-            "must have an inertia: the links behind it have none along its axis, nor has a rotor"
+            "must have an inertia: the links behind it have none along its axis, nor has a rotor: "
+            f"state <inertial> in the file, or armature of {light} [kg.m^2]"
         )
         raise ParameterError("joint", light, bound)
 
@@ -380,9 +325,9 @@ def _shown(point: np.ndarray) -> str:
     return "(" + ", ".join(f"{x:.4g}" for x in np.round(point, 9) + 0.0) + ")"
 
 
-def _moved(model: Any, arm: Any, mechanism: Mechanism, pose: np.ndarray) -> Iterator[str]:
+def _moved(model: Any, wanted: Any, mechanism: Mechanism, pose: np.ndarray) -> Iterator[str]:
     """A sentence if the pose of the file does not close the arm's chain."""
-    if arm.pose is None and mechanism.following:
+    if wanted is None and mechanism.following:
         i = max(mechanism.following, key=lambda i: abs(mechanism.pose[i] - pose[i]))
         gap = float(mechanism.pose[i] - pose[i])
         if abs(gap) > OPEN:
@@ -390,7 +335,28 @@ def _moved(model: Any, arm: Any, mechanism: Mechanism, pose: np.ndarray) -> Iter
             yield f"the pose of the file does not close the chain: {name} was moved by {gap:.3g}"
 
 
-def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> list[str]:
+def _pose_notes(model: Any, wanted: Any, mechanism: Mechanism, joints: list[int]) -> Iterator[str]:
+    """Whose the pose is, unless it is given, and whether the arm can take it."""
+    by_key = wanted is None or isinstance(wanted, str | int)
+    key = poses.keyframe(model, wanted) if by_key else None
+    whose = (
+        "zero position of the file"
+        if key is None
+        else f"key frame {_key_name(model, key)} of the file"
+    )
+    whose = whose if by_key else "as given"
+    names, q = [model.joint(j).name for j in joints], mechanism.pose[mechanism.dofs]
+    if beyond := outside_words(q, _ranges(model, joints), names):
+        yield f"pose: {whose}, at which {beyond}"
+    elif by_key:
+        yield f"pose: {whose}"
+
+
+def _key_name(model: Any, key: int) -> str:
+    return model.key(key).name or str(key)
+
+
+def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int], wanted: Any) -> list[str]:
     """Sentences about what the file leaves open, and what of it takes no part."""
     names = [model.joint(j).name for j in joints]
     rotors = model.dof_armature[mechanism.dofs]
@@ -402,21 +368,20 @@ def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int]) -> lis
             f"no rotor inertia (armature) at {', '.join(bare)}: limits of geared joints are then "
             "far too low"
         )
-    if arm.pose is None:
-        homes = [model.key(i).name for i in range(model.nkey)]
-        notes.append(
-            f"pose: {'key frame home' if 'home' in homes else 'zero position'} of the file"
-        )
+    notes += _pose_notes(model, wanted, mechanism, joints)
     used = {*mechanism.dofs, *mechanism.following}
     locked = [model.joint(j).name for j in range(model.njnt) if j not in used]
     if locked:
-        notes.append(f"locked: {', '.join(locked)}")
+        notes.append(f"locked: {names_words(locked, MOST_LOCKED)}")
     if mechanism.following:
         tied = [model.joint(j).name for j in mechanism.following]
         notes.append(f"constraints, taken as rigid, move {', '.join(tied)}")
         notes += _anchors(model)
-    if model.nu:
-        notes.append(f"{model.nu} actuators of the file take no part")
+    if model.nactuator:
+        notes.append(f"{model.nactuator} actuators of the file give no torque beside the law")
     if np.any(model.geom_contype | model.geom_conaffinity):
         notes.append("contacts of the file take no part")
-    return notes
+    if arm.torque_limit is None:
+        notes += actuators.limit_notes(model, joints, names)
+    by_joint = {j: model.joint(j).name for j in range(model.njnt)}
+    return [*notes, *content.noted(model, by_joint, mechanism.dofs, mechanism.following)]

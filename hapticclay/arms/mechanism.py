@@ -7,6 +7,7 @@ Constraints are projected out exactly, where the engine's own are soft.
 from __future__ import annotations
 
 import copy
+import hashlib
 import threading
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -14,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import ParameterError
+from . import passive
 
 STEP = 1e-5  # [rad or m] of differences of static torques: 1e-10 of them is rounding
 CLOSED = 1e-10  # [rad or m] a closed chain is closed within
@@ -57,10 +59,14 @@ class Moving(NamedTuple):
     Attributes:
         bias: torques of motion, weight and springs [N.m], shape (n,).
         centripetal: less the acceleration of the handle while the joints turn evenly [m/s^2], (3,).
+        damping: dampers whose product with the rates is their torques [N.m.s/rad], shape (n, n).
+        drag: torques of a fluid, but for what is in `damping` [N.m], shape (n,).
     """
 
     bias: np.ndarray
     centripetal: np.ndarray
+    damping: np.ndarray
+    drag: np.ndarray
 
 
 class Sticks(NamedTuple):
@@ -108,6 +114,22 @@ class Mechanism:
             self._own.data = self._mujoco.MjData(self._model)
         return self._own.data
 
+    def __eq__(self, other: object) -> bool:
+        """Whether it moves as another one does: models of the same numbers, the same joints."""
+        if not isinstance(other, Mechanism):
+            return NotImplemented
+        return self.dofs == other.dofs and self._numbers == other._numbers
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.dofs))
+
+    @cached_property
+    def _numbers(self) -> bytes:
+        """A digest of the compiled model as the engine stores it."""
+        out = np.empty(self._mujoco.mj_sizeModel(self._model), np.uint8)
+        self._mujoco.mj_saveModel(self._model, None, out)
+        return hashlib.blake2b(out.tobytes()).digest()
+
     # ---- one pose
 
     def linear(self, q: np.ndarray) -> Linear:
@@ -129,21 +151,28 @@ class Mechanism:
         self._at(q)
         whole, follow = np.zeros((self._model.nv,) * 2), self._follow()
         self._mujoco.mj_fullM(self._model, self._data, whole)
-        damping = follow.T @ (self._model.dof_damping[:, None] * follow)
+        damping = self._damping(np.zeros(self._model.nv)) + self._viscous()
         return Resting(follow.T @ whole @ follow, damping, self._jacobian() @ follow)
 
-    def at_handle(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Position of the handle and its Jacobian at joint positions, and what holds the weight.
+    def _damping(self, rates: np.ndarray) -> np.ndarray:
+        """Dampers in the coordinates of the arm, at rates of all joints."""
+        follow = self._follow()
+        return follow.T @ passive.dampers(self._model, self._data, rates) @ follow
 
-        [m], shape (3,); [m], shape (3, n); torques [N.m], shape (n,).
+    def _viscous(self) -> np.ndarray:
+        """A fluid's part of them, where the arm is."""
+        if not passive.has_fluid(self._model):
+            return np.zeros((len(self.dofs),) * 2)
+        return passive.viscous(self._model, self._data, self._follow())
+
+    def at_handle(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Position of the handle and its Jacobian at joint positions, [m], (3,) and (3, n).
 
         Raises:
             ParameterError: constraints cannot be satisfied there.
         """
         self._at(q)
-        follow = self._follow()
-        weights = (self._data.qfrc_bias - self._data.qfrc_gravcomp) @ follow
-        return self.handle_place(), self._jacobian() @ follow, weights
+        return self.handle_place(), self._jacobian() @ self._follow()
 
     def handle(self, q: np.ndarray) -> np.ndarray:
         """Position of the handle in the frame of the world [m], shape (3,)."""
@@ -208,25 +237,15 @@ class Mechanism:
     @property
     def weighs(self) -> bool:
         """Whether weights act."""
-        return not any(self._shares_of_weight())
+        model = self._model
+        return bool(np.any((passive.weight_shares(model) != 1.0)[model.body_mass > 0.0]))
 
-    def check_weight(self) -> None:
-        """Refuses to run an arm that weighs in parts.
-
-        Raises:
-            ParameterError: the weight of a part of the arm is compensated in the file.
-        """
-        shares = self._shares_of_weight()
-        if shares not in ([], [0.0], [1.0]):
-            bound = "must be 0 or 1 in runs, the same for all bodies"
-            raise ParameterError("gravcomp", shares, bound)
-
-    def _shares_of_weight(self) -> list[float]:
-        """Shares of the bodies' weights that are compensated: without gravity, 1."""
-        model, off = self._model, self._mujoco.mjtDisableBit.mjDSBL_GRAVITY
-        if model.opt.disableflags & off or not np.any(model.opt.gravity):
-            return [1.0]
-        return np.unique(model.body_gravcomp[1:][model.body_mass[1:] > 0.0]).tolist()
+    @property
+    def is_computed(self) -> bool:
+        """Whether Python computes its terms: machine code has open chains and linear laws."""
+        model = self._model
+        plain = passive.is_linear(model) and not passive.weighs_in_parts(model)
+        return bool(self.following) or not plain
 
     @property
     def springs(self) -> tuple[np.ndarray, np.ndarray]:
@@ -252,6 +271,7 @@ class Mechanism:
         """Terms of the arm's motion where `at` put it, at rates of its joints [rad/s]."""
         data, rates = self._data, self._follow() @ w
         drift = self._drift(rates) if self.following else np.zeros(self._model.nv)
+        viscous = self._viscous()
         data.qvel[:] = rates
         self._mujoco.mj_fwdVelocity(self._model, data)
         whole, turned = np.zeros((self._model.nv,) * 2), np.zeros((3, self._model.nv))
@@ -259,11 +279,22 @@ class Mechanism:
         place, body = self.handle_place(), self._held()
         self._mujoco.mj_jacDot(self._model, data, turned, None, place, body)
         torques = data.qfrc_bias - data.qfrc_spring - data.qfrc_gravcomp + whole @ drift
-        return Moving(torques @ self._follow(), -(turned @ rates + self._jacobian() @ drift))
+        return Moving(
+            torques @ self._follow(),
+            -(turned @ rates + self._jacobian() @ drift),
+            self._damping(rates) + viscous,
+            data.qfrc_fluid @ self._follow() + viscous @ w,
+        )
 
     def weights(self) -> np.ndarray:
         """Torques that hold the arm against its weight where `at` put it [N.m], shape (n,)."""
         return (self._data.qfrc_bias - self._data.qfrc_gravcomp) @ self._follow()
+
+    def taken(self, q: np.ndarray, w: np.ndarray) -> float:
+        """Power that dampers and a fluid take at positions and rates of the joints [W]."""
+        self._at(q)
+        moving = self.moving(w)
+        return float(w @ (moving.damping @ w - moving.drag))
 
     def energy(self, q: np.ndarray, w: np.ndarray) -> float:
         """Energy of motion, weight and springs at positions and rates of the joints [J]."""
@@ -273,10 +304,9 @@ class Mechanism:
         self._mujoco.mj_energyPos(self._model, data)
         self._mujoco.mj_fwdVelocity(self._model, data)
         self._mujoco.mj_energyVel(self._model, data)
-        lifted = 0.0
-        if not self.weighs:
-            lifted = -float(self._model.body_mass @ (data.xipos @ self._model.opt.gravity))
-            lifted *= not self._model.opt.disableflags & self._mujoco.mjtDisableBit.mjDSBL_GRAVITY
+        held = passive.weight_shares(self._model) * self._model.body_mass
+        lifted = -float(held @ (data.xipos @ self._model.opt.gravity))
+        lifted *= not self._model.opt.disableflags & self._mujoco.mjtDisableBit.mjDSBL_GRAVITY
         return float(data.energy.sum()) - lifted
 
     def _drift(self, rates: np.ndarray) -> np.ndarray:
@@ -399,6 +429,10 @@ class Mechanism:
             out[self.following] = -np.linalg.lstsq(own, rest, rcond=DEPENDENT)[0]
         return out
 
+    def follow(self) -> np.ndarray:
+        """Rates of all joints per rate of the arm's where it was put last, shape (nv, n)."""
+        return self._follow().copy()
+
     def freedom(self) -> int:
         """Followers that the constraints leave free, and so no joint of the arm moves."""
         if not self.following:
@@ -414,9 +448,10 @@ class Mechanism:
         return bool(np.abs(rows @ follow).max() > 1e-6 * np.abs(rows).max())
 
     def _static(self) -> np.ndarray:
-        """Torques that hold springs, gravity, and a unit mass at the handle, shape (3, n)."""
+        """Torques that hold springs (and wind), weight, a unit mass at the handle, (3, n)."""
         data, up = self._data, -np.array(self._model.opt.gravity)
-        every = -data.qfrc_spring, data.qfrc_bias - data.qfrc_gravcomp, up @ self._jacobian()
+        held = -data.qfrc_spring - data.qfrc_fluid
+        every = held, data.qfrc_bias - data.qfrc_gravcomp, up @ self._jacobian()
         return np.array(every) @ self._follow()
 
     def _stiffness(self, q: np.ndarray) -> np.ndarray:

@@ -14,8 +14,10 @@ from ..arguments import named
 from ..errors import ParameterError, array_of, choice
 from .loading import load
 from .mechanism import Linear, Mechanism
+from .servo_gains import ServoGains
 
-PerJoint = Mapping[str, float] | Sequence[float] | None
+PerJoint = Mapping[str, float] | Sequence[float] | float | None
+Pose = Mapping[str, float] | Sequence[float] | str | int | None
 
 
 @named
@@ -23,27 +25,33 @@ PerJoint = Mapping[str, float] | Sequence[float] | None
 class MjcfArm:
     """An arm that MuJoCo loads: any chain of hinges and slides, open or closed by constraints.
 
-    Joints between the handle and the world are the arm's, unless `joints` names others; a joint
-    that equality constraints tie to them follows; all others are locked at the pose. Actuators,
-    contacts and joint limits of the file take no part. What the file leaves open is in `notes`.
+    Joints between the handle and the world, or a floating base, are the arm's, unless `joints`
+    names others; a joint that constraints of the file tie to them follows; all others are locked at
+    the pose, and the base is held. The file's contacts and the forces of its actuators take no
+    part. What the file leaves open, and what is locked, is in `notes`.
 
     Attributes:
         file: MJCF or URDF file, an mujoco.MjSpec, or the name of an arm of the package: planar_2r,
             five_bar, haptic_3, leader_7.
-        site: site, or body, at which the hand holds the arm; None for the only site on a moving
-            body.
+        site: site, or body, at which the hand holds the arm; None for the only site at the end of
+            an arm. Without any the arm ends where its hand branches, and has no handle.
         joints: names of the arm's joints, in the order of its gains; None for those between the
-            handle and the world. Then those in use.
-        pose: joint positions [rad or m] by name, or one for each joint of the arm; None for the
-            key frame "home", or the positions of the file. Then those of all joints, by name.
-        armature: reflected inertia of the rotors [kg.m^2], 0 to 1e3, by joint name, or one for
-            each joint of the arm; None for the file's. Then those of the arm's joints.
+            handle and the world. Then those in use. Joints without a name in the file are joint 1,
+            joint 2, ... in its order.
+        pose: joint positions [rad or m] by name, or one for each joint of the arm; or a key frame
+            of the file, by name or number; None for the key frame "home", or the positions of the
+            file. Then those of all joints, by name; of a base that floats elsewhere than in the
+            file, its place (x, y, z and a quaternion).
+        armature: reflected inertia of the rotors [kg.m^2], 0 to 1e3, by joint name, one for all,
+            or one for each joint of the arm; None for the file's, actuators included. Then those
+            of the arm's joints.
         damping: viscous damping of the joints [N.m.s/rad], 0 to 1e6, likewise.
-        friction: Coulomb friction of the joints [N.m], 0 to 1e6, likewise.
-        gravity: "compensated" if the controller holds the arm against gravity, by the torque for
-            the measured joint positions; "acts" if nothing does.
+        friction: Coulomb friction of the joints [N.m], 0 to 1e6, likewise; that of joints which
+            follow them included.
+        gravity: "compensated" if the host holds the arm against gravity under any controller, by
+            the torque for the measured joint positions; "acts" if nothing does.
         torque_limit: largest torque of each joint's motor [N.m], > 0, likewise; None for that of
-            the file, or none.
+            the file's joints and actuators, or none.
         plane: in runs, the axes of the world, such as "xy" or "zx", in which clay and forces lie
             and which p, v and forces name x and y; None for the first two along which the handle
             moves.
@@ -52,7 +60,7 @@ class MjcfArm:
     file: Any
     site: str | None = None
     joints: Sequence[str] | None = None
-    pose: PerJoint = None
+    pose: Pose = None
     armature: PerJoint = None
     damping: PerJoint = None
     friction: PerJoint = None
@@ -74,6 +82,19 @@ class MjcfArm:
         if not isinstance(self.file, str):  # a spec, whose defaults and assets its XML has
             fields["file"] = self.file.to_xml()
         return _arm_of, (fields, isinstance(self.file, str))
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same arm, from whatever file."""
+        if not isinstance(other, MjcfArm):
+            return NotImplemented
+        return self._given == other._given and self.mechanism == other.mechanism
+
+    def __hash__(self) -> int:
+        return hash((self.site, self.joints))
+
+    @property
+    def _given(self) -> list[Any]:
+        return [getattr(self, x.name) for x in dataclasses.fields(self) if x.name != "file"]
 
     def __repr__(self) -> str:
         return f"<MjcfArm {self.name}: {', '.join(self.names)}>"
@@ -102,6 +123,11 @@ class MjcfArm:
     def ranges(self) -> np.ndarray:
         """Least and largest position of each joint [rad or m], infinite for none, shape (n, 2)."""
         return self._loaded.ranges.copy()  # type: ignore[attr-defined]
+
+    @property
+    def servo(self) -> ServoGains:
+        """Gains that the file's actuators give the joints; zeros if there are none."""
+        return self._loaded.servo  # type: ignore[attr-defined]
 
     @property
     def mechanism(self) -> Mechanism:
@@ -184,7 +210,9 @@ class MjcfArm:
             ParameterError: neither `site` nor the file names one.
         """
         if self.site is None:
-            bound = "must name a site or body at the handle: the file has no site on a moving body"
+            names = self._loaded.handles  # type: ignore[attr-defined]
+            such = f", such as {', '.join(names)}" * bool(names)
+            bound = f"must name a site or body at the handle{such}: the file leaves it open"
             raise ParameterError("site", None, bound)
 
     def _place(self, q: Sequence[float] | np.ndarray | None) -> np.ndarray:

@@ -20,8 +20,8 @@ from .console import ends
 
 HELP = frozenset(("-h", "--help"))
 
-# Matrices here are small: BLAS threads that wait for each other take up to ten times as long.
-# Before NumPy; whoever sets it decides.
+# Questions limit BLAS to one thread; a command has no other use for more, which NumPy would start
+# and which child processes would inherit: 20 ms on two cores. Whoever sets it decides.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
@@ -85,9 +85,14 @@ def _print_end(text: str) -> None:
 
 
 def parse_words(words: Sequence[str]) -> Callable[[], int] | None:
-    """The command of a command line; None if it asked for help, which is then printed."""
+    """The command of a command line; None if it asked for help or nothing: then help is printed."""
     if words[:1] == ["--version"]:
         words = ["version"]
+    if not words:
+        from .manual import print_overview
+
+        print_overview()
+        return None
     if words[:1] == ["help"]:
         words = [*words[1:2], "--help"]
     if not HELP.isdisjoint(words):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from ..errors import Bound, ParameterError
+from ..errors import Bound
 from ..files import writable
 from . import console, walls
 from .arm_options import ArmOptions
@@ -31,15 +31,17 @@ class ArmCommand:
     Attributes:
         file: MJCF or URDF file of the arm, or the name of one of the package: planar_2r, five_bar,
             haptic_3, leader_7.
-        gains: File of the gains, .toml, .json or .yaml, as teleoperation projects keep them.
-        Kp: Stiffness of each joint [N.m/rad], in place of --gains.
-        Kd: Damping of each joint [N.m.s/rad].
+        gains: File of the gains, .toml, .json or .yaml, as projects keep them, FILE:TABLE for one
+            of several tables; by default those of the actuators of the arm's file.
+        Kp: Stiffness of each joint, or one for all [N.m/rad], in place of the file's.
+        Kd: Damping of each joint, or one for all [N.m.s/rad], likewise.
         rate: Control rate [Hz], by default 1000.
         Ts: Control sample [s], in place of --rate.
         delay: Latency from a sample to the torque computed from it [s].
         velocity: How the rate of a joint is had, by default as the file of gains says, or exact.
         cutoff: Cutoff of --velocity filter [rad/s].
         runs: Where the gains act: in the host's loop at the rate, or in the drives' own.
+        drive_rate: Rate at which drives measure and hold [Hz]; by default they are continuous.
         arm: The arm of the file.
         counts: Encoder counts a turn behind the friction that the gains feed forward.
         wall: Axis of the world along which a wall at the handle pushes.
@@ -64,6 +66,7 @@ class ArmCommand:
     velocity: Literal["exact", "difference", "filter"] | None = None
     cutoff: Annotated[float | None, Bound(0.0, unit="rad/s", above=True)] = None
     runs: Literal["host", "drive"] | None = None
+    drive_rate: Annotated[float | None, Bound(10.0, 1e6, "Hz")] = None
     arm: ArmOptions = ArmOptions()
     counts: Annotated[int | None, Bound(1, 10**9)] = None
     wall: Literal["x", "y", "z"] | None = None
@@ -79,8 +82,6 @@ class ArmCommand:
     unused: ClassVar[tuple[Unused, ...]] = (
         Unused(("rate",), "is 1/Ts: give --Ts or --rate", ("Ts",)),
         Unused(("Kp", "Kd"), "is in the file of --gains: give one of the two", ("gains",)),
-        Unused(("poses",), "needs gains: give --gains, or --Kp and --Kd", (), ("gains", "Kp")),
-        Unused(("run",), "needs gains: give --gains, or --Kp and --Kd", (), ("gains", "Kp")),
         Unused(("film",), "shows a run: give --run", (), ("run",)),
         Unused(("seed",), "is of the draw of --poses", (), ("poses",)),
         Unused(("B", "hand"), "is of the wall: give --wall", (), ("wall",)),
@@ -109,7 +110,7 @@ class ArmCommand:
         """The scenario of the run as built, and the film of the buzz."""
         from ..studies.joint_runs import built_scenario, buzz
 
-        law, timing = self._law(), (self._Ts, self.delay)
+        law, timing = self._law(arm), (self._Ts, self.delay)
         built = built_scenario(arm, law, *timing)
         print(f"to run it as built: hapticclay run {built.save(out / 'as_built.toml')}")
         if self.film is None:
@@ -125,8 +126,8 @@ class ArmCommand:
         """The limits of the gains, of a wall, and over poses: those that are asked for."""
         from ..theory import fed_friction, joint_gains, joint_poses, joint_walls
 
-        if self.gains or self.Kp:
-            law = self._law()
+        if self._is_judged(arm):
+            law = self._law(arm)
             timing = self._Ts, self.delay
             yield joint_gains.joint_limits(arm, law, *timing)
             if self.run:
@@ -137,8 +138,6 @@ class ArmCommand:
                 yield fed_friction.friction_cycle(arm, law, *timing, self.counts)
             if self.poses:
                 yield joint_poses.over_poses(arm, law, *timing, self.poses, self.seed)
-        elif not self.wall:
-            raise ParameterError("gains", None, "must be given, or --Kp and --Kd, or --wall")
         if self.wall:
             hand = walls.operator_of(self.hand)
             velocity = "difference" if self.velocity == "difference" else "exact"
@@ -152,14 +151,25 @@ class ArmCommand:
     def _Ts(self) -> float:
         return self.Ts if self.Ts is not None else 1.0 / (self.rate or 1000.0)
 
-    def _law(self) -> JointPD:
+    def _is_judged(self, arm: MjcfArm) -> bool:
+        """Whether gains are judged: of a file without any, a wall alone may be."""
+        wanted = self.gains or self.Kp or self.Kd or self.run or self.poses
+        return bool(wanted or arm.servo.taken or not self.wall)
+
+    def _law(self, arm: MjcfArm) -> JointPD:
         from ..arms.joint_law import JointPD
 
-        given = {
+        given: dict[str, Any] = {
             name: getattr(self, name)
-            for name in ("velocity", "cutoff", "runs")
+            for name in ("velocity", "cutoff", "runs", "drive_rate")
             if getattr(self, name) is not None
         }
         if self.gains:
-            return JointPD.load(self.gains, **given)
-        return JointPD(self.Kp, self.Kd, **given)
+            return JointPD.load(self.gains, arm.names, **given)
+        n = max(len(self.Kp), len(self.Kd)) if len(self.Kp) + len(self.Kd) > 2 else len(arm.names)
+        for name in ("Kp", "Kd"):
+            if values := getattr(self, name):
+                given[name] = values * n if len(values) == 1 else values
+        if {"Kp", "Kd"} <= given.keys():
+            return JointPD(**given)
+        return JointPD.of(arm, **given)

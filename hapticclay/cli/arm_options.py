@@ -19,8 +19,10 @@ class ArmOptions:
     Attributes:
         site: Site or body at which the hand holds the arm.
         joints: Joints of the arm, in the order of the gains; by default those before the handle.
-        pose: Joint positions, a number for each joint or NAME=POSITION [rad or m].
-        armature: Reflected inertia of the rotors, a number for each joint or NAME=INERTIA [kg.m^2].
+        pose: Joint positions, a number for each joint or NAME=POSITION [rad or m]; or a key frame
+            of the file, by name or number.
+        armature: Reflected inertia of the rotors, a number for all joints or for each, or
+            NAME=INERTIA [kg.m^2].
         damping: Viscous damping of the joints, likewise [N.m.s/rad].
         friction: Coulomb friction of the joints, likewise [N.m].
         gravity: Whether the controller holds the arm against gravity.
@@ -42,7 +44,7 @@ class ArmOptions:
             file,
             site=self.site,
             joints=self.joints or None,
-            pose=_per_joint("pose", self.pose),
+            pose=_pose(self.pose),
             armature=_per_joint("armature", self.armature),
             damping=_per_joint("damping", self.damping),
             friction=_per_joint("friction", self.friction),
@@ -50,11 +52,19 @@ class ArmOptions:
         )
 
 
+def _pose(words: Sequence[str]) -> Any:
+    """A key frame, or positions."""
+    if len(words) == 1 and "=" not in words[0]:
+        return words[0]
+    return _per_joint("pose", words)
+
+
 def _per_joint(name: str, words: Sequence[str]) -> Any:
-    """Values in order, or by the name of the joint, NAME=VALUE; None for none."""
+    """Values in order, one for all, or by the name of the joint, NAME=VALUE; None for none."""
     from ..scene.changes import split_words
 
     if not any("=" in word for word in words):
-        return [value_of_text(word) for word in words] or None
+        values = [value_of_text(word) for word in words]
+        return values[0] if len(values) == 1 else values or None
     pairs = split_words(name, words, "must be numbers, or NAME=NUMBER, each once, not both")
     return {joint: value_of_text(text) for joint, text in pairs.items()}

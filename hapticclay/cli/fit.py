@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from ..errors import Bound, ParameterError
 from ..files import writable
 from . import console
+from .log_options import NAMES as LOG_NAMES
 from .log_options import LogOptions, column_names, found_line
 from .options import Loose
 
@@ -64,7 +65,7 @@ class FitCommand:
         if self.source.suffix == ".toml":
             bound = "must be a log or a record, not a scenario: run it first"
             raise ParameterError("source", str(self.source), bound)
-        for name in ("columns", "units", "counts", "table", "where"):
+        for name in ("columns", *LOG_NAMES):
             words = self.columns if name == "columns" else getattr(self.log, name)
             if recorded and words:
                 raise ParameterError(name, words, "is for a log: leave it out")

@@ -11,6 +11,7 @@ from ..errors import Bound
 from ..files import writable
 from ..model.constants import AXES
 from . import console
+from .log_options import NAMES as LOG_NAMES
 from .log_options import LogOptions, column_names, found_line, hinted
 from .options import Loose
 from .unused import Unused
@@ -96,10 +97,7 @@ class IdentifyCommand:
                 "held",
                 "delay",
                 "paper",
-                "units",
-                "counts",
-                "table",
-                "where",
+                *LOG_NAMES,
             ),
             "is for a log: give FILE too",
             (),

@@ -6,13 +6,16 @@ import contextlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from ..errors import ParameterError, choice
+from ..errors import Bound, ParameterError, choice
 from ..fields import value_of_text
 
 if TYPE_CHECKING:
     from ..columns.log import Log
+
+
+NAMES = ("units", "counts", "table", "where", "rate")  # of the options
 
 
 @dataclass(frozen=True)
@@ -20,25 +23,28 @@ class LogOptions:
     """What the names in a log do not say.
 
     Attributes:
-        units: Units of columns, in place of what the file says, as in pos=mm force=lbf.
+        units: Units of columns, in place of what the file says, as in pos=mm force=lbf; or scales
+            of sensors, as in current_mA=0.05N.m/A.
         counts: Columns of encoders, in counts a turn, or with the size of a count, as in q=4096
             x=0.01mm.
         table: Group, topic or sheet to read, where a file has several.
         where: Rows to read, as in episode_index=3.
+        rate: Rows in a second, of a file without a time.
     """
 
     units: tuple[str, ...] = ()
     counts: tuple[str, ...] = ()
     table: str = ""
     where: tuple[str, ...] = ()
+    rate: Annotated[float | None, Bound(0.0, 1e9, "Hz", above=True)] = None
 
     def log(self, file: Path, field: str = "file") -> Log:
         """The log in a file."""
-        from ..columns.log import open_log
+        from ..columns.log import Reading, open_log
 
         where = {name: value_of_text(x) for name, x in self._pairs("where").items()}
         units, counts = self._pairs("units"), self._pairs("counts")
-        return open_log(field, file, units, counts, self.table, where)
+        return open_log(field, file, Reading(units, counts, self.table, where, self.rate))
 
     def _pairs(self, option: str) -> dict[str, str]:
         """Values by the name of a column, which may hold an equals sign."""

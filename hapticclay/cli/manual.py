@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from ..fields import UNSET
 from . import parser
-from .commands import COMMANDS, load_command
+from .commands import MOST, groups, load_command
 from .options import SCENARIO
 
 NARROWEST = 20  # columns of a terminal in which help is laid out; in five that never ends
@@ -20,7 +20,7 @@ PAPER = (
     "Sections, figures and equations are those of Her, Hsu, Lan, Karkoub, J. Intelligent and "
     "Robotic Systems 35 (2002)."
 )
-ABOUT = "Virtual clay, cut with a simulated haptic arm."
+ABOUT = "A simulator of a person's hand, an arm or a haptic device, and virtual clay in one loop."
 
 
 def print_help(words: Sequence[str]) -> None:
@@ -28,11 +28,35 @@ def print_help(words: Sequence[str]) -> None:
     if words and not words[0].startswith("-"):
         _print_command(words, width)
         return
+    _print_begin(width)
+    for title, names in groups().items():
+        print(f"\n{title}:")
+        _print_commands(names, width)
+    print("\n" + textwrap.fill("hapticclay COMMAND --help shows the options of a command.", width))
+
+
+def print_overview() -> None:
+    """What most people need, and the names of the rest."""
+    width = max(shutil.get_terminal_size().columns, NARROWEST)
+    _print_begin(width)
+    print()
+    for title, names in groups().items():
+        text, indent = f"{title}: {', '.join(names)}", " " * 2
+        print(textwrap.fill(text, width, subsequent_indent=indent))
+    last = "hapticclay --help says what each is for, hapticclay COMMAND --help shows its options."
+    print("\n" + textwrap.fill(last, width))
+
+
+def _print_begin(width: int) -> None:
+    """What the program is, and the commands that most people need."""
     print(f"Usage: hapticclay COMMAND [OPTIONS]\n\n{textwrap.fill(ABOUT, width)}\n")
-    for name in COMMANDS:
+    _print_commands(MOST, width)
+
+
+def _print_commands(names: Sequence[str], width: int) -> None:
+    for name in names:
         text, indent = f"  {name:11} {_paragraphs(load_command(name))[0]}", " " * 14
         print(textwrap.fill(text, width, subsequent_indent=indent))
-    print("\n" + textwrap.fill("hapticclay COMMAND --help shows the options of a command.", width))
 
 
 def _print_command(words: Sequence[str], width: int) -> None:

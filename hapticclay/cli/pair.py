@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from ..errors import Bound, ParameterError
 from ..files import writable
 from . import console
+from .log_options import NAMES as LOG_NAMES
 from .log_options import LogOptions, column_names
 from .options import Loose
 from .unused import Unused
@@ -17,10 +18,11 @@ from .unused import Unused
 if TYPE_CHECKING:
     from ..results import Result
     from ..scene.pair import Pair
+    from ..simulation.pair_record import PairRecord
 
-OF_PAIR = ("map", "compare", "cells", "feel", "run", "film")
+OF_PAIR = ("map", "compare", "cells", "feel", "run", "push", "film")
 OF_THEORY = ("delay", "kind", "Ts", "view", *OF_PAIR)
-OF_LOGS = ("columns", "band", "level", "units", "counts", "table", "where")
+OF_LOGS = ("columns", "band", "level", *LOG_NAMES)
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,7 @@ class PairCommand:
             objects the pair is stable.
         run: Also run the pair for this time [s], under the muscle of the hand that the file gives;
             by default a push of 1 N for 50 ms.
+        push: In the run, push with this force along x for 50 ms, in place of the muscle [N].
         film: Film of that run, of at least 8 s, in which small motion is magnified: .mp4, .webp or
             .gif.
         view: Show the pair in a browser, with the mouse as the leader's hand and sliders for delay
@@ -75,6 +78,7 @@ class PairCommand:
     cells: Annotated[tuple[int, int], Bound(2, 200, names=("gains", "delays"))] = (20, 20)
     feel: Literal["x", "y", "z"] | None = None
     run: Annotated[float | None, Bound(0.0, 1e4, "s", above=True)] = None
+    push: Annotated[float | None, Bound(0.0, 1e6, "N", above=True)] = None
     film: Path | None = None
     view: bool = False
     host: str = "127.0.0.1"
@@ -92,7 +96,7 @@ class PairCommand:
         Unused(OF_THEORY, "is for a file of the pair, not for a log", ("data",)),
         Unused(OF_LOGS, "is for a log: give --data", (), ("data",)),
         Unused(OF_PAIR, "is left out where the pair is shown: leave out --view", ("view",)),
-        Unused(("film",), "shows a run: give --run", (), ("run",)),
+        Unused(("film", "push"), "is of a run: give --run too", (), ("run",)),
         Unused(("host", "port"), "is of the page: give --view too", (), ("view",)),
         Unused(("cells",), "is for a map: give --map delay-gain", (), ("map",)),
     )
@@ -116,6 +120,7 @@ class PairCommand:
         answers = list(self._answers(pair))  # all is computed before a file is written
         for found in answers:
             console.deliver(found, out, self.figures)
+        self._print_disagreement(answers)
         if self.film is not None:
             self._filmed(answers, self.film)
         return 0
@@ -165,11 +170,26 @@ class PairCommand:
         if self.feel:
             yield pair_ports.pair_transparency(pair, self.feel)
         if self.run:
-            from ..simulation.simulate import simulate
-
-            yield simulate(replace(pair, t_max=self.run))
+            yield self._run(pair, self.run)
         if self.map:
             yield pair_maps.pair_map(pair, *map(int, self.cells))
+
+    def _run(self, pair: Pair, seconds: float) -> PairRecord:
+        from ..simulation.simulate import simulate
+        from ..studies.pair_disagreement import push
+
+        muscle = pair.muscle if self.push is None else push(self.push)
+        return simulate(replace(pair, t_max=seconds, muscle=muscle))
+
+    def _print_disagreement(self, answers: Sequence[Any]) -> None:
+        """Why a run and theory differ, if they do, and what shows it."""
+        from ..simulation.pair_record import PairRecord
+        from ..studies.pair_disagreement import disagreement
+
+        for record in answers:
+            if isinstance(record, PairRecord) and record.pair is not None:
+                if words := disagreement(record.pair, answers[0], record):
+                    print(f"note: {words}")
 
     def _pair(self, file: Path) -> Pair:
         """The pair of a file, with what the options change."""

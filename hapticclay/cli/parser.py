@@ -117,10 +117,6 @@ def begun(words: Sequence[str], whole: bool = True) -> tuple[Line, list[str]]:
 
     Where the line is not `whole`, as for a help page, the scenario may be left out.
     """
-    if not words:
-        raise _refused(
-            f"give a command: {', '.join(COMMANDS)}; hapticclay --help says what each is for"
-        )
     name, *rest = words
     if name.startswith("-"):
         raise _refused(f"{name}: no option of hapticclay; see hapticclay --help")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..display import text_table
+from ..errors import ParameterError
 from ..files import writable
 from ..model.constants import AXES
 from . import console
@@ -160,6 +161,7 @@ def run_table(record: Record, paced: bool = False) -> str:
     ):  # the fewest for out_of_band_ratio()
         lines.append(_maneuver_line(record, AXES[s.muscle.rms.index(max(s.muscle.rms))]))
     lines.append(f"status: {record.status}")
+    lines += [] if s.is_closed_form else _motion_lines(record)
     if record.outcome.advice:
         lines.append(f"advice: {record.outcome.advice}")
     elif _chatters(s, [r for _, r in pieces]):
@@ -175,7 +177,8 @@ def run_table(record: Record, paced: bool = False) -> str:
 
 def _joint_table(record: Record) -> str:
     """What the joints of an arm from a file did."""
-    from ..scene.joint_numbers import references, torque_limits
+    from ..arms.joint_units import table_of
+    from ..scene.joint_numbers import references, torque_limits, turning
 
     s, some = record.scenario, len(record.t) > 0
     pulled, limits = references(s), torque_limits(s)
@@ -189,7 +192,18 @@ def _joint_table(record: Record) -> str:
         table["largest torque [N.m]"] = abs(record.tau).max(axis=0).tolist()
     if any(map(math.isfinite, limits)):
         table["limit [N.m]"] = [x if math.isfinite(x) else math.nan for x in limits]
+    table = table_of(table, turning(s))
     return text_table(table, dict.fromkeys(table, "z.4g"))
+
+
+def _motion_lines(record: Record) -> list[str]:
+    """The swing of the joints, if there is one."""
+    from ..studies.joint_motion import joint_motion
+
+    try:
+        return [f"motion: {joint_motion(record).headline()}"]
+    except ParameterError:
+        return []
 
 
 def _pace_line(record: Record, paced: bool) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..display import one_line
 from ..errors import ParameterError
-from .cells import BadCell, short
+from .cells import BadCell, Cells, short
 from .heads import Head
 
 MOST_PARTS = 256  # columns of an array with a column for each part
@@ -23,7 +23,7 @@ TIMES = frozenset(("t", "time", "timestamp", "stamp"))
 
 
 @dataclass(frozen=True)
-class ArrayTable:
+class ArrayTable(Cells):
     """Columns of numbers under their heads.
 
     Attributes:
@@ -55,58 +55,15 @@ class ArrayTable:
         """A column, (n,), with NaN for what is no number."""
         return self.arrays[place]
 
-    def numbers(self, place: int) -> np.ndarray:
-        """A column of finite numbers, (n,); refused with its row where one is none."""
-        found = self.arrays[place]
-        if (bad := ~np.isfinite(found)).any():
-            row, name = int(np.argmax(bad)), short(self.heads[place].text)
-            bound = f"row {row}, column {name}: must be a finite number, is {found[row]:g}"
-            raise BadCell(self.field, str(self.path), bound)
-        return found
+    def is_missing(self, row: int, place: int) -> bool:
+        """Whether a cell is no finite number."""
+        return True
 
-
-@dataclass(frozen=True)
-class Chosen:
-    """Some rows of another table: those in which columns have given values."""
-
-    table: Any
-    rows_kept: np.ndarray
-    notes: tuple[str, ...]
-
-    @property
-    def path(self) -> Path:
-        """The file."""
-        return self.table.path
-
-    @property
-    def heads(self) -> Sequence[Head]:
-        """Names and units of the columns."""
-        return self.table.heads
-
-    @property
-    def form(self) -> str:
-        """The format, in words."""
-        return self.table.form
-
-    @property
-    def rows(self) -> int:
-        """Number of rows."""
-        return len(self.rows_kept)
-
-    def refusal(self, bound: str) -> ParameterError:
-        """An error that names the file."""
-        return self.table.refusal(bound)
-
-    def numbers(self, place: int) -> np.ndarray:
-        """A column of finite numbers, (n,)."""
-        found = self.loose_numbers(place)
-        if not np.isfinite(found).all():
-            return self.table.numbers(place)[self.rows_kept]
-        return found
-
-    def loose_numbers(self, place: int) -> np.ndarray:
-        """A column, (n,), with NaN for what is no number."""
-        return self.table.loose_numbers(place)[self.rows_kept]
+    def bad_cell(self, row: int, place: int) -> BadCell:
+        """An error that names the row of a cell which is no finite number."""
+        name, value = short(self.heads[place].text), self.arrays[place][row]
+        bound = f"row {row}, column {name}: must be a finite number, is {value:g}"
+        return BadCell(self.field, str(self.path), bound)
 
 
 def flat(data: Any, name: str = "") -> Iterator[tuple[str, Any]]:

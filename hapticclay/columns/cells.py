@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 import re
 from datetime import UTC, datetime, time
+from typing import TYPE_CHECKING, Protocol
 
 from ..display import one_line
 from ..errors import ParameterError
+
+if TYPE_CHECKING:
+    import numpy as np
 
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eEdD][-+]?\d+)?")
 COMMA_NUMBER = re.compile(r"[-+]?(\d+,\d+|,\d+|\d+,)([eE][-+]?\d+)?")
@@ -15,6 +19,36 @@ MISSING = frozenset(("", "nan", "na", "n/a", "inf", "infinity", "null", "none", 
 CLOCK = re.compile(r"(\d{4}-\d\d?-\d\d?[T ])?\d\d?:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
 SIGNS = str.maketrans({"\u2212": "-", "\u00a0": None, "\u202f": None, "\u2009": None})
 DAY = 86_400_000_000_000  # [ns]
+
+
+class Cells(Protocol):
+    """What a table knows of its cells, and the numbers in its columns."""
+
+    def loose_numbers(self, place: int) -> np.ndarray:
+        """A column, (n,), with NaN for what is no number."""
+        ...
+
+    def is_missing(self, row: int, place: int) -> bool:
+        """Whether a cell stands for a number that is not there, and not for another text."""
+        ...
+
+    def bad_cell(self, row: int, place: int) -> BadCell:
+        """An error that names a cell which is no finite number."""
+        ...
+
+    def numbers(self, place: int, holes: bool = False) -> np.ndarray:
+        """A column of finite numbers in the unit of the file, (n,).
+
+        With `holes`, missing cells are NaN; else they are refused, as other texts are.
+        """
+        import numpy as np
+
+        x = self.loose_numbers(place)
+        good = np.isfinite(x)
+        for row in np.flatnonzero(~good).tolist():
+            if not (holes and self.is_missing(row, place)):
+                raise self.bad_cell(row, place)
+        return x if good.all() else np.where(good, x, np.nan)
 
 
 class BadCell(ParameterError):

@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import needing
 from ..files import DAMAGED, parse_json, read_text
 from .array_tables import ArrayTable, Container
+from .heads import Head, numbered
 
 ABOVE = 4  # folders above a file in which LeRobot keeps meta/info.json
 
@@ -33,15 +34,17 @@ def feather(field: str, path: Path, table: str = "") -> ArrayTable:
 
 
 def _of_arrow(field: str, path: Path, found: Any, form: str, table: str) -> ArrayTable:
+    found.validate(full=True)  # offsets of a damaged file would end or hang the process
     data: dict[str, Any] = {}
     units: dict[str, str] = {}
-    for column in found.schema:
-        values = _values(found.column(column.name))
+    heads = numbered([Head(column.name) for column in found.schema])
+    for head, column, cells in zip(heads, found.schema, found.columns, strict=True):
+        values = _values(cells)
         if values is not None:
-            data[column.name] = values
+            data[head.text] = values
         for key in (b"unit", b"units"):
             if key in (column.metadata or {}):
-                units[column.name] = column.metadata[key].decode("utf-8", "replace")
+                units[head.text] = column.metadata[key].decode("utf-8", "replace")
     return Container.of(field, path, form, data, units, _feature_names(path)).table(table)
 
 

@@ -6,12 +6,14 @@ import importlib
 import os
 import zipfile
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from ..display import one_line
 from ..errors import ParameterError
 from ..files import MOST_READ, Unfit, check_regular
+from .cells import BadCell, Cells
 from .heads import Head
 from .text_tables import TextTable
 
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 
-class Table(Protocol):
+class Table(Cells, Protocol):
     """Columns under their heads."""
 
     @property
@@ -47,17 +49,153 @@ class Table(Protocol):
         """What was passed over, in words."""
         ...
 
-    def numbers(self, place: int) -> np.ndarray:
-        """A column of finite numbers in the unit of the file, (n,)."""
-        ...
-
-    def loose_numbers(self, place: int) -> np.ndarray:
-        """The same, with NaN for what is no number."""
-        ...
-
     def refusal(self, bound: str) -> ParameterError:
         """An error that names the file."""
         ...
+
+
+@dataclass(frozen=True)
+class Chosen(Cells):
+    """Some rows of another table: those in which columns have given values."""
+
+    table: Table
+    rows_kept: np.ndarray
+    notes: tuple[str, ...]
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.table.path
+
+    @property
+    def heads(self) -> Sequence[Head]:
+        """Names and units of the columns."""
+        return self.table.heads
+
+    @property
+    def form(self) -> str:
+        """The format, in words."""
+        return self.table.form
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(self.rows_kept)
+
+    def refusal(self, bound: str) -> ParameterError:
+        """An error that names the file."""
+        return self.table.refusal(bound)
+
+    def is_missing(self, row: int, place: int) -> bool:
+        """Whether a cell stands for a number that is not there."""
+        return self.table.is_missing(int(self.rows_kept[row]), place)
+
+    def bad_cell(self, row: int, place: int) -> BadCell:
+        """An error that names a cell which is no finite number."""
+        return self.table.bad_cell(int(self.rows_kept[row]), place)
+
+    def loose_numbers(self, place: int) -> np.ndarray:
+        """A column, (n,), with NaN for what is no number."""
+        return self.table.loose_numbers(place)[self.rows_kept]
+
+
+@dataclass(frozen=True)
+class Picked(Cells):
+    """Some columns of another table, with heads of their own."""
+
+    table: Table
+    kept: tuple[int, ...]
+    heads: tuple[Head, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.table.path
+
+    @property
+    def form(self) -> str:
+        """The format, in words."""
+        return self.table.form
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return self.table.rows
+
+    def refusal(self, bound: str) -> ParameterError:
+        """An error that names the file."""
+        return self.table.refusal(bound)
+
+    def is_missing(self, row: int, place: int) -> bool:
+        """Whether a cell stands for a number that is not there."""
+        return self.table.is_missing(row, self.kept[place])
+
+    def bad_cell(self, row: int, place: int) -> BadCell:
+        """An error that names a cell which is no finite number."""
+        return self.table.bad_cell(row, self.kept[place])
+
+    def loose_numbers(self, place: int) -> np.ndarray:
+        """A column, (n,), with NaN for what is no number."""
+        return self.table.loose_numbers(self.kept[place])
+
+
+@dataclass(frozen=True)
+class Clocked(Cells):
+    """Another table with a time of its rows, behind its own columns, by a rate that is stated."""
+
+    table: Table
+    rate: float  # [Hz]
+
+    @property
+    def clock(self) -> str:
+        """Name of the time."""
+        return f"rows at {self.rate:.6g} Hz"
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.table.path
+
+    @property
+    def heads(self) -> Sequence[Head]:
+        """Names and units of the columns."""
+        return (*self.table.heads, Head(self.clock, "s"))
+
+    @property
+    def form(self) -> str:
+        """The format, in words."""
+        return self.table.form
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """What was passed over, in words."""
+        return self.table.notes
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return self.table.rows
+
+    def refusal(self, bound: str) -> ParameterError:
+        """An error that names the file."""
+        return self.table.refusal(bound)
+
+    def is_missing(self, row: int, place: int) -> bool:
+        """Whether a cell stands for a number that is not there."""
+        return self.table.is_missing(row, place)
+
+    def bad_cell(self, row: int, place: int) -> BadCell:
+        """An error that names a cell which is no finite number."""
+        return self.table.bad_cell(row, place)
+
+    def loose_numbers(self, place: int) -> np.ndarray:
+        """A column, (n,), with NaN for what is no number."""
+        import numpy as np
+
+        if place == len(self.table.heads):
+            return np.arange(self.rows) / self.rate
+        return self.table.loose_numbers(place)
 
 
 # first bytes of a file, and its reader, "module:function"

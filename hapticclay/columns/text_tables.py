@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 from ..errors import ParameterError
 from ..files import MOST_TABLE, read_bytes
 from . import cells
-from .cells import BadCell, short
+from .cells import BadCell, Cells, short
 from .heads import Head, bracketed, is_unit
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ Line = tuple[int, str]
 
 
 @dataclass(frozen=True)
-class TextTable:
+class TextTable(Cells):
     """A table in a file of text.
 
     Attributes:
@@ -110,18 +110,15 @@ class TextTable:
         """An error that names the file."""
         return ParameterError(self.field, str(self.path), bound)
 
-    def numbers(self, place: int) -> np.ndarray:
-        """A column of finite numbers, (n,); refused with its line where a cell is none."""
-        found = self.loose_numbers(place)
-        import numpy as np
+    def is_missing(self, row: int, place: int) -> bool:
+        """Whether a cell is empty, or says that nothing is there."""
+        return cells.is_missing(self.cell(row, place))
 
-        if (bad := ~np.isfinite(found)).any():
-            row = int(np.argmax(bad))
-            line, text = self.lines[row]
-            cell = split(text, self.separator)[place]
-            bound = f"line {line}, column {short(self.heads[place].text)}: must be a finite number"
-            raise BadCell(self.field, str(self.path), f"{bound}, is {short(cell)}")
-        return found
+    def bad_cell(self, row: int, place: int) -> BadCell:
+        """An error that names the line of a cell which is no finite number."""
+        bound = f"line {self.lines[row][0]}, column {short(self.heads[place].text)}"
+        bound += f": must be a finite number, is {short(self.cell(row, place))}"
+        return BadCell(self.field, str(self.path), bound)
 
     def loose_numbers(self, place: int) -> np.ndarray:
         """A column, (n,), with NaN where a cell is no number; of clock times in seconds."""
@@ -176,7 +173,8 @@ class TextTable:
         texts = [row[place] if place < len(row) else "" for row in self._split_lines]
         comma = self._comma or self._quoted_commas
         found = np.array([cells.number(x, comma) for x in texts])
-        if len(texts) and not np.isfinite(found).any() and cells.is_clock(texts[0]):
+        first = next((x for x in texts if not cells.is_missing(x)), "")
+        if not np.isfinite(found).any() and cells.is_clock(first):
             return _clock_times(texts)
         return found
 
@@ -332,9 +330,10 @@ def _heads(
     above: list[Line], comments: list[str], below: list[Line], separator: str, notes: list[str]
 ) -> tuple[Head, ...]:
     """Names and units of the columns, from the lines above the numbers or a comment."""
-    width = _width(below, separator)
-    if above and below and above[-1][0] == below[0][0] - 1:
-        _check_names(_words(above[-1][1], separator, width), width, below[0][0])
+    directly = above[-1][1] if above and below and above[-1][0] == below[0][0] - 1 else ""
+    width = _width(below, separator, directly)
+    if directly:
+        _check_names(_words(directly, separator, width), width, below[0][0])
     rows = [(i, _words(x, separator, width)) for i, x in above]
     full = [(i, x) for i, x in rows if len(x) == width or (not width and len(x) > 0)]
     near = []
@@ -371,12 +370,18 @@ def _check_names(row: list[str], width: int, line: int) -> None:
     raise ValueError(bound)
 
 
-def _width(below: list[Line], separator: str) -> int:
-    """Number of cells in most rows, without empty ones at their ends."""
+def _width(below: list[Line], separator: str, names: str) -> int:
+    """Number of cells in most rows, without empty ones at their ends that no name stands above."""
     if not below:
         return 0
-    widths = [len(_trimmed(split(x, separator))) for _, x in below[:: max(len(below) // SAMPLE, 1)]]
-    return max(set(widths), key=widths.count)
+    made = [split(x, separator) for _, x in below[:: max(len(below) // SAMPLE, 1)]]
+    whole, filled = (
+        max(set(widths), key=widths.count)
+        for widths in ([len(x) for x in made], [len(_trimmed(x)) for x in made])
+    )
+    named = len(_trimmed(split(names, separator)))
+    wider = named == whole if named else any(len(_trimmed(x)) == whole for x in made)
+    return whole if wider else filled
 
 
 def _trimmed(row: list[str]) -> list[str]:
@@ -433,7 +438,8 @@ def _clock_times(texts: list[str]) -> np.ndarray:
     import numpy as np
 
     whole = [cells.nanoseconds(x) for x in texts]
-    start = whole[0] if whole[0] is not None and whole[0] > cells.DAY else 0
+    first = next((x for x in whole if x is not None), 0)
+    start = first if first > cells.DAY else 0
     out, days, before = [], 0, None
     for x in whole:
         if x is not None and before is not None and not start and x < before - cells.DAY // 2:

@@ -2,6 +2,8 @@
 
 import math
 
+from . import numbers
+
 
 def jacobian(q1, q2, links):
     """Columns of the Jacobian in absolute angles, u_i = dp/dtheta_i (Eq. 14) [m].
@@ -59,11 +61,12 @@ def joint_torques(fx, fy, u):
 def joint_velocity(vx, vy, u, n):
     """Absolute link rates of a handle velocity, divided by n: 1, or a time for accelerations.
 
-    A stretched or folded arm divides by zero.
+    They are not finite where the arm is stretched or folded.
     """
     u1x, u1y, u2x, u2y = u[0], u[1], u[2], u[3]
     det = n * (u1x * u2y - u2x * u1y)
-    return (vx * u2y - vy * u2x) / det, (vy * u1x - vx * u1y) / det
+    first = numbers.ratio(vx * u2y - vy * u2x, det)
+    return first, numbers.ratio(vy * u1x - vx * u1y, det)
 
 
 def inverse_kinematics(x, y, links):

@@ -4,6 +4,7 @@ cdef extern from "math.h" nogil:
     double acos(double)
     double atan2(double, double)
     double sqrt(double)
+    double pow(double, double)
     double tanh(double)
     double exp(double)
     double expm1(double)

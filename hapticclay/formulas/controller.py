@@ -1,5 +1,7 @@
 """The servo's law and the velocity lost per unit of force."""
 
+from . import numbers
+
 
 def feedback_law(servo, delta, y, yd, p, v, c):
     """Servo acceleration of one axis at an instant, without forces; see `feedback_vector`.
@@ -22,10 +24,10 @@ def velocity_per_force(n, W, d):
     c, e = W[1] * d[0] + W[2] * d[2], n[1] + W[1] * d[2] + W[2] * d[1]
     det = a * e - b * c
     return (
-        (e * W[0] - b * W[1]) / det,
-        (e * W[1] - b * W[2]) / det,
-        (a * W[1] - c * W[0]) / det,
-        (a * W[2] - c * W[1]) / det,
+        numbers.ratio(e * W[0] - b * W[1], det),
+        numbers.ratio(e * W[1] - b * W[2], det),
+        numbers.ratio(a * W[1] - c * W[0], det),
+        numbers.ratio(a * W[2] - c * W[1], det),
     )
 
 

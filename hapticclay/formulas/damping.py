@@ -1,6 +1,6 @@
 """Damping of clay in time steps: split over a kick, on rotated axes, growing with time."""
 
-from . import constants
+from . import constants, numbers
 
 
 def halved_damping(b0, b1, L, R):
@@ -57,11 +57,11 @@ def slow_force(g, W, share, f):
     xx, xy, yy = W
     if share[0] and share[1]:
         det = xx * yy - xy * xy
-        x = (yy * gx - xy * gy) / det
-        y = (xx * gy - xy * gx) / det
+        x = numbers.ratio(yy * gx - xy * gy, det)
+        y = numbers.ratio(xx * gy - xy * gx, det)
     else:
-        x = (gx - xy * f[1]) / xx
-        y = (gy - xy * f[0]) / yy
+        x = numbers.ratio(gx - xy * f[1], xx)
+        y = numbers.ratio(gy - xy * f[0], yy)
     return x, y
 
 

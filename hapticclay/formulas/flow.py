@@ -2,6 +2,8 @@
 
 import math
 
+from . import numbers
+
 KICK_PARTS = 6  # most parts of a kick: two stops, the parts around them, and one spare
 AXIS_ROUNDS = 60  # iterations between the axes until both forces agree
 CLOSE = 1e-15  # tolerance of that agreement
@@ -9,7 +11,7 @@ CLOSE = 1e-15  # tolerance of that agreement
 
 def moving_force(Fy, K, n, speed):
     """Force of yielding clay on a tool of a speed >= 0, without its damping, Fy + K v^n [N]."""
-    return Fy + K * speed**n if K > 0.0 else Fy
+    return Fy + K * numbers.power(speed, n) if K > 0.0 else Fy
 
 
 def motion_force(law, along, vx, vy):
@@ -38,12 +40,12 @@ def thinned(q, k, n):
     if k <= 0.0 or q <= 0.0:
         return q
     m = 0.5 * q if n < 1.0 else q
-    if k * m**n > m:
-        m = (m / k) ** (1.0 / n)
+    if k * numbers.power(m, n) > m:
+        m = numbers.power(m / k, 1.0 / n)
     for _ in range(60):
         if m <= 0.0:
             break
-        p = k * m**n
+        p = k * numbers.power(m, n)
         step = (q - m - p) / (1.0 + n * p / m)
         m += step
         if abs(step) <= 1e-15 * m:
@@ -76,12 +78,12 @@ def sliding_force(a, end, slope, Fy, K, n):
     if end > 0.0:
         m = thinned(end, slope * K, n)
         if m > 0.0:
-            share = implicit_share(slope * K * n * m ** (n - 1.0))
+            share = implicit_share(slope * K * n * numbers.power(m, n - 1.0))
             m = thinned((1.0 - share) * a + share * end, share * slope * K, n)
             stops = m <= (1.0 - share) * a
     if stops:
         m = 0.5 * a
-    return sign * (Fy + K * m**n)
+    return sign * (Fy + K * numbers.power(m, n))
 
 
 def resist_axes(B, v, end, law, sample):
@@ -146,7 +148,7 @@ def forces_on_axes(B, v, d, left, law):
     fx, fy, stuckx, stucky = 0.0, 0.0, False, False
     if vx == 0.0 and vy == 0.0:
         det = xx * yy - xy * yx
-        fx, fy = (yy * dx - xy * dy) / det, (xx * dy - yx * dx) / det
+        fx, fy = numbers.ratio(yy * dx - xy * dy, det), numbers.ratio(xx * dy - yx * dx, det)
         stuckx = stucky = abs(fx) <= Fyx and abs(fy) <= Fyy
     elif vy != 0.0:
         fy = Fyy if vy > 0.0 else -Fyy
@@ -155,13 +157,13 @@ def forces_on_axes(B, v, d, left, law):
         need = dx - xy * fy
         stuckx = vx == 0.0 and abs(need) <= xx * Fyx
         if stuckx:
-            fx = need / xx
+            fx = numbers.ratio(need, xx)
         else:
             fx = sliding_force(vx, vx + left * need, left * xx, Fyx, Kx, nx)
         need = dy - yx * fx
         stucky = vy == 0.0 and abs(need) <= yy * Fyy
         if stucky:
-            fy = need / yy
+            fy = numbers.ratio(need, yy)
         else:
             fy = sliding_force(vy, vy + left * need, left * yy, Fyy, Ky, ny)
         if abs(fx - oldx) <= CLOSE * abs(fx) and abs(fy - oldy) <= CLOSE * abs(fy):
@@ -176,7 +178,7 @@ def resist_along(B, v, end, law, sample):
     vx, vy = v
     dx, dy = end[0] - vx, end[1] - vy
     det = xx * yy - xy * yx
-    holdx, holdy = (yy * dx - xy * dy) / det, (xx * dy - yx * dx) / det
+    holdx, holdy = numbers.ratio(yy * dx - xy * dy, det), numbers.ratio(xx * dy - yx * dx, det)
     rx, ry, sx, sy, hx, hy, stop = 0.0, 0.0, vx, vy, 0.0, 0.0, -1.0
     begin, left, first = 0.0, 1.0, True
     for _ in range(KICK_PARTS):
@@ -234,7 +236,8 @@ def force_along(B, v, d, hold, left, Fy, K, n):
         f = 0.5 * math.sqrt(v[0] * v[0] + v[1] * v[1])
         f = moving_force(Fy, K, n, f)
         det = B[0] * B[3] - B[1] * B[2]
-        px, py = (B[3] * v[0] - B[1] * v[1]) / det, (B[0] * v[1] - B[2] * v[0]) / det
+        px = numbers.ratio(B[3] * v[0] - B[1] * v[1], det)
+        py = numbers.ratio(B[0] * v[1] - B[2] * v[0], det)
         square, mixed = px * px + py * py, px * hold[0] + py * hold[1]
         rest = mixed * mixed - square * (hold[0] * hold[0] + hold[1] * hold[1] - f * f)
         if square > 0.0 and rest >= 0.0:
@@ -245,7 +248,7 @@ def force_along(B, v, d, hold, left, Fy, K, n):
         m = math.sqrt(mx * mx + my * my)
         if m == 0.0:  # at rest at the very end
             return hold[0] + px / left, hold[1] + py / left, left
-    f = moving_force(Fy, K, n, m) / m
+    f = numbers.ratio(moving_force(Fy, K, n, m), m)
     return f * mx, f * my, left
 
 
@@ -275,17 +278,19 @@ def slowed(B, qx, qy, k, Fy, K, n):
         f = moving_force(Fy, K, n, s)
         a, b, c, e = s + f * xx, f * xy, f * yx, s + f * yy
         det = a * e - b * c
-        x, y = (e * qx - b * qy) / det, (a * qy - c * qx) / det
+        x, y = numbers.ratio(e * qx - b * qy, det), numbers.ratio(a * qy - c * qx, det)
         long = math.sqrt(x * x + y * y)
         if long > 1.0:
             low = s
         else:
             high = s
-        slope = n * K * s ** (n - 1.0) if K > 0.0 else 0.0
+        slope = n * K * numbers.power(s, n - 1.0) if K > 0.0 else 0.0
         px, py = x + slope * (xx * x + xy * y), y + slope * (yx * x + yy * y)
-        gx, gy = (e * px - b * py) / det, (a * py - c * px) / det
+        gx, gy = numbers.ratio(e * px - b * py, det), numbers.ratio(a * py - c * px, det)
         # 1/long - 1 is nearly linear in s
-        step = (long - 1.0) * long * long / (x * gx + y * gy) if long > 0.0 else 0.0
+        step, far = 0.0, (long - 1.0) * long * long
+        if long > 0.0:
+            step = numbers.ratio(far, x * gx + y * gy)
         if abs(step) > CLOSE * s and not low < s + step < high:
             step = 0.5 * (low + high) - s
         s += step
@@ -294,5 +299,5 @@ def slowed(B, qx, qy, k, Fy, K, n):
     f = moving_force(Fy, K, n, s)
     a, b, c, e = s + f * xx, f * xy, f * yx, s + f * yy
     det = a * e - b * c
-    x, y = (e * qx - b * qy) / det, (a * qy - c * qx) / det
+    x, y = numbers.ratio(e * qx - b * qy, det), numbers.ratio(a * qy - c * qx, det)
     return s * x, s * y

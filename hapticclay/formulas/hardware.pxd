@@ -5,7 +5,7 @@ from . cimport numbers
 cdef double slide(long case) noexcept nogil
 cdef double round_to_even(double x, double step) noexcept nogil
 cdef double quantize(double x, long bits, double span) noexcept nogil
-cdef double encode(double q, long long counts) noexcept nogil
+cdef double encode(double q, double count) noexcept nogil
 cdef double velocity_difference(double then, double old, double k, double q, double Ts) noexcept nogil
 cdef double low_pass(double y, double mean, double cutoff, double span) noexcept nogil
 cdef (double, double) filter_step(double *f, double x0, double x1, double u) noexcept nogil

@@ -29,9 +29,9 @@ def quantize(x, bits, span):
     return min(level, half - 1.0) * span / half
 
 
-def encode(q, counts):
-    """Joint angle as an encoder reads it [rad]; 0 counts per turn for an exact reading."""
-    return round_to_even(q, math.tau / counts) if counts else q
+def encode(q, count):
+    """Joint position as an encoder reads it, in counts of a size [rad or m]; 0 for exactly."""
+    return round_to_even(q, count) if count else q
 
 
 def velocity_difference(then, old, k, q, Ts):
@@ -69,18 +69,19 @@ def coulomb_friction(w, a11, a12, a22, limit):
             f1, f2 = -s1 * limit[0], -s2 * limit[1]
         elif s1:
             f1 = -s1 * limit[0]
-            f2 = -(w[1] + a12 * f1) / a22
+            f2 = numbers.ratio(-(w[1] + a12 * f1), a22)
         elif s2:
             f2 = -s2 * limit[1]
-            f1 = -(w[0] + a12 * f2) / a11
+            f1 = numbers.ratio(-(w[0] + a12 * f2), a11)
         else:
             det = a11 * a22 - a12 * a12
-            f1, f2 = (a12 * w[1] - a22 * w[0]) / det, (a12 * w[0] - a11 * w[1]) / det
+            f1 = numbers.ratio(a12 * w[1] - a22 * w[0], det)
+            f2 = numbers.ratio(a12 * w[0] - a11 * w[1], det)
         v1, v2 = w[0] + a11 * f1 + a12 * f2, w[1] + a12 * f1 + a22 * f2
         # violation of the case: a resting joint beyond its limit, a sliding one reversed
         wrong = max(
-            -s1 * v1 / a11 if s1 else abs(f1) - limit[0],
-            -s2 * v2 / a22 if s2 else abs(f2) - limit[1],
+            numbers.ratio(-s1 * v1, a11) if s1 else abs(f1) - limit[0],
+            numbers.ratio(-s2 * v2, a22) if s2 else abs(f2) - limit[1],
         )
         if wrong < least:
             best1, best2, least = f1, f2, wrong
@@ -101,7 +102,7 @@ def passivity_controller(energy, f, v, Ts, W):
 
     energy: that the clay has taken [J]; f: requested force [N]; W: mobility of the handle [1/kg].
     """
-    most, lack = v / (Ts * W), min(energy, 0.0)
+    most, lack = numbers.ratio(v, Ts * W), min(energy, 0.0)
     left = v * v + 2.0 * W * lack
     if lack and left <= 0.0:
         return most

@@ -90,12 +90,14 @@ class TaskEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
         Raises:
             ParameterError: the action has another shape, or is not of finite real numbers.
-            RuntimeError: the environment was not reset.
+            RuntimeError: the environment was not reset, or not after a step that was interrupted.
         """
         if not self._live:
             raise RuntimeError("reset the environment before its first step")
         numbers = action_of("action", action, self._shape)
+        self._live = False  # a step that is interrupted has no end from which to go on
         observation, reward, ended, info = self._episodes.step(numbers.tolist())
+        self._live = True
         if self.render_mode is not None:
             self._show()
         return observation, reward, ended, False, self._episodes.truth | info

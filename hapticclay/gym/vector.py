@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 import gymnasium
@@ -70,6 +71,7 @@ class TaskVectorEnv(VectorEnv):
         self._seeds: list[int] = []
         self._count = np.zeros(self.num_envs, np.int64)
         self._over = np.ones(self.num_envs, bool)
+        self._is_amid = False  # a call, or one was interrupted: copies differ in their period
         self._pictures: list[Any] = []
 
     @property
@@ -115,7 +117,8 @@ class TaskVectorEnv(VectorEnv):
         for i in np.flatnonzero(mask).tolist():
             if seeds[i] is not None:
                 self._generators[i], self._seeds[i] = seeding.np_random(seeds[i])
-        self._begin(mask, fixed)
+        with self._whole():
+            self._begin(mask, fixed)
         return self._episodes.observe(), _masked(self._episodes.truth, mask)
 
     def _options(self, given: Any) -> tuple[list[Truth], np.ndarray]:
@@ -142,8 +145,9 @@ class TaskVectorEnv(VectorEnv):
             raise ParameterError("reset_mask", given, bound) from None
         if mask.shape != (n,) or mask.dtype != bool or not mask.any():
             raise ParameterError("reset_mask", given, bound)
-        if not self._episodes.begun and not mask.all():
-            raise ParameterError("reset_mask", given, "must be True for all at the first reset")
+        if (self._is_amid or not self._episodes.begun) and not mask.all():
+            bound = "must be True for all at the first reset, and after an interrupted call"
+            raise ParameterError("reset_mask", given, bound)
         return mask
 
     def _begin(self, mask: np.ndarray, fixed: Sequence[Truth] | None = None) -> None:
@@ -167,14 +171,21 @@ class TaskVectorEnv(VectorEnv):
 
         Raises:
             ParameterError: the actions have another shape, or are not of finite real numbers.
-            RuntimeError: there was no reset, or an episode is over with autoreset "DISABLED".
+            RuntimeError: there was no reset, or not after an interrupted call; or an episode is
+                over with autoreset "DISABLED".
         """
         numbers = action_of("actions", actions, (self.num_envs, len(self.task.actions)))
         live = ~self._over
-        if not self._episodes.begun:
+        if self._is_amid or not self._episodes.begun:
             raise RuntimeError("reset the environments before their first step")
         if self.autoreset_mode is AutoresetMode.DISABLED and not live.all():
             raise RuntimeError("an episode is over: reset its copy before the next step")
+        with self._whole():
+            return self._step(numbers, live)
+
+    def _step(
+        self, numbers: np.ndarray, live: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         found = self._episodes.step(numbers.T, live)
         self._count += live
         ended = found.ended & live
@@ -190,6 +201,17 @@ class TaskVectorEnv(VectorEnv):
         everywhere = np.ones(self.num_envs, bool)
         infos = _masked(self._episodes.truth, everywhere) | _masked(found.info, live & ~again)
         return observations, np.where(live, found.reward, 0.0), ended, cut_off, infos | final
+
+    @contextlib.contextmanager
+    def _whole(self) -> Iterator[None]:
+        """Notes where Ctrl-C, but not an error, ended a call."""
+        self._is_amid = True
+        try:
+            yield
+        except Exception:
+            self._is_amid = False
+            raise
+        self._is_amid = False
 
     def _final(self, found: Period, over: np.ndarray) -> dict[str, Any]:
         """Observations and infos of the episodes that are over, as Gymnasium hands them out."""

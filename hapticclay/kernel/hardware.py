@@ -50,8 +50,8 @@ def converted(m, f):
 
 
 def encoded(m, i, q):
-    """The angle of a joint as its encoder reads it [rad]."""
-    return law.encode(q, m.counts[i])
+    """The position of a joint as its encoder reads it."""
+    return law.encode(q, m.count[i])
 
 
 def differenced(m, s, q, w):

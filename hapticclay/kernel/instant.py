@@ -7,6 +7,7 @@ after" is the acceleration.
 import math
 
 from ..formulas import arm as arm_law
+from ..formulas import numbers
 from . import arm, hand, modes, own_laws, servo, signals, viscous
 
 # ---- the loop ------------------------------------------------------------------------------------
@@ -123,11 +124,12 @@ def hold(m, s, k, out):
         t1, t2 = side1 * m.limit[0], side2 * m.limit[1]
         if side1 == 0.0 and side2 == 0.0:
             det = (1.0 - xx) * (1.0 - yy) - xy * yx
-            t1, t2 = ((1.0 - yy) * b1 + xy * b2) / det, ((1.0 - xx) * b2 + yx * b1) / det
+            t1 = numbers.ratio((1.0 - yy) * b1 + xy * b2, det)
+            t2 = numbers.ratio((1.0 - xx) * b2 + yx * b1, det)
         elif side1 == 0.0:
-            t1 = (b1 + xy * t2) / (1.0 - xx)
+            t1 = numbers.ratio(b1 + xy * t2, 1.0 - xx)
         elif side2 == 0.0:
-            t2 = (b2 + yx * t1) / (1.0 - yy)
+            t2 = numbers.ratio(b2 + yx * t1, 1.0 - yy)
         w1, w2 = b1 + xx * t1 + xy * t2, b2 + yx * t1 + yy * t2
         # excess of a free motor over its limit, or shortfall of the request at a limit
         wrong1 = m.limit[0] - side1 * w1 if side1 != 0.0 else abs(t1) - m.limit[0]

@@ -38,7 +38,7 @@ def put_matrix(m, k):
             a = e.joint_M[i * n + j]
             if i == j:
                 a += H * k.R * m.damper[i]
-            if m.closed:
+            if m.computed:
                 a += H * k.R * e.joint_D[i * n + j]
             px, py, qx, qy = e.joint_J[i], e.joint_J[n + i], e.joint_J[j], e.joint_J[n + j]
             a += H * (px * (x.d * qx + k.dxy * qy) + py * (y.d * qy + k.dxy * qx))

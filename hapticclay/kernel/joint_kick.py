@@ -26,6 +26,7 @@ def put_momentum(m, s, k):
             - e.joint_bias[i]
             + m.pull[i]
             - m.spring[i] * s.q[i]
+            + joints.drag(m, i)
             - k.L * joints.damping(m, k.o, i)
         )
         for j in range(n):

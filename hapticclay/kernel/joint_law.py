@@ -46,7 +46,7 @@ def measure_rates(m, s):
 def see_pose(m, s):
     """The arm at the measured angles: place, Jacobian of the handle, torques that hold the arm."""
     e, n = m.engine, m.joints
-    if m.closed:
+    if m.computed:
         for i in range(n):
             e.pose[i] = s.angles[i]
         e.at_scratch(e.pose)

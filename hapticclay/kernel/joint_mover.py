@@ -41,17 +41,18 @@ class JointMover(Mover):
         self.places["scratch_handle"] = getattr(self.scratch, place)[self.site]
         self.places["scratch_q"] = self.scratch.qpos
         self.pivots = np.zeros(len(arm.names), dtype=np.int64)
-        self.closed: Any = (None, None, None)
-        if mechanism.following:
-            self.close(scenario)
+        self.computed: Any = (None, None, None)
+        if mechanism.is_computed:
+            self.compute(scenario)
 
-    def close(self, scenario: Scenario) -> None:
-        """Functions that project the constraints of a closed chain out."""
-        from .closed_chain import ClosedChain  # imported only for one
+    def compute(self, scenario: Scenario) -> None:
+        """Functions that compute the terms of a closed chain, or of laws that are not linear."""
+        from .computed_terms import ComputedTerms  # imported only for one
 
-        chain = ClosedChain(scenario, self.places)
-        self.places["handle"], self.places["scratch_handle"] = chain.handle, chain.scratch_handle
-        self.closed = chain.at_pose, chain.at_rates, chain.at_scratch
+        terms = ComputedTerms(scenario, self.places)
+        self.places["handle"], self.places["scratch_handle"] = terms.handle, terms.scratch_handle
+        self.computed = terms.at_pose, terms.at_rates, terms.at_scratch
+        self.failed, self.calls_python = terms.failed, True
 
     def build(self, scenario: Scenario) -> Any:
         return scenario.file_arm.mechanism.runnable()
@@ -78,7 +79,7 @@ class JointMover(Mover):
 
         made.bias, made.jacobian, made.jacobian_rate = bias, jacobian, jacobian_rate
         made.full = lambda model, data, out: mujoco.mj_fullM(model, data, whole)
-        made.at_pose, made.at_rates, made.at_scratch = self.closed
+        made.at_pose, made.at_rates, made.at_scratch = self.computed
 
     def fill_row(self, made: Any) -> None:
         super().fill_row(made)
@@ -86,7 +87,7 @@ class JointMover(Mover):
         made["scratch"] = addresses_of(self.model, self.scratch)[1]
         made["site"], made["body"], made["freedoms"] = self.site, self.body, self.model.nv
         made["pivots"] = self.pivots.ctypes.data
-        self.called = [CALLED(x) for x in self.closed if x is not None]
+        self.called = [CALLED(x) for x in self.computed if x is not None]
         for name, x in zip(("at_pose", "at_rates", "at_scratch"), self.called, strict=False):
             made[name] = ctypes.cast(x, ctypes.c_void_p).value
 
@@ -94,3 +95,4 @@ class JointMover(Mover):
         for data in (self.data, self.scratch):
             mujoco.mj_resetData(self.model, data)
             data.qpos[:] = self.home
+        self.failed.clear()

@@ -19,7 +19,7 @@ def put_arm(m: Any, arrays: dict[str, np.ndarray], s: Scenario) -> None:
     arm: Any = s.file_arm
     n, axes = len(arm.names), ["xyz".index(c) for c in arm.axes]
     m.general, m.joints, m.axes = 1, n, len(axes)
-    m.closed = int(bool(arm.mechanism.following))
+    m.computed = int(arm.mechanism.is_computed)
     arrays["dof"] = np.array(arm.mechanism.dofs, dtype=np.int64)
     m.row[: len(axes)] = axes
     m.at[: len(axes)] = arm.handle()[axes].tolist()
@@ -71,7 +71,8 @@ def scratch(n: int, freedoms: int) -> dict[str, np.ndarray]:
     sizes = {
         "M": freedoms * freedoms, "J": 3 * freedoms, "Jdot": 3 * freedoms,
         "scratch_forces": freedoms, "scratch_J": 3 * n, "scratch_bias": n, "joint_M": n * n,
-        "joint_J": 3 * n, "joint_bias": n, "joint_D": n * n, "joint_c": 3, "pose": 2 * n,
-        "lower": n * n, "Y": 3 * n, "free": n, "moment": n, "matrix": 2 * n * n + 2 * n,
+        "joint_J": 3 * n, "joint_bias": n, "joint_D": n * n, "joint_F": n, "joint_c": 3,
+        "pose": 2 * n, "lower": n * n, "Y": 3 * n, "free": n, "moment": n,
+        "matrix": 2 * n * n + 2 * n,
     }  # fmt: skip
     return {name: np.zeros(size) for name, size in sizes.items()}

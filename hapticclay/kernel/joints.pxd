@@ -19,6 +19,7 @@ cdef void from_event(Model m, State s, Kick k) noexcept nogil
 cdef void at_event(Model m, Kick k) noexcept nogil
 @cython.locals(x=cython.double)
 cdef double damping(Model m, double *w, long i) noexcept nogil
+cdef double drag(Model m, long i) noexcept nogil
 cdef void factor_inertia(Model m, double h) noexcept nogil
 @cython.locals(x=cython.double)
 cdef void factor(double *A, long at, long n) noexcept nogil

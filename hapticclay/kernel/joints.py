@@ -5,8 +5,7 @@ Only hand and muscle act along z, which is eliminated: in the plane all laws of 
 of another mobility (docs/equations.md).
 """
 
-import math
-
+from ..formulas import numbers
 from . import dynamics, hand
 
 
@@ -16,7 +15,7 @@ def sense(m, s):
         return
     s.sensed, e, n = 1, m.engine, m.joints
     e.factored = -1.0
-    if m.closed:
+    if m.computed:
         for i in range(n):
             e.pose[i] = s.q[i]
         e.at_pose(e.pose)
@@ -47,10 +46,11 @@ def turn(m, k, rates, g, h):
     As in the closed form of sampled control, a hand with a mass is so first-order in the step.
     """
     e, n = m.engine, m.joints
-    if m.closed:
+    if m.computed:
         for i in range(n):
             e.pose[n + i] = rates[i] + h * g[i]
         e.at_rates(e.pose)
+        e.factored = -1.0  # its dampers may depend on the rates
         for i in range(m.axes):
             k.axis[i].c = e.joint_c[i]
         return
@@ -111,7 +111,7 @@ def place_after(m, s, after):
     if not m.places:
         return s.k.x.p, s.k.y.p
     e = m.engine
-    if m.closed:
+    if m.computed:
         for i in range(m.joints):
             e.pose[i] = s.q[i] + after * s.k.w[i]
         e.at_scratch(e.pose)
@@ -161,10 +161,15 @@ def at_event(m, k):
 def damping(m, w, i):
     """Torque of the dampers on a joint, at rates of all [N.m]."""
     e, x = m.engine, m.damper[i] * w[i]
-    if m.closed:
+    if m.computed:
         for j in range(m.joints):
             x += e.joint_D[i * m.joints + j] * w[j]
     return x
+
+
+def drag(m, i):
+    """Torque of a fluid on a joint, beside what the dampers have of it [N.m]."""
+    return m.engine.joint_F[i] if m.computed else 0.0
 
 
 def factor_inertia(m, h):
@@ -176,7 +181,7 @@ def factor_inertia(m, h):
     for i in range(n):
         for j in range(i + 1):
             e.lower[i * n + j] = e.joint_M[i * n + j]
-            if m.closed:
+            if m.computed:
                 e.lower[i * n + j] += h * e.joint_D[i * n + j]
         e.lower[i * n + i] += h * m.damper[i]
     factor(e.lower, 0, n)
@@ -190,7 +195,7 @@ def factor(A, at, n):
             x = A[p + j]
             for r in range(j):
                 x -= A[p + r] * A[q + r]
-            A[p + j] = 1.0 / math.sqrt(x) if i == j else x * A[q + j]
+            A[p + j] = numbers.ratio(1.0, numbers.root(x)) if i == j else x * A[q + j]
 
 
 def solve(L, of, x, at, n):
@@ -226,7 +231,7 @@ def mobility(m, i, j):
 def eliminate(k, d):
     """Eliminates z, where the law is n u = a + W (f - d u), from the law of the plane."""
     x, y, z = k.x, k.y, k.z
-    per = d / (z.n + k.Wzz * d)
+    per = numbers.ratio(d, z.n + k.Wzz * d)
     force = z.f - per * (z.a + k.Wzz * z.f)
     x.a, y.a = x.a + k.Wxz * force, y.a + k.Wyz * force
     x.rest, y.rest = x.rest + k.Wxz * force, y.rest + k.Wyz * force
@@ -240,7 +245,7 @@ def answer(m, k):
     if m.axes > 2:
         z = k.z
         total = z.a + k.Wxz * k.x.net + k.Wyz * k.y.net + k.Wzz * z.f
-        z.u = total / (z.n + k.Wzz * z.d)
+        z.u = numbers.ratio(total, z.n + k.Wzz * z.d)
         z.net, z.fe = z.f - z.d * z.u, 0.0
     for j in range(n):
         x = 0.0
@@ -276,7 +281,7 @@ def prepare_sensor(m, s, k):
     turn(m, k, s.e.w, s.e.w, 0.0)
     for i in range(n):
         torque = s.e.tau[i] + s.e.slip[i] - e.joint_bias[i] + m.pull[i] - m.spring[i] * s.q[i]
-        e.free[i] = torque - damping(m, s.e.w, i)
+        e.free[i] = torque - damping(m, s.e.w, i) + drag(m, i)
     factor_inertia(m, 0.0)
     solve(e.lower, 0, e.free, 0, n)
     put_mobility(m, k)
@@ -304,9 +309,9 @@ def force_along_z(m, k, fx, fy, ax, ay):
 
 
 def step(m, s, k, h):
-    """Moves the arm to the rates of a kick: the engine does, but for a closed chain."""
+    """Moves the arm to the rates of a kick: the engine does, where its terms are used."""
     s.sensed, n = 0, m.joints
-    if m.closed:
+    if m.computed:
         for j in range(n):
             s.q[j], s.w[j], s.g[j] = s.q[j] + h * k.w[j], k.w[j], k.g[j]
         return

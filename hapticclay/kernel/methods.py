@@ -55,7 +55,7 @@ def keep(m, s, after, shows):
             march.write(m, s)
             s.row += 1
     else:
-        rows.keep(m, s, s.k, after, shows)
+        rows.keep(m, s, s.k, after, shows, is_sound(m, s))  # without works that no motion has
 
 
 def take(m, s, after):

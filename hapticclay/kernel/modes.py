@@ -3,7 +3,7 @@
 import math
 
 from ..formulas import arm as arm_law
-from ..formulas import controller, flow
+from ..formulas import controller, flow, numbers
 from . import arm, servo, viscous
 
 STABLE_STEP = 0.5  # fastest rate times step up to which an explicit step is trusted
@@ -39,7 +39,7 @@ def strength(s, i, speed):
 def steepness(s, i, speed):
     """How fast that force grows with the speed, n K v^(n - 1) [N.s/m]."""
     a = s.mode[i]
-    return a.Kn * a.n * speed ** (a.n - 1.0) if a.Kn > 0.0 and speed > 0.0 else 0.0
+    return a.Kn * a.n * numbers.power(speed, a.n - 1.0) if a.Kn > 0.0 and speed > 0.0 else 0.0
 
 
 def is_rough(s, i):
@@ -173,7 +173,7 @@ def holding(grip):
     """The force that cancels the acceleration, (x, y) [N]."""
     B, x, y = grip.B, grip.x.a, grip.y.a
     det = B[0] * B[3] - B[1] * B[2]
-    return (B[3] * x - B[1] * y) / det, (B[0] * y - B[2] * x) / det
+    return numbers.ratio(B[3] * x - B[1] * y, det), numbers.ratio(B[0] * y - B[2] * x, det)
 
 
 def remaining_acceleration(ax, ay, B, fx, fy):
@@ -186,9 +186,9 @@ def resist_axes(s, grip):
     x, y, B, sx, sy = grip.x, grip.y, grip.B, s.mode[0].mode, s.mode[1].mode
     x.f, y.f = sx * strength(s, 0, sx * x.v), sy * strength(s, 1, sy * y.v)
     if sx == 0.0:
-        x.f = (x.a - B[1] * y.f) / B[0]
+        x.f = numbers.ratio(x.a - B[1] * y.f, B[0])
     elif sy == 0.0:
-        y.f = (y.a - B[2] * x.f) / B[3]
+        y.f = numbers.ratio(y.a - B[2] * x.f, B[3])
     ax, ay = remaining_acceleration(x.a, y.a, B, x.f, y.f)
     return 0.0 if sx == 0.0 else ax, 0.0 if sy == 0.0 else ay
 
@@ -205,7 +205,9 @@ def resist_along(s, grip):
     gx, gy = remaining_acceleration(x.a, y.a, B, x.f, y.f)
     if slides:
         return gx, gy
-    off = (ex * gy - ey * gx) / turning(B, ex, ey)  # a transverse force keeps it on its path
+    off = numbers.ratio(
+        ex * gy - ey * gx, turning(B, ex, ey)
+    )  # a transverse force keeps it on its path
     ax, ay = remaining_acceleration(gx, gy, B, -off * ey, off * ex)
     size = ax * ex + ay * ey
     x.f, y.f = x.f - off * ey, y.f + off * ex
@@ -366,7 +368,7 @@ def is_nearly_at_rest(m, s, grip, i):
     j = 1 - i
     o, a = grip.axis[i], ay if i else ax
     # without it, the other axis as it is
-    need = abs(o.a - grip.B[2 * i + j] * grip.axis[j].f) / grip.B[3 * i]
+    need = numbers.ratio(abs(o.a - grip.B[2 * i + j] * grip.axis[j].f), grip.B[3 * i])
     return nearly_rests(m, s, i, abs(o.v), o.v * a, abs(a), need)
 
 
@@ -415,7 +417,7 @@ def turned_in(s, grip, speed, ex, ey):
         turn = max(-0.5, min(turn, 0.5))
         ex, ey = ex - turn * ey, ey + turn * ex
         size = math.sqrt(ex * ex + ey * ey)
-        ex, ey = ex / size, ey / size
+        ex, ey = numbers.ratio(ex, size), numbers.ratio(ey, size)
         if abs(turn) < 1e-15:
             break
     return ex, ey

@@ -105,11 +105,17 @@ _checked: set[int] = set()
 
 
 class Mover:
-    """An arm of the engine: its model and data, and the records by which rows call it."""
+    """An arm of the engine: its model and data, and the records by which rows call it.
+
+    Attributes:
+        calls_python: whether steps call functions of Python.
+        failed: what those raised, which compiled code drops.
+    """
 
     calls: ClassVar = CALLS
 
     def __init__(self, scenario: Scenario):
+        self.calls_python, self.failed = False, list[BaseException]()
         self.model = self.build(scenario)
         self.data = mujoco.MjData(self.model)
         self.out = np.zeros(2)

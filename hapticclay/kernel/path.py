@@ -229,7 +229,7 @@ def may_step_whole(m, s):
 
 def has_room(m, s, room):
     """Whether a step may write its row, crossings and stops; between samples it has no row."""
-    fits = s.row < room or s.t != s.i * m.dt
+    fits = (s.row < room or s.t != s.i * m.dt) and not m.halts
     return fits and s.crossing < m.max_crossings and s.stopped < m.max_stops
 
 

@@ -84,9 +84,11 @@ class Engine:
     joint_M: floats  # by the joints: inertia, Jacobian of the handle, bias torques
     joint_J: floats
     joint_bias: floats
-    joint_D: floats  # of a closed chain: dampers of its followers, centripetal acceleration
-    joint_c: floats
-    pose: floats  # positions and rates given to the functions of a closed chain
+    # where Python computes them: dampers beside the joints' own, torques of a fluid beside these,
+    joint_D: floats
+    joint_F: floats
+    joint_c: floats  # centripetal acceleration
+    pose: floats  # and the positions and rates for which
     at_pose: own_control
     at_rates: own_control
     at_scratch: own_control
@@ -158,7 +160,7 @@ class Model:
     joints: whole
     axes: whole  # of the handle
     general: whole  # the arm is on the engine's terms, not in closed form
-    closed: whole  # constraints of its chain are projected out, by functions in Python
+    computed: whole  # Python computes its terms: its chain is closed, or some are not linear
     dof: wholes  # degree of freedom of each joint
     row: whole[3]  # axis of the world of each axis
     at: real[3]  # place of p = 0 [m]
@@ -233,13 +235,14 @@ class Model:
     Ts: real  # [s]
     uneven: whole  # events may lie between the steps
     drops_events: whole  # crossings and stops are overwritten, since nothing reads them
+    halts: whole  # no further step is made: another thread may say so while steps are made
     records_clay_force: whole  # fe is recorded, since it is not b v
     records_held_force: whole  # as the motors hold it
     chance: whole
     chances: floats  # four numbers a sample
     chance_first: whole
     encoder: whole  # joints have encoders
-    counts: whole[12]  # per turn
+    count: real[12]  # step of their readings [rad, m of slides], 0 for exact ones
     window: whole  # samples of the difference, 0 for exact rates
     cutoff: real  # of the low-pass after it [Hz], 0 for none
     angles: floats  # ring of past angles

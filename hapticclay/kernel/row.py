@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import math
+import signal
+import threading
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -17,6 +19,8 @@ from .mover import Mover
 
 CHUNK = 4096  # rows between two looks at a run (progress, Ctrl-C, outcome); fits the cache
 CROSSINGS, STOPS = 64, 4 * CHUNK  # between two looks: an axis stops and starts again in each step
+# of one step: a handle thrown beyond many borders crosses each of them once, and then one more
+CROSSED_MORE = 3
 
 SHOWN = rows.ROW + 2  # numbers of a sample shown: its row, and the force of the clay [N]
 
@@ -37,8 +41,10 @@ class Buffers:
         self.stops, self.rendered = np.empty((1, 3)), np.empty((1, 3))
         self.extra = np.empty((1, 0))
 
-    def make_room(self, m: Any) -> None:
-        """Makes room for what a scene records in addition to its rows."""
+    def make_room(self, m: Any, borders: int) -> None:
+        """Makes room for what a scene with so many borders records in addition to its rows."""
+        if len(self.crossings) < CROSSINGS + borders:
+            self.crossings = np.empty((CROSSINGS + borders, 4))
         if (m.flow or m.modal) and len(self.stops) < STOPS:
             self.stops = np.empty((STOPS, 3))
         if m.records_clay_force and len(self.rendered) <= CHUNK:
@@ -65,11 +71,12 @@ class Row:
     """
 
     engine = "python"
+    drops_events = 0  # crossings and stops are overwritten, since nothing reads them
     m: Any
     s: Any
 
     def __init__(self, scenario: Scenario, mover: Mover, buffers: Buffers):
-        self.s, self.spare = records.State(), records.State()
+        self.s, self.spare, self._is_amid = records.State(), records.State(), False
         self._start(scenario, mover, buffers)
 
     def _start(self, scenario: Scenario, mover: Mover, buffers: Buffers) -> None:
@@ -84,9 +91,11 @@ class Row:
         """Takes a scene; the state stays."""
         made = scene.compile_scene(scenario, controller)
         self.arrays, self.caller, self.laws = made.arrays, made.caller, made.laws
-        self.buffers.make_room(made.m)
-        made.m.max_crossings = CROSSINGS - 3
+        borders = regions.border_count(made.arrays["table"])
+        self.buffers.make_room(made.m, borders)
+        made.m.max_crossings = len(self.buffers.crossings) - borders - CROSSED_MORE
         made.m.max_stops = max(len(self.buffers.stops) - 8, 1)
+        made.m.drops_events = self.drops_events
         self.names = [name for name in made.written if name in self.arrays]
         self.written = [self.arrays[name].reshape(-1) for name in self.names]
         self.written += [law.z for law in self.laws]
@@ -145,6 +154,29 @@ class Row:
             law.z[law.first :] = z[law.first :]
         self.go_on()
 
+    def drop_events(self, drops: bool) -> None:
+        """Says whether crossings and stops are dropped, in this scene and in later ones."""
+        self.drops_events = self.m.drops_events = int(drops)
+
+    def checkpoint(self) -> Any:
+        """The run in its scene, to return to from a change."""
+        return dict(vars(self)), self.state(), self.model()
+
+    def model(self) -> Any:
+        """The numbers of the scene that a change overwrites."""
+        return None
+
+    def change_back(self, before: Any) -> None:
+        """Returns to a checkpoint from a change that was interrupted anywhere."""
+        attributes, state, model = before
+        vars(self).update(attributes)
+        self.put_model(model)
+        self.put_state(state)
+        self.replace(self.buffers.arrays)  # which the change may have made larger
+
+    def put_model(self, model: Any) -> None:
+        """Puts the numbers of a scene back."""
+
     def go_on(self) -> None:
         """Continues in a changed scene."""
         begin.change(self.m, self.s)
@@ -185,7 +217,18 @@ class Row:
         return self.buffers.extra[n] if self.m.general else self.buffers.extra[0, :0]
 
     def _step(self, make: Any, *arguments: Any) -> None:
-        """Makes steps, where the step of an exactly straight arm raises."""
+        """Makes steps, where the step of an exactly straight arm raises.
+
+        Between two lines of a step the state is none of the run. So Ctrl-C waits for its end, but
+        where a function of the user is called.
+        """
+        if self.is_called:
+            self._step_through(make, *arguments)
+        else:
+            uninterrupted(self._step_through, make, *arguments)
+
+    def _step_through(self, make: Any, *arguments: Any) -> None:
+        self._is_amid = True
         try:
             make(*arguments)
         except ArithmeticError:
@@ -194,16 +237,24 @@ class Row:
             if np.isfinite(self.mover.data.qpos).all() and np.isfinite(self.mover.data.qvel).all():
                 raise
             self.s.code = path.NOT_FINITE
+        self._is_amid = False
+
+    @property
+    def is_torn(self) -> bool:
+        """Whether a step was interrupted within, so that the state is none of the run."""
+        errors = [*self.failed, *self.mover.failed]
+        errors += [] if self.caller is None else [self.caller.error]
+        return self._is_amid or any(x and not isinstance(x, Exception) for x in errors)
 
     @property
     def is_called(self) -> bool:
-        """Whether steps call functions of the user, which may fail."""
-        return self.caller is not None or bool(self.laws)
+        """Whether steps call functions of Python, which may fail."""
+        return self.caller is not None or bool(self.laws) or self.mover.calls_python
 
     def check(self) -> None:
-        """Raises what functions of the user raised."""
-        if self.failed:
-            raise self.failed[0]
+        """Raises what functions of the user raised, and Ctrl-C that came within one of Python."""
+        for error in (*self.failed, *self.mover.failed):
+            raise error
         if self.caller is not None:
             self.caller.check()
 
@@ -237,6 +288,11 @@ class Row:
         self.put_state(saved.state)
         for x, before in zip(self.written, saved.arrays, strict=True):
             x[:] = before
+        self.failed.clear()
+        self.mover.failed.clear()
+        if self.caller is not None:
+            self.caller.error = None
+        self._is_amid = False
 
 
 class NativeRow(Row):
@@ -246,6 +302,7 @@ class NativeRow(Row):
 
     def __init__(self, scenario: Scenario, mover: Mover, buffers: Buffers, at: Any = None):
         self.machine, self.spare = native.machine(), one(records.State)
+        self._is_amid = False
         self.models, self.states = at or (one(records.Model), one(records.State))
         self.s = layout.view_of(records.State, self.states)
         self.addresses = self.models.ctypes.data, self.states.ctypes.data
@@ -312,6 +369,12 @@ class NativeRow(Row):
     def put_state(self, state: np.ndarray) -> None:
         bytes_of(self.states)[:] = state
 
+    def model(self) -> Any:
+        return bytes_of(self.models).copy()
+
+    def put_model(self, model: Any) -> None:
+        bytes_of(self.models)[:] = model
+
 
 ROWS: dict[str, type[Row]] = {"python": Row, "native": NativeRow}
 
@@ -324,6 +387,28 @@ def one(record: Any) -> np.ndarray:
 def bytes_of(rows: np.ndarray) -> np.ndarray:
     """The bytes of rows: NumPy would copy records field by field, which takes 0.1 ms."""
     return rows.view(np.uint8)
+
+
+def uninterrupted(call: Any, *arguments: Any) -> None:
+    """Makes a call that Ctrl-C does not end: it takes effect afterwards, a second one at once."""
+    handler = signal.getsignal(signal.SIGINT)
+    if not callable(handler) or threading.current_thread() is not threading.main_thread():
+        call(*arguments)
+        return
+    came: list[Any] = []
+
+    def note(*signal_and_frame: Any) -> None:
+        came.append(signal_and_frame)
+        if len(came) > 1:
+            handler(*signal_and_frame)
+
+    try:
+        signal.signal(signal.SIGINT, note)
+        call(*arguments)
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    if came:
+        handler(*came[0])
 
 
 PLACE, FLOAT = ctypes.c_void_p, ctypes.c_double

@@ -18,4 +18,4 @@ cdef void write(Model m, State s, Kick k, double after) noexcept nogil
 cdef void write_force(Model m, State s, Kick k, long end, double vx, double vy, double fx, double fy) noexcept nogil
 cdef void repeat(Model m, State s, Kick k, double after) noexcept nogil
 cdef (double, double, double, double) arrived(Model m, State s, double vx, double vy, double fx, double fy) noexcept nogil
-cdef void keep(Model m, State s, Kick k, double after, bint shows) noexcept nogil
+cdef void keep(Model m, State s, Kick k, double after, bint shows, bint works) noexcept nogil

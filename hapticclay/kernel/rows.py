@@ -82,12 +82,14 @@ def arrived(m, s, vx, vy, fx, fy):
     return vx, vy, fx, fy
 
 
-def keep(m, s, k, after, shows):
+def keep(m, s, k, after, shows, works):
     """Keeps the results of a kick: its row, if now is a sample, and its works."""
     if shows:
         write(m, s, k, after)
         s.row += 1
+    if not works:
+        return
     if sampled.is_early(s, after):
-        ledger.add_work(m, s.work_at_event, s.work, k, s.e.w, s.next)
+        ledger.add_work(m, s.work_at_event, s.work, k, s.e.w, s.next, s.q)
     else:
-        ledger.add_work(m, s.work, s.work, k, s.w, s.now)
+        ledger.add_work(m, s.work, s.work, k, s.w, s.now, s.q)

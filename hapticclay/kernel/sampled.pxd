@@ -44,7 +44,7 @@ cdef (double, double) reaction(Model m, State s, Kick k, double fx, double fy) n
 cdef void compute(Model m, State s, Kick k, double fx, double fy) noexcept nogil
 cdef double output(Model m, MachineAxis z, long i, double f) noexcept nogil
 @cython.locals(size=cython.double)
-cdef void call_own_controller(Model m, State s, double fx, double fy) noexcept nogil
+cdef void call_own_controller(Model m, State s, Kick k, double fx, double fy) noexcept nogil
 cdef void advance(Model m, State s, long i, double shift) noexcept nogil
 cdef void advance_form(Model m, long i, MachineAxis z, MachineAxis to, double shift) noexcept nogil
 cdef double form_row(double *c, long j, double *z, double y, double yrate, double start, double f) noexcept nogil

@@ -8,7 +8,7 @@ new torques.
 import math
 
 from ..formulas import arm as arm_law
-from ..formulas import compensator, controller
+from ..formulas import compensator, controller, numbers
 from . import (
     arm,
     friction,
@@ -122,7 +122,7 @@ def event(m, s, samples, now):
         across(m, s, e, 0.0)
         for i in range(m.axes):
             s.fh[i] = hand.force(m, e, i)
-        ledger.add_work(m, s.work, s.work_at_event, e, e.o, s.now)
+        ledger.add_work(m, s.work, s.work_at_event, e, e.o, s.now, s.q)
     else:
         rest(m, s, e)
         memory.copied(s.work_at_event, s.work)
@@ -190,7 +190,7 @@ def respond(m, s, k, fx, fy):
     if m.window > 0:
         hardware.differenced(m, s, q, w)
     if m.own:
-        call_own_controller(m, s, fx, fy)
+        call_own_controller(m, s, k, fx, fy)
     elif m.joint_law:
         joint_law.respond(m, s, k)
     else:
@@ -274,9 +274,9 @@ def acceleration(m, s, k, fx, fy):
     gx, gy = ax + k.Wxx * fx + k.Wxy * fy, ay + k.Wxy * fx + k.Wyy * fy
     a, b = 1.0 + k.Wxx * m.x.mass, k.Wxy * m.y.mass
     c, d = k.Wxy * m.x.mass, 1.0 + k.Wyy * m.y.mass
-    r = c / a
-    uy = (gy - r * gx) / (d - r * b)
-    return (gx - b * uy) / a, uy
+    r = numbers.ratio(c, a)
+    uy = numbers.ratio(gy - r * gx, d - r * b)
+    return numbers.ratio(gx - b * uy, a), uy
 
 
 def reaction(m, s, k, fx, fy):
@@ -340,8 +340,11 @@ def output(m, z, i, f):
     return out + c[j] * a[0] + c[j + 1] * a[1] + c[j + 2] * a[2] + c[j + 3] * a[3]
 
 
-def call_own_controller(m, s, fx, fy):
-    """The user's own controller: a function of a buffer, which it fills with torques and state."""
+def call_own_controller(m, s, k, fx, fy):
+    """The user's own controller: a function of a buffer, which it fills with torques and state.
+
+    The host adds what holds the arm against gravity, where it does.
+    """
     b, z, n = m.buffer, s.next, m.joints
     b[0], b[2 * n + 1], b[2 * n + 2] = s.t, fx, fy
     if m.axes > 2:
@@ -355,13 +358,16 @@ def call_own_controller(m, s, fx, fy):
     size = 0.0
     for i in range(n):
         size += abs(b[tau + i])
-        s.angles[i] = b[tau + i]
+        k.tau[i] = b[tau + i]
     if not size < math.inf:
         s.code = NOT_FINITE
         for i in range(n):
             z.tau[i] = b[tau + i]
     else:
-        hardware.drive(m, s, s.angles)
+        if m.feeds_gravity:
+            joint_law.see_pose(m, s)
+            joint_law.feed_gravity(m, k)
+        hardware.drive(m, s, k.tau)
     z.x.force = z.y.force = 0.0
 
 

@@ -17,6 +17,7 @@ from ..model import compensator, controller, regions
 from ..model import hardware as devices
 from ..model.controller import Servo
 from ..model.sampled_controller import Controller, LawCaller
+from ..scene.joint_numbers import turning
 from ..scene.scenario import Scenario
 from . import hardware, methods, modes, pace, records, sampled, user_laws
 from .march import GROWTH_BLOCK
@@ -24,6 +25,7 @@ from .march import GROWTH_BLOCK
 QUEUE = 4  # rows of the queue of torques in addition to the whole samples of their delay
 STIFF, HITTING = 1.0, 0.02  # see `hardness`
 NOISE_AHEAD = 16384  # control samples whose random effects are drawn at once
+NEVER = 1 << 62  # sample from which no random effects are drawn
 
 
 class Compiled(NamedTuple):
@@ -248,8 +250,8 @@ def put_memory(m: Any, s: Scenario) -> None:
 
 def put_hardware(m: Any, arrays: dict[str, np.ndarray], s: Scenario, io: Any) -> None:
     """The hardware between computer and arm."""
-    counts = io.encoder if isinstance(io.encoder, tuple) else (io.encoder or 0,) * m.joints
-    m.encoder, m.counts[: m.joints] = int(any(counts)), map(int, counts)
+    counts = io.count_sizes(turning(s))
+    m.encoder, m.count[: m.joints] = int(any(counts)), counts
     if io.jitter > 0.0 or io.dropout_probability > 0.0 or io.force_noise > 0.0:
         n = min(int(s.t_max / m.Ts), NOISE_AHEAD) + 8
         m.chance, arrays["chances"] = 1, devices.SampleNoise(io).table(0, n).ravel()

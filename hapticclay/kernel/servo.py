@@ -1,6 +1,6 @@
 """What drives the handle in a kick: the law of compensator and servo, or given torques."""
 
-from ..formulas import compensator, controller
+from ..formulas import compensator, controller, numbers
 from . import arm, memory
 
 # ---- the compensator -----------------------------------------------------------------------------
@@ -130,9 +130,9 @@ def solve(k):
     gx, gy = x.a + xx * x.f + xy * y.f, y.a + xy * x.f + yy * y.f
     a, b = x.n + xx * x.d + xy * z, xx * z + xy * y.d
     c, e = xy * x.d + yy * z, y.n + xy * z + yy * y.d
-    r = c / a
-    uy = (gy - r * gx) / (e - r * b)
-    return (gx - b * uy) / a, uy
+    r = numbers.ratio(c, a)
+    uy = numbers.ratio(gy - r * gx, e - r * b)
+    return numbers.ratio(gx - b * uy, a), uy
 
 
 # ---- at a sample or an instant -------------------------------------------------------------------

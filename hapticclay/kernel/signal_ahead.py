@@ -35,6 +35,7 @@ class Drives:
         i = row.s.i
         if row.arrays is self._arrays and self._first <= i and i + n <= self._end:
             return n
+        self._end = 0  # none, where this is interrupted
         made = self._prepared(row, n)
         self._arrays, self._first, self._end = row.arrays, i, i + made
         return min(n, made)

@@ -2,7 +2,7 @@
 
 import math
 
-from ..formulas import controller, regions
+from ..formulas import controller, numbers, regions
 from ..formulas import flow as law
 from . import groove, viscous
 
@@ -108,7 +108,10 @@ def resist(m, s, k):
     if k.still > 0.0:  # the force that does it
         qx, qy = viscous.along(m, x.u, y.u)
         det = B[0] * B[3] - B[1] * B[2]
-        rx, ry = (B[3] * qx - B[1] * qy) / det, (B[0] * qy - B[2] * qx) / det
+        rx, ry = (
+            numbers.ratio(B[3] * qx - B[1] * qy, det),
+            numbers.ratio(B[0] * qy - B[2] * qx, det),
+        )
         x.u = y.u = 0.0
     else:
         ux, uy = viscous.across(m, wx + backx, wy + backy)

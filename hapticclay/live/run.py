@@ -34,28 +34,33 @@ class Pull:
         self.spring, self.force = np.array(spring), (0.0, 0.0)
         self.damper_force = 0.0, 0.0
         self.knots = [(0.0, *p)]
-        self._from, self._rate, self._since = np.array(p), np.zeros(2), 0.0
+        self._motion = np.array(p), np.zeros(2), 0.0  # place [m], velocity [m/s], since [s]
 
-    def glide(self, t: float, to: tuple[float, float], span: float) -> None:
-        """Moves the point to a place at constant speed."""
+    def gliding(self, t: float, to: tuple[float, float], span: float) -> tuple[Any, ...]:
+        """Motion to a place at constant speed, and its knots, to `put`."""
         now = self.at(t)
-        self._from, self._rate, self._since = now, (np.array(to) - now) / span, t
-        self.knots += [(t, *now), (t + span, *to)]
+        motion = now, (np.array(to) - now) / span, t
+        return motion, len(self.knots), [(t, *now), (t + span, *to)]
 
-    def jump(self, t: float, p: tuple[float, float], v: tuple[float, float]) -> None:
-        """Releases the handle: the point moves with it."""
-        self._from, self._rate, self._since = np.array(p), np.array(v), t
-        self.knots.append((t, *p))
+    def released(self, t: float, p: tuple[float, float], v: tuple[float, float]) -> tuple[Any, ...]:
+        """Motion with the handle, which is released, and its knots, to `put`."""
+        return (np.array(p), np.array(v), t), len(self.knots), [(t, *p)]
+
+    def put(self, motion: Any, n: int, knots: list[tuple[float, float, float]]) -> None:
+        """Moves the point from now on; its path has the first n knots and these."""
+        self._motion, self.knots[n:] = motion, knots
 
     def at(self, t: Any) -> np.ndarray:
         """Returns the position of the point [m], shape (2,) or (n, 2)."""
-        return self._from + (np.asarray(t) - self._since)[..., None] * self._rate
+        p, v, since = self._motion
+        return p + (np.asarray(t) - since)[..., None] * v
 
     def steady(self) -> tuple[float, ...]:
         """The force as parts.Push.steady: since [s], (x, y) [N], its rate [N/s]."""
-        (fx, fy), (px, py) = self.force, (self.spring * self._from).tolist()
+        p, v, since = self._motion
+        (fx, fy), (px, py) = self.force, (self.spring * p).tolist()
         cx, cy = self.damper_force
-        return float(self._since), fx + cx + px, fy + cy + py, *(self.spring * self._rate).tolist()
+        return float(since), fx + cx + px, fy + cy + py, *(self.spring * v).tolist()
 
     def mean(self, t: Any, h: Any) -> np.ndarray:
         """Returns the mean force over [t - h, t + h] [N], as `Signal.mean`."""
@@ -73,24 +78,23 @@ class LiveRun(Run):
         x, y = scenario.hands
         self.pull = Pull((x.spring, y.spring), scenario.start)
         # a person moves it: growing motion is no instability while the gain is below its limit
-        self.watch = monitor.StabilityMonitor(replace(scenario, muscle=Multisine()))
+        self.watch = monitor.StabilityMonitor(self.watched(scenario))
         self.keeping = True
         self.gains = [(0, scenario.gain)]
 
     def slice(self, steps: int) -> None:
         """Makes the given number of steps, unless the run ends."""
+        self.mend()
         self.pause = min(self.i + steps, self.row.m.last)
+        if self.gains[-1][1] != self.scenario.gain:
+            self.gains.append((self.i, self.scenario.gain))
         self.push_evenly(self.pull.steady())
         self.go(None)
         if self.filled:
             self.flush()
 
-    def change(self, scenario: Scenario) -> None:
-        """Continues with another gain, or with other damping between the same borders."""
-        if scenario.gain != self.scenario.gain:
-            self.gains.append((self.i, scenario.gain))
-        super().change(scenario)
-        self.watch.scenario = replace(scenario, muscle=Multisine())
+    def watched(self, scenario: Scenario) -> Scenario:
+        return replace(scenario, muscle=Multisine())
 
     @property
     def held(self) -> tuple[bool, bool]:

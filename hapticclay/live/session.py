@@ -10,12 +10,12 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
 from ..arguments import checked
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..scene.scenario import Scenario
 from ..simulation import monitor
 from ..simulation.record import Record
@@ -31,9 +31,9 @@ from .verdict import CALM_TIME, LiveVerdict, live_gain_limits, live_verdict
 class Session:
     """A person, the arm and the clay.
 
-    `given` is the scenario as given, `scenario` the running one with the present gain and damping,
-    `run` steps it. `point` is where the hand pulls to [m], None if it does not pull. `frames` holds
-    the state at the end of each slice, `frame_time` apart at least.
+    `given` is the scenario as given, `run` steps it. `point` is where the hand pulls to [m], None
+    if it does not pull. `frames` holds the state at the end of each slice, `frame_time` apart at
+    least.
     """
 
     stream: Listener | None = None
@@ -58,9 +58,9 @@ class Session:
 
     def start(self, scenario: Scenario) -> None:
         """Starts a scenario with uncut clay and an empty record."""
-        self.scenario = self.prepared(scenario)
+        self._pending: tuple[Any, ...] = "start", scenario
         self.given = scenario
-        self.run = LiveRun(self.scenario, self.every)
+        self.run = LiveRun(self.prepared(scenario), self.every)
         self.paused, self.recording = False, True
         self.clock = Clock(self.partner.span)
         self.point: tuple[float, float] | None = None
@@ -70,6 +70,19 @@ class Session:
         self._time_left = 0.0
         self._last_swing = -math.inf  # time of the last growing oscillation [s]
         self._observe()
+        self._pending = ()
+
+    @property
+    def scenario(self) -> Scenario:
+        """The running scenario, with the present gain and damping."""
+        return self.run.scenario
+
+    def mend(self) -> None:
+        """Completes what Ctrl-C has ended early: a slice, a change, a start."""
+        self.run.mend()
+        if self._pending:
+            name, *arguments = self._pending
+            getattr(self, name)(*arguments)
 
     def prepared(self, scenario: Scenario) -> Scenario:
         """The scenario as it is run."""
@@ -78,6 +91,7 @@ class Session:
 
     def restart(self) -> None:
         """Restarts the same scenario with the present gain, damping and recording switch."""
+        self.mend()
         gain, b, recording = self.scenario.gain, self.damping, self.recording
         self.start(self.given)
         self.change(gain=gain, b=b)
@@ -126,7 +140,7 @@ class Session:
         self.point = None if point is None else self._within_reach(point)
 
     @checked
-    def push(self, force: Annotated[tuple[float, float], Bound(-1e3, 1e3, "N")]) -> None:
+    def push(self, force: Annotated[tuple[Real, Real], Bound(-1e3, 1e3, "N")]) -> None:
         """Makes the hand press with a constant force, in addition to any pull."""
         self.run.pull.force = force
 
@@ -137,36 +151,60 @@ class Session:
         b: Annotated[float | None, Bound(0.0, 1e6)] = None,
     ) -> None:
         """Changes the gain or the damping; where a number is out of its bounds, nothing."""
+        self.mend()
         scenario, damping = self.scenario, self.damping if b is None else b
         if gain is not None:
             scenario = replace(scenario, gain=gain)
         if b is not None:
             clay = self.given.clay
             scenario = replace(scenario, clay=clay and clay.scaled(damping))
-        self.run.change(scenario)
-        self.scenario, self.damping = scenario, damping
+        self._change_to(scenario, damping)
+
+    def _change_to(self, scenario: Scenario, damping: float) -> None:
+        if scenario is not self.scenario:
+            self._pending = "_change_to", scenario, damping
+            try:
+                self.run.change(scenario)
+            except ParameterError:
+                self._pending = ()
+                raise
+        self.damping, self._pending = damping, ()
 
     def advance(self, seconds: float) -> np.ndarray:
-        """Advances by a slice of simulated time, unless paused."""
+        """Advances by a slice of simulated time, unless paused.
+
+        One that Ctrl-C ended early is completed by the next call.
+        """
+        self.mend()
         run, dt = self.run, self.scenario.dt
         if self.paused or run.outcome:
             return np.empty((0, 2))
         steps = math.floor((seconds + self._time_left) / dt + 1e-9)
-        self._time_left += seconds - steps * dt
+        left = self._time_left + (seconds - steps * dt)
         if not steps:
+            self._time_left = left
             return np.empty((0, 2))
         if self.point is None:
-            run.pull.jump(run.t, *self.handle())
+            pull = run.pull.released(run.t, *self.handle())
         else:
-            run.pull.glide(run.t, self.point, steps * dt)
-        run.keeping = self.recording
+            pull = run.pull.gliding(run.t, self.point, steps * dt)
         before = run.position()
-        run.slice(steps)
-        self._observe()
+        self._slice(run.i + steps, pull, left, self.recording)
         return np.array([before, run.position()])
+
+    def _slice(self, end: int, pull: tuple[Any, ...], left: float, keeping: bool) -> None:
+        """Makes steps up to a sample; `left`: time that is due then [s]."""
+        self._pending = "_slice", end, pull, left, keeping
+        self.run.pull.put(*pull)
+        self.run.keeping = keeping
+        self.run.slice(end - self.run.i)
+        self._time_left = left
+        self._observe()
+        self._pending = ()
 
     def record(self) -> Record:
         """Ends the run and returns its record, with removed volume, hand's point and gain."""
+        self.mend()
         run = self.run
         if run.outcome is None and run.i:
             run.end()
@@ -221,7 +259,7 @@ class Session:
         watch = self.run.watch
         if watch.onset and max(map(len, watch.swings)) >= monitor.SWINGS:
             self._last_swing = self.t
-        if self.frames and self.t < self.frames[-1].t + self.frame_time - 1e-9:
+        if self.frames and self.t < self.frames[-1].t + max(self.frame_time - 1e-9, 1e-9):
             return
         p, v = self.handle()
         b = self.b

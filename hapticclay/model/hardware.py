@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import sqrt, tau
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from ..arguments import part
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..fields import JOINTS, Seed
 from .traits import LEFT_OUT, YES, Quantity, Refusal, Trait, present
 
@@ -27,8 +28,8 @@ class Coupling:
         damper: damping [N.s/m], > 0, at most 1e12.
     """
 
-    spring: Annotated[float, Bound(0.0, STIFF, "N/m", above=True)]
-    damper: Annotated[float, Bound(0.0, STIFF, "N.s/m", above=True)]
+    spring: Annotated[Real, Bound(0.0, STIFF, "N/m", above=True)]
+    damper: Annotated[Real, Bound(0.0, STIFF, "N.s/m", above=True)]
 
 
 @part("hardware.")
@@ -40,8 +41,8 @@ class Hardware:
             that samples keep their order.
         dropout_probability: probability that a sample is lost, 0 to 0.99; the torque is then held
             for one more.
-        encoder: counts per turn of each joint, 4 to 2^40, one number or one for each joint; None
-            measures angles exactly.
+        encoder: counts per turn of the joints that turn, 4 to 2^40, one number or one for each;
+            None measures angles exactly.
         velocity: of the joints: "exact" (a tachometer) or "difference" of measured angles.
         velocity_window: samples that the difference spans, 1 to 10000.
         velocity_filter: first-order low-pass behind the difference [Hz]; None for none.
@@ -60,28 +61,31 @@ class Hardware:
             Ryu 2002).
         coupling: between the handle and a virtual tool in the clay; None puts the handle into it.
         seed: seed of jitter, losses and noise, 0 to 2^32 - 1.
+        linear_encoder: counts per length of the joints of a file that slide [1/m], as "1000 1/mm",
+            up to 1e12, one number or one for each; 0 or None measures their positions exactly.
     """
 
-    jitter: Annotated[float, Bound(0.0, 1.0, "s")] = 0.0
+    jitter: Annotated[Real, Bound(0.0, 1.0, "s")] = 0.0
     dropout_probability: Annotated[float, Bound(0.0, 0.99)] = 0.0
     encoder: Annotated[int | tuple[int, ...] | None, Bound(4, 2**40)] = None
     velocity: Literal["exact", "difference"] = "exact"
     velocity_window: Annotated[int, Bound(1, 10_000)] = 1
-    velocity_filter: Annotated[float | None, Bound(0.0, 1e6, "Hz", above=True)] = None
+    velocity_filter: Annotated[Real | None, Bound(0.0, 1e6, "Hz", above=True)] = None
     adc_bits: Annotated[int | None, Bound(2, 32)] = None
-    adc_range: Annotated[float, Bound(0.0, 1e6, "N", above=True)] = 50.0
-    force_noise: Annotated[float, Bound(0.0, 1e3, "N")] = 0.0
-    force_filter: Annotated[float | None, Bound(0.0, 1e6, "Hz", above=True)] = None
+    adc_range: Annotated[Real, Bound(0.0, 1e6, "N", above=True)] = 50.0
+    force_noise: Annotated[Real, Bound(0.0, 1e3, "N")] = 0.0
+    force_filter: Annotated[Real | None, Bound(0.0, 1e6, "Hz", above=True)] = None
     filter_order: Annotated[int, Bound(1, 2)] = 2
     dac_bits: Annotated[int | None, Bound(2, 32)] = None
     dac_range: Annotated[
-        tuple[float, float] | None, Bound(0.0, 1e6, "N.m", above=True, names=JOINTS)
+        tuple[Real, Real] | None, Bound(0.0, 1e6, "N.m", above=True, names=JOINTS)
     ] = None
-    delay: Annotated[float, Bound(0.0, 1.0, "s")] = 0.0
-    friction: Annotated[tuple[float, float], Bound(0.0, 1e6, "N.m", names=JOINTS)] = (0.0, 0.0)
+    delay: Annotated[Real, Bound(0.0, 1.0, "s")] = 0.0
+    friction: Annotated[tuple[Real, Real], Bound(0.0, 1e6, "N.m", names=JOINTS)] = (0.0, 0.0)
     passivity: bool = False
     coupling: Coupling | None = None
     seed: Seed = 0
+    linear_encoder: Annotated[Real | tuple[Real, ...] | None, Bound(0.0, 1e12, "1/m")] = None
 
     def __post_init__(self):
         if isinstance(self.encoder, tuple):
@@ -89,12 +93,61 @@ class Hardware:
                 bound = "must be whole numbers, one for each joint"
                 raise ParameterError("hardware.encoder", self.encoder, bound)
             object.__setattr__(self, "encoder", tuple(map(int, self.encoder)))
+        if self.linear_encoder == ():
+            bound = "must be one number, or one for each joint that slides"
+            raise ParameterError("hardware.linear_encoder", (), bound)
         if self.velocity == "exact" and (
             self.velocity_filter is not None or self.velocity_window != 1
         ):
             raise ParameterError(
                 "hardware.velocity", self.velocity, "must be 'difference' for a window or a filter"
             )
+
+    def count_sizes(self, turning: Sequence[bool]) -> list[float]:
+        """Size of a count of each joint, 0 of one that is measured exactly [rad, m of slides].
+
+        Args:
+            turning: whether each joint turns; others slide.
+        """
+        turns, slides = sum(turning), len(turning) - sum(turning)
+        per_turn = [tau / n if n else 0.0 for n in _each(self.encoder, turns)]
+        per_metre = [1.0 / n if n else 0.0 for n in _each(self.linear_encoder, slides)]
+        sizes = {True: iter(per_turn), False: iter(per_metre)}
+        return [next(sizes[bool(turns)]) for turns in turning]
+
+    def check_encoders(self, turning: Sequence[bool], names: Sequence[str], path: str) -> None:
+        """Refuses counts that do not fit the joints.
+
+        Args:
+            turning: whether each joint turns; others slide.
+            names: joints.
+            path: what errors put before the name of a field.
+
+        Raises:
+            ParameterError: counts a turn of a joint that slides, or the other way round; more or
+                fewer numbers than joints.
+        """
+        slides = [name for name, turns in zip(names, turning, strict=True) if not turns]
+        if self.encoder is not None and slides and self.linear_encoder is None:
+            bound = (
+                f"is a number of counts a turn, and {', '.join(slides)} slides: give counts a "
+                "metre as hardware.linear_encoder, such as '1000 1/mm', or 0 for exact positions"
+            )
+            raise ParameterError(f"{path}encoder", self.encoder, bound)
+        for name, many, kind in (
+            ("encoder", len(names) - len(slides), "turn"), ("linear_encoder", len(slides), "slide")
+        ):  # fmt: skip
+            value = getattr(self, name)
+            if value is not None and not many:
+                raise ParameterError(f"{path}{name}", value, f"must be None: no joint {kind}s")
+            if isinstance(value, tuple) and len(value) != many:
+                bound = f"must be one number, or one for each of {many} joints that {kind}"
+                raise ParameterError(f"{path}{name}", value, bound)
+
+
+def _each(value: Any, n: int) -> Sequence[float]:
+    """A value for each of n joints."""
+    return value if isinstance(value, tuple) else (value or 0.0,) * n
 
 
 NOISE_BLOCK = 1024  # samples drawn at once
@@ -172,6 +225,16 @@ def _difference_words(x: Hardware) -> list[Quantity]:
     return [Quantity("velocity by difference"), *window, *low_pass]
 
 
+def _encoder_words(x: Hardware) -> list[Quantity]:
+    kinds = ("encoder", x.encoder, "turn"), ("linear encoder", x.linear_encoder, "metre")
+    out = []
+    for name, n, length in kinds:
+        if n:
+            values = n if isinstance(n, tuple) else (n,)
+            out += Quantity.of_scene(f"{name} {{}}", values, f"counts per {length}")
+    return out
+
+
 def _converter_words(x: Hardware) -> list[Quantity]:
     bits = {"A/D": x.adc_bits, "D/A": x.dac_bits}
     return [Quantity(f"{name} {{}}", (float(n),), "bits") for name, n in bits.items() if n]
@@ -223,7 +286,7 @@ TRAITS = (
     Trait("hardware", "part", lambda s: s.hardware is not None, YES, _UNSAMPLED),
     _field_trait("jitter", "jitter", "s rms"),
     _field_trait("dropouts", "dropout_probability"),
-    _field_trait("encoder", "encoder", "counts per turn"),
+    _trait("encoder", lambda x: bool(x.encoder or x.linear_encoder), _encoder_words),
     _trait("velocity by difference", lambda x: x.velocity == "difference", _difference_words),
     _trait("converters", lambda x: bool(x.adc_bits or x.dac_bits), _converter_words),
     _field_trait("force noise", "force_noise", "N rms"),

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..formulas.regions import ENTERED, FLOWS, HEAD, SPRINGS
+from ..formulas.regions import EDGES, ENTERED, FLOWS, HEAD, LANDED, SPRINGS
 from .cells import Profile
 from .clay import NOTHING, Clay
 from .smooth import Smooth
@@ -100,6 +100,11 @@ def _of_cells(what: str, law: Any) -> np.ndarray:
         dent = np.full((*law.damping.shape, 1), math.nan)
         return np.concatenate((law.elastic, dent), axis=2).ravel()
     return getattr(law, what).ravel()
+
+
+def border_count(table: np.ndarray) -> int:
+    """Number of borders in a table, along x and along y."""
+    return int(table[LANDED] - table[EDGES])
 
 
 def keep_entries(table: np.ndarray, before: np.ndarray) -> None:

@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from ..arguments import checked, named
-from ..columns.log import Log, open_log
+from ..columns.log import Log, Reading, open_log
 from ..columns.stamps import times_of
 from ..errors import ParameterError, array_of, choice
 from . import pieces
@@ -92,7 +92,8 @@ class Samples(Signal):
         """
         if isinstance(columns, str) or len(columns) != 3:
             raise ParameterError("columns", columns, "must name three columns: time, x, y")
-        log = open_log("path", path, units)
+        log = open_log("path", path, Reading(units or {}))
+        log.check_once(columns)
         t, _ = times_of(log, columns[0])
         x, y = (log.values(name, UNITS) for name in columns[1:])
         if not len(t):

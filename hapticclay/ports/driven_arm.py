@@ -8,7 +8,6 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..arms.joint_law import compensated
 from ..errors import ParameterError, number
 from ..formulas.arm import handle_velocity, jacobian, joint_torques
 from ..model.sampled_controller import Controller
@@ -116,7 +115,7 @@ class DrivenArm:
         raise NotImplementedError
 
     def torques_of(self, force: Numbers, at: Any) -> Numbers:
-        """Joint torques of a force on the handle, and what the arm needs besides [N.m]."""
+        """Joint torques of a force on the handle [N.m]."""
         raise NotImplementedError
 
     def drive(self, drive: Drive) -> Numbers:
@@ -171,7 +170,7 @@ class PlanarMotors(DrivenArm):
 
 
 class MechanismMotors(DrivenArm):
-    """The motors of an arm from a file, which also hold its weight if gravity is compensated."""
+    """The motors of an arm from a file."""
 
     def reach_of(self, scenario: Scenario) -> Sequence[float]:
         return scenario.file_arm.mechanism.reach
@@ -180,17 +179,13 @@ class MechanismMotors(DrivenArm):
         arm = scenario.file_arm
         self._mechanism, self._rows = arm.mechanism, ["xyz".index(axis) for axis in arm.axes]
         self._origin = arm.handle()[self._rows]
-        self._holds = compensated(arm, None) and arm.mechanism.weighs
-        masses = np.array([hand.mass for hand in scenario.hands])
-        self._weight = masses * np.array(arm.mechanism.model.opt.gravity)[self._rows]
         return self.see(0.0, tuple(arm.q.tolist()), (0.0,) * len(arm.names))[0]
 
     def see(self, t: float, q: Numbers, qd: Numbers) -> tuple[Sensed, Any]:
-        place, J, weights = self._mechanism.at_handle(np.array(q))
+        place, J = self._mechanism.at_handle(np.array(q))
         J = J[self._rows]
         p, v = place[self._rows] - self._origin, J @ qd
-        held = weights - J.T @ self._weight if self._holds else 0.0 * weights
-        return Sensed(t, tuple(p.tolist()), tuple(v.tolist()), tuple(q), tuple(qd)), (J, held)
+        return Sensed(t, tuple(p.tolist()), tuple(v.tolist()), tuple(q), tuple(qd)), J
 
     def _law(self, t: float, q: Numbers, qd: Numbers, fh: Any, state: Any, params: Any) -> Any:
         try:
@@ -199,8 +194,7 @@ class MechanismMotors(DrivenArm):
             return (math.nan,) * len(q), state
 
     def torques_of(self, force: Numbers, at: Any) -> Numbers:
-        J, held = at
-        return tuple((held + J.T @ force).tolist())
+        return tuple((at.T @ force).tolist())
 
 
 def force_at(asked: Drive, seen: Sensed, largest: float) -> Numbers:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from ..arms.mjcf_arm import MjcfArm
@@ -14,6 +15,7 @@ FELT = ("position-force", "four-channel")  # kinds of link that send a measured 
 OF_FORCE = ("adc_bits", "force_noise", "force_filter")
 SENSORS = {  # in words, what theory leaves out
     "encoder": "encoder",
+    "linear_encoder": "linear encoder",
     "adc_bits": "A/D converter",
     "force_noise": "noise of the force",
     "force_filter": "filter of the force",
@@ -23,7 +25,7 @@ SENSORS = {  # in words, what theory leaves out
 }
 
 
-def check_hardware(pair: Any, i: int) -> None:
+def check_hardware(pair: Any, i: int, names: Sequence[str]) -> None:
     """Refuses hardware that cannot act at an end of a pair."""
     given: Hardware | None = pair.hardware[i]
     if given is None:
@@ -31,6 +33,7 @@ def check_hardware(pair: Any, i: int) -> None:
     for name, (is_wrong, bound) in _refusals(pair, i, given).items():
         if is_wrong:
             raise ParameterError(f"pair.{ENDS[i]}_hardware.{name}", getattr(given, name), bound)
+    given.check_encoders(turning(pair.arms[i], pair.n), names, f"pair.{ENDS[i]}_hardware.")
 
 
 def _refusals(pair: Any, i: int, given: Hardware) -> dict[str, tuple[bool, str]]:
@@ -46,7 +49,8 @@ def _refusals(pair: Any, i: int, given: Hardware) -> dict[str, tuple[bool, str]]
         "delay": (given.delay > 0.0, "must be 0 in a pair: Pair(delay)"),
         "passivity": (given.passivity, "must be False in a pair: Link(passivity)"),
         "coupling": (given.coupling is not None, "must be None in a pair"),
-        "encoder": _encoder(pair, arm, given),
+        "encoder": _encoder(arm, given.encoder),
+        "linear_encoder": _encoder(arm, given.linear_encoder),
         "friction": (
             any(given.friction) and not closed,
             f"must be 0 here: {'MjcfArm(friction)' if from_file else 'Device(friction)'}",
@@ -68,11 +72,21 @@ def _refusals(pair: Any, i: int, given: Hardware) -> dict[str, tuple[bool, str]]
     return found
 
 
-def _encoder(pair: Any, arm: Any, given: Hardware) -> tuple[bool, str]:
-    if given.encoder is not None and not isinstance(arm, MjcfArm | Arm):
-        return True, "must be None for a device of one axis: Device(quantum)"
-    wrong = isinstance(given.encoder, tuple) and len(given.encoder) != pair.n
-    return wrong, f"must be one number, or one for each of {pair.n} joints"
+def _encoder(arm: Any, counts: Any) -> tuple[bool, str]:
+    one_axis = not isinstance(arm, MjcfArm | Arm)
+    return counts is not None and one_axis, "must be None for a device of one axis: Device(quantum)"
+
+
+def turning(arm: Any, n: int) -> list[bool]:
+    """Whether each of n joints of an arm turns; others slide."""
+    return arm.mechanism.turning if isinstance(arm, MjcfArm) else [True] * n
+
+
+def slides_of(arm: Any) -> tuple[bool, ...]:
+    """Whether each joint of an arm of a pair slides, as a device of one axis does."""
+    if isinstance(arm, MjcfArm):
+        return tuple(not turns for turns in arm.mechanism.turning)
+    return (False, False) if isinstance(arm, Arm) else (True,)
 
 
 def left_out(pair: Any, i: int) -> str:

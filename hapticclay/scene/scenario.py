@@ -13,9 +13,10 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..arms.joint_law import JointPD, checked_law
+from ..arms.joint_ranges import outside
 from ..arms.mjcf_arm import MjcfArm
 from ..display import html_table, one_line
-from ..errors import Bound, ParameterError, choice, number, numbers_of, quantity
+from ..errors import Bound, ParameterError, Real, choice, number, numbers_of, quantity
 from ..fields import JOINTS, check_fields, dotted_names, merged_values, no_field, values_of
 from ..model import samples, shapes  # noqa: F401  # so that files and options know every Signal
 from ..model.arm import PAPER, Arm
@@ -40,15 +41,15 @@ REACH_MARGIN = 1e-3  # [m] short of the stretched and the folded arm, where no f
 FOLD_MARGIN = math.radians(1.001)  # of the elbow, likewise: a run ends at 1 degree (`monitor.FOLD`)
 
 # Types of the fields that experiments share with scenarios.
-Force = Annotated[tuple[float, float], Bound(-1e6, 1e6, "N")]
-SpaceForce = Annotated[tuple[float, float, float], Bound(-1e6, 1e6, "N", names=("x", "y", "z"))]
+Force = Annotated[tuple[Real, Real], Bound(-1e6, 1e6, "N")]
+SpaceForce = Annotated[tuple[Real, Real, Real], Bound(-1e6, 1e6, "N", names=("x", "y", "z"))]
 STEP_LEAST = 1e-6  # [s]
-StepLength = Annotated[float, Bound(STEP_LEAST, 0.02, "s")]
-Duration = Annotated[float, Bound(0.0, 1e5, "s", above=True)]
-Length = Annotated[float | None, Bound(-10.0, 10.0, "m")]
-Position = Annotated[tuple[float, float], Bound(unit="m")]
-TorqueLimit = Annotated[tuple[float, float], Bound(0.0, 1e6, "N.m", above=True, names=JOINTS)]
-SamplePeriod = Annotated[float | None, Bound("dt", 1.0, "s")]
+StepLength = Annotated[Real, Bound(STEP_LEAST, 0.02, "s")]
+Duration = Annotated[Real, Bound(0.0, 1e5, "s", above=True)]
+Length = Annotated[Real | None, Bound(-10.0, 10.0, "m")]
+Position = Annotated[tuple[Real, Real], Bound(unit="m")]
+TorqueLimit = Annotated[tuple[Real, Real], Bound(0.0, 1e6, "N.m", above=True, names=JOINTS)]
+SamplePeriod = Annotated[Real | None, Bound("dt", 1.0, "s")]
 Integrator = Literal["fast", "accurate"]
 Control = Literal["continuous", "sampled"]
 Render = Literal["held", "physical"]
@@ -110,15 +111,15 @@ class Scenario:
 
     name: str = "free"
     clay: Clay | None = None
-    gain: Annotated[tuple[float, float], Bound(0.0, 1e6, "1/kg")] = GAIN
-    force: Annotated[SpaceForce | tuple[float, float], Bound(-1e6, 1e6, "N")] = FORCE
+    gain: Annotated[tuple[Real, Real], Bound(0.0, 1e6, "1/kg")] = GAIN
+    force: Annotated[SpaceForce | tuple[Real, Real], Bound(-1e6, 1e6, "N")] = FORCE
     operator: Operator | None | tuple[Operator | None, Operator | None] = None
     inertia_shaping: bool = False
     dt: StepLength = TS
     t_max: Duration = 60.0
     length: Length = PATH_LENGTH
     start: Position = (0.0, 0.0)
-    velocity: Annotated[tuple[float, float], Bound(-10.0, 10.0, "m/s")] = (0.0, 0.0)
+    velocity: Annotated[tuple[Real, Real], Bound(-10.0, 10.0, "m/s")] = (0.0, 0.0)
     origin: Position = ORIGIN
     torque_limit: TorqueLimit = TORQUE_LIMIT
     integrator: Integrator = "fast"
@@ -337,10 +338,8 @@ class Scenario:
             return
         number("hardware.jitter", given.jitter, 0.0, 0.28 * Ts, unit="s")
         number("hardware.delay", given.delay, 0.0, 100.0 * Ts, unit="s")
-        n = len(self.joints)
-        if isinstance(given.encoder, tuple) and len(given.encoder) != n:
-            bound = f"must be one number, or one for each of {n} joints"
-            raise ParameterError("hardware.encoder", given.encoder, bound)
+        turning = [True, True] if self.is_closed_form else self.file_arm.mechanism.turning
+        given.check_encoders(turning, self.joints, "hardware.")
 
     @property
     def rotated(self) -> bool:
@@ -420,10 +419,10 @@ def _check_force(s: Scenario) -> None:
 
 def _check_pose(arm: MjcfArm) -> None:
     """Refuses a pose beyond the range of a joint, where a run would end at once."""
-    for name, q, (low, high) in zip(arm.names, arm.q, arm.ranges, strict=True):
-        if not low <= q <= high:
-            bound = f"must be within the range of the joint, {low:.4g} to {high:.4g}"
-            raise ParameterError(f"arm.pose.{name}", float(q), bound)
+    for i in outside(arm.q, arm.ranges):
+        low, high = arm.ranges[i]
+        bound = f"must be within the range of the joint, {low:.4g} to {high:.4g}"
+        raise ParameterError(f"arm.pose.{arm.names[i]}", float(arm.q[i]), bound)
 
 
 def _check_arm(s: Scenario) -> None:
@@ -448,10 +447,18 @@ def _check_arm(s: Scenario) -> None:
             raise ParameterError(name, getattr(s, name), bound)
     if len(arm.names) > MOST_JOINTS:
         raise ParameterError("arm", arm.name, f"must have at most {MOST_JOINTS} joints in runs")
-    arm.mechanism.check_weight()
+    if isinstance(law, JointPD) and law.drive_rate is not None:
+        bound = (
+            "must be None in runs: a drive that samples runs as a host of its rate, "
+            f"JointPD(..., runs='host') with Ts={1.0 / law.drive_rate:g}"
+        )
+        raise ParameterError("controller.drive_rate", law.drive_rate, bound)
     limits: Any = arm.torque_limit
     if isinstance(law, JointPD) and law.runs == "drive" and any(map(math.isfinite, limits)):
-        bound = "must be none where drives run the law, whose limits are not simulated"
+        bound = (
+            "must be none where drives run the law, whose limits are not simulated: "
+            f"MjcfArm(torque_limit={[math.inf] * len(arm.names)})"
+        )
         raise ParameterError("arm.torque_limit", limits, bound)
     if io is not None and io.dac_bits and not all(map(math.isfinite, limits)):
         bound = "must be finite where a converter gives the torques, whose range it is"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 import os
@@ -19,6 +20,7 @@ from ..model.sampled_controller import Controller
 from ..scene.plausible import warn_implausible
 from ..scene.scenario import Scenario
 from . import record
+from .crew import outlast
 from .engines import engine_for
 from .many import Lane, kind_key
 from .one_run import check_memory
@@ -99,7 +101,7 @@ class BatchPool:
         if self.stop.is_set():
             raise CancelledError
         if not hasattr(self.own, "lane"):
-            self.own.lane = Lane(Workspace())
+            self.own.lane = Lane(Workspace(stop=self.stop))
         return self.own.lane
 
     def run(self, scenario: Scenario, every: int) -> tuple[Run, float]:
@@ -172,7 +174,8 @@ def on_threads(
     """Makes parts of a batch on threads, 0 for none; the first exception ends all and is raised.
 
     The calling thread reads the scenarios and stores the results. So a generator runs where it was
-    made, Ctrl-C reaches it, and at most two parts per thread are held.
+    made, Ctrl-C reaches it, and at most two parts per thread are held. Once `stop` is set, runs end
+    at their next look.
     """
     at = 0
     if not threads:
@@ -187,14 +190,15 @@ def on_threads(
             for future in wait(working, return_when=FIRST_COMPLETED).done:
                 put(working.pop(future), future.result())
 
-    with ThreadPoolExecutor(threads) as pool:
-        try:
-            for part in parts:
-                working[pool.submit(make, part)] = at
-                at += len(part)
-                collect(2 * threads - 1)
-            collect(0)
-        except BaseException:  # Ctrl-C too
-            stop.set()
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    pool = ThreadPoolExecutor(threads)
+    try:
+        for part in parts:
+            working[pool.submit(make, part)] = at
+            at += len(part)
+            collect(2 * threads - 1)
+        collect(0)
+    except BaseException:  # Ctrl-C too
+        stop.set()
+        raise
+    finally:
+        outlast(functools.partial(pool.shutdown, wait=True, cancel_futures=True))

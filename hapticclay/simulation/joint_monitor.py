@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from ..arms.joint_law import JointPD, compensated
+from ..arms.joint_ranges import widened
+from ..arms.joint_units import of_joint
 from ..scene.scenario import Scenario
 from ..theory.client_loop import with_hands_of
 from ..theory.joint_gains import joint_loop
-from .monitor import LIMITS, OFTEN, STILL, WHILE, Outcome, at_rest
+from .monitor import LIMITS, OFTEN, STILL, WHILE, Outcome, at_rest, with_own_lists
 
 FASTEST = 200.0  # [rad/s or m/s] beyond any joint of an arm
 GROWTH = 30.0  # an oscillation that has grown so much, swing by swing, is unstable
@@ -76,13 +78,19 @@ class JointMonitor:
         self.scenario = scenario
         self.monitored = monitored and not (scenario.driven and is_stable_at_start(scenario))
         arm = scenario.file_arm
-        self.names, self.ranges = arm.names, arm.ranges
+        self.names, self.ranges, self.turning = arm.names, arm.ranges, arm.mechanism.turning
         self.limits = np.array(arm.torque_limit)
         self.onset: Outcome | None = None
         self.seen = self.often = 0
         self.moved = self.unbound = -1
         self.swings = [Swings() for _ in self.names]
         self.bound = np.zeros(0, dtype=bool)
+
+    def copied(self) -> JointMonitor:
+        """The monitor as it is now, which further rows do not change."""
+        made = with_own_lists(self)
+        made.swings = [with_own_lists(x) for x in self.swings]
+        return made
 
     def look(self, rows: np.ndarray, first: int) -> tuple[int, Outcome | None]:
         """Judges the next rows, joints by samples: number of good ones, and an outcome if any."""
@@ -107,17 +115,22 @@ class JointMonitor:
     def _good(self, rows: np.ndarray, q: np.ndarray, rates: np.ndarray) -> tuple[int, Any]:
         """Number of rows before the first bad one: its code, joint and cause."""
         fast = ~(np.abs(rates) <= FASTEST)
-        out = (q < self.ranges[:, :1]) | (q > self.ranges[:, 1:])
+        low, high = widened(self.ranges).T
+        out = (q < low[:, None]) | (q > high[:, None])
         bad = fast | out | ~np.isfinite(rows).all(axis=0)
         good = int(bad.any(axis=0).argmax()) if bad.any() else rows.shape[1]
         if good == rows.shape[1]:
             return good, None
         if fast[:, good].any() or not out[:, good].any():
             joint = int(np.nan_to_num(np.abs(rates[:, good]), nan=math.inf).argmax())
-            return good, ("diverged", joint, f"faster than {FASTEST:g} rad/s")
+            return good, ("diverged", joint, f"faster than {FASTEST:g} {self._unit(joint)}/s")
         joint = int(out[:, good].argmax())
         low, high = self.ranges[joint]
-        return good, ("out of reach", joint, f"beyond its range, {low:.4g} to {high:.4g} rad")
+        range_ = f"{low:.4g} to {high:.4g} {self._unit(joint)}"
+        return good, ("out of reach", joint, f"beyond its range, {range_}")
+
+    def _unit(self, joint: int) -> str:
+        return of_joint("rad", self.turning[joint])
 
     def _count(self, rates: np.ndarray, bound: np.ndarray) -> None:
         """Notes when a joint last moved, and when no motor was at its limit."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -62,6 +63,12 @@ class StabilityMonitor:
         self.swings: list[list[tuple[float, bool, int]]] = [[], []]
         self.largest = [0.0, 0.0]  # swing so far [m/s]
         self._limits = PoseLimits(scenario)
+
+    def copied(self) -> StabilityMonitor:
+        """The monitor as it is now, which further rows do not change."""
+        made = with_own_lists(self)
+        made._limits = self._limits.copied()
+        return made
 
     def look(self, rows: np.ndarray, first: int) -> tuple[int, Outcome | None]:
         """Judges the next rows, shape (12, n): number of good ones, and an outcome if any."""
@@ -275,6 +282,18 @@ def _good_rows(rows: np.ndarray) -> int:
         return rows.shape[1]
     bad = ~np.isfinite(rows).all(axis=0) | (v > SPEED).any(axis=0) | (bend < FOLD)
     return int(bad.argmax()) if bad.any() else rows.shape[1]
+
+
+Judge = TypeVar("Judge")
+
+
+def with_own_lists(judge: Judge) -> Judge:
+    """A copy of an object whose lists, of numbers and of lists of them, are its own."""
+    made = copy.copy(judge)
+    for name, value in vars(judge).items():
+        if isinstance(value, list):
+            setattr(made, name, [list(x) if isinstance(x, list) else x for x in value])
+    return made
 
 
 class RangeMonitor(StabilityMonitor):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arms import loading
+from ..arms import model_file
 from ..arms.joint_law import JointPD
 from ..arms.mjcf_arm import MjcfArm
 from ..errors import ParameterError
@@ -74,7 +74,7 @@ def _driven(arm: MjcfArm, drive: JointPD) -> MjcfArm:
     """The arm with springs at its pose and dampers in place of drives."""
     from ..physics import mujoco
 
-    spec = loading.spec_of(arm.file)[0]
+    spec = model_file.spec_of(arm.file)[0]
     for name, Kp, q in zip(arm.names, drive.Kp, arm.q, strict=True):
         joint = spec.joint(name)
         if np.any(joint.stiffness):

@@ -48,6 +48,7 @@ class PairRun:
         self.forces: list[Sequence[float] | None] = [None, None]
         self.every = every
         self.newest: list[Any] = []  # row of the last sample
+        self._is_amid = False  # a step, or one was interrupted
         dt = pair.Ts / self.parts
         more = {"dt": dt, "t_max": (self.samples * self.parts + 2) * dt}
         self.hosts = []
@@ -72,7 +73,13 @@ class PairRun:
         return self.pair.Ts * self.step / self.parts
 
     def advance(self) -> None:
-        """Makes a control sample: measures, sends, and steps both arms; does nothing once ended."""
+        """Makes a control sample: measures, sends, and steps both arms; does nothing once ended.
+
+        Raises:
+            RuntimeError: an earlier call was interrupted; what it recorded remains.
+        """
+        if self._is_amid:
+            raise RuntimeError("Ctrl-C came within a sample of the pair: start it again")
         end = (self.step // self.parts + 1) * self.parts
         with warnings_caught():  # of arms that diverge, which is an outcome
             while self.step < end and not self.ended:
@@ -80,6 +87,7 @@ class PairRun:
 
     def _go_on(self, end: int) -> None:
         """Makes steps of both arms, to what is due next; at a sample hosts measure and send."""
+        self._is_amid = True
         self._act(ARRIVE)
         if self.step % self.parts == 0:
             self._sample()
@@ -91,6 +99,7 @@ class PairRun:
             self.energy += sum(self._advanced(host, n) for host in self.hosts)
             self.ended = self._ended()
             self.step += n
+        self._is_amid = False
 
     def to_end(self) -> PairRecord:
         """Runs for the time of the pair, or until something ends it."""

@@ -9,6 +9,7 @@ import numpy as np
 from ..formulas import hardware as law
 from ..model.hardware import Hardware, butterworth
 from ..scene.pair import Pair
+from ..scene.pair_hardware import turning
 
 IDEAL = Hardware()
 
@@ -18,8 +19,7 @@ class Sensors:
 
     def __init__(self, pair: Pair, i: int, axes: int):
         self.parts = pair.hardware[i] or IDEAL
-        counts = self.parts.encoder
-        self.counts = counts if isinstance(counts, tuple) else (counts or 0,) * pair.n
+        self.counts = self.parts.count_sizes(turning(pair.arms[i], pair.n))
         self.quantum = float(getattr(pair.arms[i], "quantum", 0.0))
         self.random = np.random.default_rng([self.parts.seed, i])
         cutoff, order = self.parts.force_filter, self.parts.filter_order
@@ -37,7 +37,8 @@ class Sensors:
             return q
         if self.quantum:
             return np.array([law.round_to_even(float(x), self.quantum) for x in q])
-        return np.array([law.encode(float(x), n) for x, n in zip(q, self.counts, strict=True)])
+        read = zip(q.tolist(), self.counts, strict=True)
+        return np.array([law.encode(x, count) for x, count in read])
 
     def forces(self, f: np.ndarray) -> np.ndarray:
         """A force along the axes of the handle with noise, filtered, converted."""

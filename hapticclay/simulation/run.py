@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import contextlib
-import copy
 import math
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from concurrent.futures import CancelledError
+from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arguments import named
+from ..errors import ParameterError
 from ..kernel import arm, energy, joints, modes, mover, path, rows, scene, viscous
 from ..kernel.movers import Movers
 from ..kernel.row import CHUNK, Buffers, NativeRow, Row, Saved
@@ -23,11 +25,12 @@ from ..model.sampled_controller import Controller
 from ..scene.scenario import Scenario
 from . import monitor
 
-RECORDED = (  # what a snapshot keeps of a run, in addition to its state
-    "steps", "watch", "judged", "kept", "last", "crossings", "stops", "outcome", "end_time",
-    "is_quiet", "initial_energy",
+JUDGED = (  # what a check of the monitor changes, beside the state and the samples kept
+    "steps", "watch", "judged", "last", "crossings", "stops", "outcome", "end_time", "is_quiet",
 )  # fmt: skip
 Progress = Callable[[float, float], bool | None]
+SETTLE = ("settle",)
+OTHER = "must be of a simulation of the same scenario"
 LEDGER = ("muscle", "motors", "clay", "hand", "through")  # fields of records.Work
 # where the pairs of a sample lie, (x, y) or (shoulder, elbow): its row, then the force of the clay
 COLUMNS = {"q": 0, "p": 2, "v": 4, "fh": 6, "tau": 8, "delta": 10, "b": 12, "qd": 14, "fe": 16}
@@ -72,10 +75,13 @@ class SamplesNeeded(Exception):
 
 
 class Workspace:
-    """Engines that move the arms of successive runs, and buffers that their rows fill."""
+    """Engines that move the arms of successive runs, and buffers that their rows fill.
 
-    def __init__(self, movers: Movers | None = None):
-        self.movers, self.buffers = movers or Movers(), Buffers()
+    Once `stop` is set, a run ends by CancelledError when it looks at its rows.
+    """
+
+    def __init__(self, movers: Movers | None = None, stop: threading.Event | None = None):
+        self.movers, self.buffers, self.stop = movers or Movers(), Buffers(), stop
 
 
 _idle: list[Workspace] = []  # workspaces that no run uses
@@ -95,9 +101,12 @@ def borrowed_workspace() -> Iterator[Workspace]:
 class Snapshot(NamedTuple):
     """A run with its record, to return to; it can be pickled.
 
-    `before` is the run at the last check of the monitor; `rows` and `forces` have not been judged.
+    `given` is the scenario that it began with, `kept` says what it keeps; `before` is the run at
+    the last check of the monitor; `rows` and `forces` have not been judged.
     """
 
+    given: Scenario
+    kept: dict[str, Any]
     scenario: Scenario
     saved: Saved
     before: Saved
@@ -119,8 +128,25 @@ class Kept(NamedTuple):
     extra: np.ndarray
 
 
+class Books(NamedTuple):
+    """A run before a check of the monitor, to return to where the check is interrupted.
+
+    `fields` are those of JUDGED, `kept` and `filled` the number of samples kept and of rows not
+    judged; `saved` is None while the check has left the state as it was.
+    """
+
+    fields: dict[str, Any]
+    kept: int
+    filled: int
+    saved: Saved | None
+
+
 class Run:
     """One run of a scenario: makes its steps, judges them and keeps their samples.
+
+    Ctrl-C may end a call between any two of its lines. What the call was about to do is then
+    `pending`, and `mend` completes it, or returns to where it began: so neither sample, step nor
+    event is lost or counted twice.
 
     It keeps each `every`-th sample, and the last; without `recorded` only `last`. As long as a
     quick test finds nothing, the monitor judges no row; later it may need them all, and
@@ -130,9 +156,12 @@ class Run:
 
     Attributes:
         row: its row.
+        given: the scenario that it began with; `scenario` has the force, gain, ... now in effect.
         pause: index of the sample to pause at.
         judged: number of samples judged so far.
         is_quiet: whether the quick test has found nothing so far.
+        pending: the method that completes an interrupted call, and its arguments; empty where
+            nothing is left half done.
         last: the last good row, and the force of the clay in it; None before the first check.
     """
 
@@ -152,13 +181,18 @@ class Run:
         self.buffers = self.workspace.buffers
         arms = self.workspace.movers.of(scenario), self.buffers
         self.row = NativeRow(scenario, *arms, at) if engine == "native" else Row(scenario, *arms)
+        self.row.drop_events(not recorded)
         self.scenario, self.every, self.recorded = scenario, every, recorded
-        self._controller: Controller | None = None  # in place of the scenario's
+        self.given = scenario
+        self.pending: tuple[Any, ...] = ()
+        self.controller: Controller | None = None  # in place of the scenario's: it gives `torque`
+        self.torque: tuple[float, ...] = ()
         self.drives = _drives(scenario)
         self._noise: hardware.SampleNoise | None = None
         self.monitored = monitored
         self.watch = _monitor(scenario, monitored)
-        self.steps, self.pause, self.judged = 0, math.inf, 0
+        self.pause, self.judged = math.inf, 0
+        self._steps_before = 0
         self.kept: list[Kept] = []
         self.last: np.ndarray | None = None
         self.crossings: list[Crossing] = []
@@ -181,6 +215,15 @@ class Run:
     def i(self) -> int:
         """Index of the sample at or before now."""
         return self.row.s.i
+
+    @property
+    def steps(self) -> int:
+        """Number of steps made."""
+        return self._steps_before + self.row.s.steps
+
+    @steps.setter
+    def steps(self, steps: int) -> None:
+        self._steps_before = steps - self.row.s.steps
 
     @property
     def q(self) -> tuple[float, ...]:
@@ -222,22 +265,66 @@ class Run:
             return float(x), float(y)
         return arm.place(self.row.m, s.q[0] + h * s.w[0], s.q[1] + h * s.w[1])
 
+    # ---- interruptions
+
+    def mend(self) -> None:
+        """Completes what an interruption left half done, or returns to where it began.
+
+        Raises:
+            RuntimeError: a step itself was interrupted: there is no state to go on from.
+        """
+        if self.pending:
+            name, *arguments = self.pending
+            getattr(self, name)(*arguments)
+        self.pending = ()
+
+    def settle(self) -> None:
+        """Stores what steps have left: events, the outcome, and rows that are full or the last."""
+        if self.row.is_torn:
+            raise RuntimeError("Ctrl-C came within a step: reset it, or restore a snapshot")
+        self._take_events()
+        self.note_end()
+        if self.filled >= CHUNK - 1 or self.outcome is not None:
+            self.flush()
+
+    def _books(self) -> Books:
+        fields = {name: getattr(self, name) for name in JUDGED} | {"watch": self.watch.copied()}
+        saved = self.row.saved() if self.is_quiet else None  # the quick test counts in the state
+        return Books(fields, len(self.kept), self.filled, saved)
+
+    def _judge_again(self, books: Books) -> None:
+        """Returns to before a check, and makes it."""
+        if books.saved is not None:
+            self.restore(books.saved)
+        for name, value in books.fields.items():
+            setattr(self, name, value)
+        self.watch = books.fields["watch"].copied()
+        del self.kept[books.kept :]
+        self.row.s.row = books.filled
+        self.flush()
+
     # ---- steps
 
     def go(self, progress: Progress | None) -> None:
         """Runs to the end, or until sample `pause`."""
+        stop = self.workspace.stop
         while self.outcome is None and self.i < self.pause:
             self.advance(int(min(CHUNK - 1, self.pause - self.judged)))
             if self.filled >= CHUNK - 1 or self.outcome:
+                if stop is not None and stop.is_set():
+                    raise CancelledError
                 if progress and progress(self.t, self.position()[0]) and self.outcome is None:
                     self.outcome = monitor.Outcome("interrupted", self.t, self.i)
                 self.flush()
+            self.pending = ()
 
     def advance(self, room: int = CHUNK - 1) -> None:
         """Makes steps until rows are filled, or the run is over."""
         if self.recorded and not self.filled:
             self._saved = self.row.saved()
+        room, self.pending = self._prepared(room), SETTLE
         self._make(room)
+        self._take_events()
         self.note_end()
 
     def advance_unprepared(self, n: int) -> bool:
@@ -247,19 +334,23 @@ class Run:
         if not filled or filled + n >= CHUNK - 1 or self.prepares:
             return False
         self.draw(n)
+        self._ahead, self.pending = None, SETTLE
         row.advance(filled + n)
-        self._ahead = None
-        self.count_steps()
+        self._take_events()
         if s.code != path.OPEN:
             self.note_end()
             self.flush()
             return True
+        self.pending = ()
         return s.row == filled + n
 
     def _make(self, room: int) -> None:
-        self.row.advance(self._prepared(room))
-        self.row.check()
-        self.count_steps()
+        self.row.advance(room)
+        try:
+            self.row.check()
+        except Exception:  # of a function of the user: the run stays where it failed
+            self.pending = ()
+            raise
 
     def _prepared(self, room: int) -> int:
         """Prepares random effects and signals for rows to fill; returns to how many."""
@@ -279,32 +370,41 @@ class Run:
         most = n // m.ratio + 8  # and a look ahead
         if m.chance_first <= k <= m.chance_first + len(self.row.arrays["chances"]) // 4 - most:
             return
-        if self._noise is None or k < self._noise.first:
+        noise, self._noise = self._noise, None  # it begins anew where this is interrupted
+        if noise is None or k < noise.first:
             assert self.scenario.hardware is not None
-            self._noise = hardware.SampleNoise(self.scenario.hardware)
-        self.row.replace({"chances": self._noise.table(k, most + NOISE_AHEAD).ravel()})
+            noise = hardware.SampleNoise(self.scenario.hardware)
+        m.chance_first = scene.NEVER
+        self.row.replace({"chances": noise.table(k, most + NOISE_AHEAD).ravel()})
         m.chance_first = k
-        self._noise.forget(k)
+        noise.forget(k)
+        self._noise = noise
 
-    def count_steps(self) -> None:
-        """Counts the steps just made, and stores their crossings and stops."""
+    def _take_events(self) -> None:
+        """Stores the crossings and stops of the steps just made."""
         s, buffers = self.row.s, self.buffers
-        if self.recorded:
-            for axis, *crossing in buffers.crossings[: s.crossing].tolist():
-                self.crossings.append(Crossing(AXES[int(axis)], *crossing))
-            for axis, begins, t in buffers.stops[: s.stopped].tolist():
-                self._note_stop(("x", "y", "xy")[int(axis)], begins > 0.0, t)
-        self.steps += s.steps
-        s.steps = s.crossing = s.stopped = 0
-
-    def _note_stop(self, axis: str, begins: bool, t: float) -> None:
-        if begins:
-            self.stops.append(Stop(axis, t))
+        if not (s.crossing or s.stopped):
             return
-        for i in reversed(range(len(self.stops))):
-            if self.stops[i].axis == axis:
-                self.stops[i] = replace(self.stops[i], end=t)
-                break
+        stops = list(self.stops)
+        crossings = [
+            Crossing(AXES[int(axis)], *crossing)
+            for axis, *crossing in buffers.crossings[: s.crossing].tolist()
+        ]
+        for axis, begins, t in buffers.stops[: s.stopped].tolist():
+            _note_stop(stops, ("x", "y", "xy")[int(axis)], begins > 0.0, t)
+        events = (len(self.crossings), crossings, stops) if self.recorded else (0, [], [])
+        self.pending = "_settle_after", *events
+        self._put_events(*events)
+        self.pending = SETTLE
+
+    def _settle_after(self, *events: Any) -> None:
+        self._put_events(*events)
+        self.settle()
+
+    def _put_events(self, n: int, crossings: list[Crossing], stops: list[Stop]) -> None:
+        """Puts crossings behind the first n, and the stops, into the record."""
+        s, self.crossings[n:], self.stops = self.row.s, crossings, stops
+        s.crossing = s.stopped = 0
 
     # ---- the end
 
@@ -321,6 +421,7 @@ class Run:
 
     def interrupt(self) -> None:
         """Ends the run at its last sample."""
+        self.pending = ("interrupt",)
         self.outcome = monitor.Outcome("interrupted", self.t, self.i)
         self.flush()
 
@@ -347,32 +448,63 @@ class Run:
 
     # ---- changes
 
-    def take_over(self, controller: Controller) -> None:
-        """Lets the user's own controller act, before the first step of a sampled run."""
-        self._controller = controller
-        self.row.take(self.scenario, controller)
+    def take_over(self) -> None:
+        """Lets a controller give `torque`, from before the first step of a sampled run on."""
+        self.pending = ("take_over",)
+        self.controller = Controller(lambda *measured: (self.torque, ()))
+        self.row.take(self.scenario, self.controller)
         self.row.begin(self.scenario)
         self._saved, self._ahead = self.row.saved(), None
+        self.pending = ()
 
     def change(self, scenario: Scenario) -> None:
         """Continues in another scene."""
-        self.scenario = self.watch.scenario = scenario
-        self.row.change(scenario, self._controller)
+        self.pending = "_change_back", self.row.checkpoint()
+        try:
+            self.row.change(scenario, self.controller)
+        except Exception:  # of a scene that is refused
+            self.mend()
+            raise
+        self._put_scenario(scenario)
+
+    def _change_back(self, before: Any) -> None:
+        """Returns to the scene before an interrupted change."""
+        self.row.change_back(before)
         self._ahead = None
+
+    def _put_scenario(self, scenario: Scenario) -> None:
+        """Notes the scene in which the run continues."""
+        self.pending = "_put_scenario", scenario
+        self.scenario, self.watch.scenario = scenario, self.watched(scenario)
+        self._ahead, self.pending = None, ()
+
+    def watched(self, scenario: Scenario) -> Scenario:
+        """The scenario as its monitor sees it."""
+        return scenario
 
     def change_force(self, force: tuple[float, ...]) -> None:
         """Continues under another constant muscle force."""
-        self.scenario = with_checked(self.scenario, force=force)
+        self._put_force(with_checked(self.scenario, force=force))
+
+    def _put_force(self, scenario: Scenario) -> None:
+        self.pending = "_put_force", scenario
+        self.scenario = scenario
         self.push_steadily()
+        self.pending = ()
 
     def change_gain(self, gain: tuple[float, float]) -> None:
         """Continues with another gain."""
         changed = with_checked(self.scenario, gain=gain)
-        if not scene.takes_gain(self.row.m):
+        if scene.takes_gain(self.row.m):
+            self._put_gain(changed)
+        else:
             self.change(changed)
-            return
-        self.scenario = self.watch.scenario = changed
-        self.put_gain(gain)
+
+    def _put_gain(self, scenario: Scenario) -> None:
+        self.pending = "_put_gain", scenario
+        self.scenario = self.watch.scenario = scenario
+        self.put_gain(scenario.gain)
+        self.pending = ()
 
     def put_gain(self, gain: tuple[float, float]) -> None:
         """Continues with other numbers K, where they are all that a gain changes."""
@@ -403,38 +535,62 @@ class Run:
 
     def restart(self) -> None:
         """Restarts without a record; not after `change`, or where signals are prepared ahead."""
+        self.pending = ("restart",)
         self.restore(self._saved)
         self.steps = self.judged = 0
         self.watch = _monitor(self.scenario, self.monitored)
         self.outcome = self.end_time = self.last = None
+        self.pending = ()
 
     def snapshot(self) -> Snapshot:
         """The run with its record, to return to."""
         n, buffers = self.filled, self.buffers
-        record = copy.deepcopy({name: getattr(self, name) for name in RECORDED})
         made = buffers.rows[:n].copy(), buffers.rendered[:n].copy(), self.extra(n).copy()
-        return Snapshot(self.scenario, self.row.saved(), self._saved, *made, record)
+        states = self.row.saved(), self._saved
+        return Snapshot(self.given, self.kind, self.scenario, *states, *made, self._record())
+
+    @property
+    def kind(self) -> dict[str, Any]:
+        """What a run must have in common with one whose snapshot it returns to."""
+        kept = {name: getattr(self, name) for name in ("every", "recorded", "monitored")}
+        return kept | {"torque": self.controller is not None}
+
+    def _record(self) -> dict[str, Any]:
+        """What a snapshot keeps of the record, which the run goes on changing."""
+        fields = {name: getattr(self, name) for name in (*JUDGED, "initial_energy", "torque")}
+        fields |= {name: list(getattr(self, name)) for name in ("kept", "crossings", "stops")}
+        return fields | {"watch": self.watch.copied()}
 
     def return_to(self, x: Snapshot) -> None:
-        """Returns to a snapshot."""
+        """Returns to a snapshot.
+
+        Raises:
+            ParameterError: it is of another scenario, or was kept otherwise.
+        """
+        check_same_run(self, x)
+        self.pending = "return_to", x
         if x.scenario != self.scenario:
             self.scenario = x.scenario
-            self.row.take(x.scenario, self._controller)
+            self.row.take(x.scenario, self.controller)
         self.restore(x.saved)
         self._saved = x.before
         self.buffers.rows[: len(x.rows)] = x.rows
         self.buffers.rendered[: len(x.forces)] = x.forces
         self.buffers.extra[: len(x.extra)] = x.extra
-        for name, value in copy.deepcopy(x.record).items():
-            setattr(self, name, value)
+        for name, value in x.record.items():
+            setattr(self, name, list(value) if isinstance(value, list) else value)
+        self.watch = x.record["watch"].copied()
+        self.pending = ()
 
     # ---- the present sample
 
     def ahead(self) -> np.ndarray:
         """The row that a step would write now, and the force of the clay in it [N]."""
         self._prepared(self.filled + 1)
+        self.pending = SETTLE
         found = self.row.peek()
         self.row.check()
+        self.pending = ()
         return found
 
     def numbers_ahead(self) -> list[float]:
@@ -477,7 +633,7 @@ class Run:
 
     def is_diverging(self) -> bool:
         """Whether the monitor would find the run unstable by now."""
-        watch, n = copy.deepcopy(self.watch), self.filled
+        watch, n = self.watch.copied(), self.filled
         _, found = (
             watch.look(self._for_monitor(self.buffers.rows[:n], self.extra(n)), self.judged)
             if n
@@ -489,20 +645,25 @@ class Run:
 
     def flush(self) -> None:
         """Judges the rows since the last check."""
-        n = self.filled
+        n, books = self.filled, self._books()
+        self.pending = "_judge_again", books
         self.row.s.row = 0
         good = self.judge(self.buffers.rows[:n])
         if self.recorded and self.outcome is not None and self.end_time is None and good < n:
+            self.pending = "_judge_again", books._replace(saved=self.row.saved())
             self._repeat(good)
+        self.pending = ()
 
     def _repeat(self, good: int) -> None:
         """Makes the good rows since the last check again: the ledger ends with them."""
-        made, crossings, stops = self.steps, list(self.crossings), list(self.stops)
+        steps, s = self.steps, self.row.s
         self.restore(self._saved)
         while self.filled < good:  # in parts, where borders are many
-            self._make(good)
-        self.row.s.row = 0
-        self.steps, self.crossings, self.stops = made, crossings, stops
+            room = self._prepared(good)
+            self._make(room)
+            s.crossing = s.stopped = 0  # they are known
+        s.row = 0
+        self.steps = steps
 
     def judge(self, made: np.ndarray) -> int:
         """Adds samples to the record, up to the end of the good part of the run."""
@@ -539,7 +700,9 @@ class Run:
     def _keep(self, made: np.ndarray, good: int) -> None:
         """Keeps good rows."""
         forces, end = self.buffers.rendered, made[good - 1]
-        force = forces[good - 1, :2] if self.records_force else self._force(end[12:14], end[4:6])
+        force: Any = (
+            forces[good - 1, :2] if self.records_force else self._force(end[12:14], end[4:6])
+        )
         extra = self.extra(len(made))
         self.last = np.concatenate((end, force, extra[good - 1] if len(extra) else ()))
         if not self.recorded:
@@ -563,7 +726,9 @@ class Run:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The samples kept, by the names of Record's arrays."""
-        indices, made, forces, extra = zip(*self.kept, strict=True)
+        more = joints.width(self.row.m) if self.row.m.general else 0
+        nothing = Kept(np.zeros(0, int), *(np.zeros((0, n)) for n in (rows.ROW, 3, more)))
+        indices, made, forces, extra = zip(*(self.kept or [nothing]), strict=True)
         t = np.concatenate(indices) * self.scenario.dt
         if self.end_time is not None and len(t):
             t[-1] = self.end_time
@@ -618,6 +783,30 @@ class Run:
         if m.general:  # it starts at rest; its weight has no zero of energy
             out["throughput"] = float(w.through)
         return out
+
+
+def check_same_run(run: Run, x: Snapshot) -> None:
+    """Refuses a snapshot of another scenario than that of a run, but for what `set` can change."""
+    for field in fields(Scenario):
+        now, then = getattr(run.given, field.name), getattr(x.given, field.name)
+        if field.name == "operator":
+            now, then = any(run.given.operators), any(x.given.operators)
+        if field.name not in ("name", "force", "gain") and now is not then and now != then:
+            raise ParameterError("snapshot", x, f"{OTHER}: {field.name} differs")
+    for name, now in run.kind.items():
+        if x.kept[name] != now:
+            raise ParameterError("snapshot", x, f"{OTHER}: {name} is {x.kept[name]!r}, not {now!r}")
+
+
+def _note_stop(stops: list[Stop], axis: str, begins: bool, t: float) -> None:
+    """Adds a stop that begins, or the end of the newest one of an axis."""
+    if begins:
+        stops.append(Stop(axis, t))
+        return
+    for i in reversed(range(len(stops))):
+        if stops[i].axis == axis:
+            stops[i] = replace(stops[i], end=t)
+            break
 
 
 def balance(work: Sequence[Any], first: Sequence[Any], last: Sequence[Any]) -> dict[str, Any]:

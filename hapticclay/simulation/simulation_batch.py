@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Any
@@ -18,7 +17,7 @@ from .batch import checked_scenarios, cores
 from .engines import engine_for
 from .monitor import Outcome
 from .run import COLUMNS
-from .stepwise import MOST, MOST_GAIN, Alone, gain_of, started_with_operator
+from .stepwise import MOST, MOST_GAIN, Alone, gain_of, mended, started_with_operator
 from .vectored import VectoredRuns
 
 
@@ -70,7 +69,7 @@ class SimulationBatch:
         given = list(checked_scenarios(scenarios, self._warned))
         if not given:
             raise ParameterError("scenarios", scenarios, "must hold at least one Scenario")
-        self._lock, self._closed = threading.Lock(), False
+        self._closed = False
         self._run = VectoredRuns(given, engine, workers or cores(), monitored)
 
     def __enter__(self) -> SimulationBatch:
@@ -83,9 +82,24 @@ class SimulationBatch:
         return len(self._run.runs)
 
     def close(self) -> None:
-        """Closes the batch; no further step can be made."""
-        self._closed = True
-        self._run.close()
+        """Closes the batch; no further step can be made.
+
+        Raises:
+            RuntimeError: another thread uses it.
+        """
+        if not self._closed:
+            with Alone(self, mends=False) as runs:
+                self._closed = True
+                runs.close()
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        """Refused: the runs lie in memory that their threads share.
+
+        Raises:
+            TypeError: always.
+        """
+        remedy = "make another of the same scenarios, or copy a Simulation"
+        raise TypeError(f"{type(self).__name__} cannot be copied or pickled: {remedy}")
 
     def advance(
         self,
@@ -135,9 +149,10 @@ class SimulationBatch:
             several = not isinstance(scenario, Scenario)
             given = list(_each("scenario", scenario, len(which), several))
             list(checked_scenarios(given, self._warned))
-        with Alone(self) as all_:
-            for k, s in zip(which, given, strict=True):
-                all_.restart(k, s)
+        with Alone(self, mends=False) as all_:
+            if all_.pending:
+                all_.mend(which)
+            all_.restart(which, given)
 
     def set(
         self,
@@ -196,7 +211,7 @@ class SimulationBatch:
     @property
     def t(self) -> np.ndarray:
         """Time of the present sample of each run [s], shape (N,)."""
-        return self._run.times.copy()
+        return mended(self).times.copy()
 
     p = _shown("p", "Handle positions [m], shape (N, 2), as `Simulation.state`.")
     v = _shown("v", "Handle velocities [m/s], shape (N, 2).")
@@ -211,12 +226,12 @@ class SimulationBatch:
     @property
     def ended(self) -> np.ndarray:
         """Which runs have ended, shape (N,)."""
-        return self._run.over.copy()
+        return mended(self).over.copy()
 
     @property
     def outcomes(self) -> list[Outcome | None]:
         """How each run ended; None while it is running."""
-        return self._run.outcomes
+        return mended(self).outcomes
 
     @property
     def diverging(self) -> np.ndarray:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import sys
 import threading
 import time
 from collections.abc import Sequence
@@ -16,7 +18,6 @@ from ..errors import Bound, ParameterError, integer, is_series, number, numbers_
 from ..kernel.engine import warnings_caught
 from ..kernel.row import SHOWN
 from ..model.operator import Operator
-from ..model.sampled_controller import Controller
 from ..scene.plausible import warn_implausible
 from ..scene.scenario import Scenario
 from . import record
@@ -102,7 +103,7 @@ class Simulation:
         monitored: bool = True,
     ):
         self._engine, self._maker = engine, engine_for(engine, scenario.t_max / scenario.dt)
-        self._lock, self._workspace = threading.Lock(), Workspace()
+        self._workspace = Workspace()
         self._closed, self._warned, self._recorded = False, (), recorded
         self._monitored, self._every = monitored, every
         self._begin(scenario)
@@ -112,11 +113,10 @@ class Simulation:
         if place != self._warned:  # warn of clay out of reach and the like once
             warn_implausible(scenario)
             self._warned = place
-        kept: dict[str, Any] = self._kept() | {"keep_for_monitor": True}
-        self._run = Run(scenario, engine=self._maker, workspace=self._workspace, **kept)
-        self._given, self._wall = scenario, 0.0
-        self._torque: tuple[float, ...] | None = None
         self._forget()
+        kept: dict[str, Any] = self._kept() | {"keep_for_monitor": True}
+        run = Run(scenario, engine=self._maker, workspace=self._workspace, **kept)
+        self._run, self._wall = run, 0.0
 
     def _kept(self) -> dict[str, Any]:
         return {"every": self._every, "recorded": self._recorded, "monitored": self._monitored}
@@ -135,20 +135,30 @@ class Simulation:
 
     def __getstate__(self) -> dict[str, Any]:
         with Alone(self) as run:
-            names = "_engine", "_torque", "_wall", "_given"
-            found = {x: getattr(self, x) for x in names}
+            found = {name: getattr(self, name) for name in ("_engine", "_wall")}
             return found | {"kept": self._kept(), "snapshot": run.snapshot()}
 
     def __setstate__(self, kept: dict[str, Any]) -> None:
-        self.__init__(kept["_given"], engine=kept["_engine"], **kept["kept"])  # type: ignore[misc]
-        if kept["_torque"] is not None:
-            self._take_over(kept["_torque"])
-        self._run.return_to(kept["snapshot"])
+        snapshot = kept["snapshot"]
+        self.__init__(snapshot.given, engine=kept["_engine"], **kept["kept"])  # type: ignore[misc]
+        if snapshot.kept["torque"]:
+            self._run.take_over()
+        self._run.return_to(snapshot)
         self._wall = kept["_wall"]
 
     def close(self) -> None:
-        """Closes the simulation; no further step can be made."""
-        if not self._closed and self._has_record:
+        """Closes the simulation; no further step can be made.
+
+        Raises:
+            RuntimeError: another thread uses it.
+        """
+        if self._closed:
+            return
+        with Alone(self, mends=False) as run:
+            is_torn = run.row.is_torn
+            if not is_torn:
+                run.mend()
+        if self._has_record and not is_torn:
             self.record()
         self._closed = True
 
@@ -159,17 +169,17 @@ class Simulation:
     @property
     def scenario(self) -> Scenario:
         """What is run, with the force, gain, operator and clay now in effect."""
-        return self._run.scenario
+        return mended(self).scenario
 
     @property
     def outcome(self) -> Outcome | None:
         """How the run ended; None while it is running."""
-        return self._run.outcome
+        return mended(self).outcome
 
     @property
     def t(self) -> float:
         """Time of the present sample [s]."""
-        return self._run.t
+        return mended(self).t
 
     @property
     def state(self) -> Sample:
@@ -293,8 +303,8 @@ class Simulation:
         Raises:
             ParameterError: scenario is of another type, or refused as by `simulate`.
         """
-        with Alone(self):
-            self._begin(scenario or self._given)
+        with Alone(self, mends=False) as run:
+            self._begin(scenario or run.given)
 
     def snapshot(self) -> Snapshot:
         """The run as it is now, to `restore`; it can be pickled."""
@@ -306,11 +316,16 @@ class Simulation:
         """Returns to a snapshot, with the record as it was.
 
         Args:
-            snapshot: of this simulation, or of another one of the same scenario.
+            snapshot: of this simulation, or of another one of the same scenario, which may have
+                begun with another force, gain or operator.
+
+        Raises:
+            ParameterError: it is of another scenario, or of a simulation with another `every`,
+                `recorded` or `monitored`, or with torques given where this one has none.
         """
-        with Alone(self) as run:
-            run.return_to(snapshot)
+        with Alone(self, mends=False) as run:
             self._forget()
+            run.return_to(snapshot)
 
     def set(
         self,
@@ -337,13 +352,13 @@ class Simulation:
                 started_with_operator(run.scenario, operator)
                 changes["operator"] = operator
             if b is not None:
-                factor, clay = number("b", b, 0.0, 1e6), self._given.clay
+                factor, clay = number("b", b, 0.0, 1e6), run.given.clay
                 changes["clay"] = clay and clay.scaled(factor)
+            self._state = None
             if changes:
                 run.change(replace(run.scenario, **changes))
             if gain is not None:
                 run.change_gain(gain)
-            self._state = None
 
     def record(self) -> record.Record:
         """The record up to the last sample stepped from; from then on the simulation has ended.
@@ -367,7 +382,7 @@ class Simulation:
 
     def _drive(self, torque: tuple[float, ...]) -> None:
         run = self._run
-        if self._torque is None:
+        if run.controller is None:
             if run.scenario.control != "sampled":
                 bound = "must be 'sampled' where torques are given"
                 raise ParameterError("control", run.scenario.control, bound)
@@ -375,12 +390,9 @@ class Simulation:
             if run.i or own:
                 bound = "must be given from the first step on, and not beside a controller"
                 raise ParameterError("torque", torque, bound)
-            self._take_over(torque)
-        self._torque = torque
-
-    def _take_over(self, torque: tuple[float, ...]) -> None:
-        self._torque = torque
-        self._run.take_over(Controller(lambda *measured: (self._torque, ())))
+            run.torque = torque
+            run.take_over()
+        run.torque = torque
 
 
 def make_steps(run: Run, n: int) -> None:
@@ -393,25 +405,56 @@ def make_steps(run: Run, n: int) -> None:
 
 
 class Alone:
-    """Access of one thread to what an owner runs, for `with`; a generator would take a step's time.
+    """Access of one thread to what an owner runs, for `with`: a generator takes a step's time.
 
-    The owner has a `_lock`, its `_run`, whether it is `_closed`, and a `_noun` for errors.
+    The owner has its `_run`, whether it is `_closed`, and a `_noun` for errors. Who uses it is
+    noted in one operation, by thread and frame: an access that Ctrl-C ended before its end could be
+    noted is recognized, as its frame does not run any more. What Ctrl-C left half done is mended.
     """
 
-    def __init__(self, owner: Any):
-        self.owner = owner
+    def __init__(self, owner: Any, mends: bool = True):
+        self.owner, self.mends = owner, mends
 
     def __enter__(self) -> Any:
-        owner = self.owner
-        if not owner._lock.acquire(blocking=False):
-            raise RuntimeError(f"another thread uses this {owner._noun}: give each thread its own")
-        if owner._closed:
-            owner._lock.release()
-            raise RuntimeError(f"the {owner._noun} is closed")
-        return owner._run
+        owner, me = self.owner, (threading.get_ident(), sys._getframe(1))
+        while (user := vars(owner).setdefault("_user", me)) is not me:
+            if is_running(*user):
+                noun = owner._noun
+                raise RuntimeError(f"another thread uses this {noun}: give each thread its own")
+            with _taking:
+                if vars(owner).get("_user") is user:
+                    del owner._user
+        try:
+            if owner._closed:
+                raise RuntimeError(f"the {owner._noun} is closed")
+            if self.mends and owner._run.pending:
+                owner._run.mend()
+            return owner._run
+        except BaseException:
+            self.__exit__()
+            raise
 
     def __exit__(self, *error: object) -> None:
-        self.owner._lock.release()
+        vars(self.owner).pop("_user", None)
+
+
+_taking = threading.Lock()
+
+
+def is_running(thread: int, frame: Any) -> bool:
+    """Whether a frame is among those that a thread runs."""
+    now = sys._current_frames().get(thread)
+    while now is not None and now is not frame:
+        now = now.f_back
+    return now is not None
+
+
+def mended(owner: Any) -> Any:
+    """What an owner runs, mended where Ctrl-C left something half done and nothing else uses it."""
+    if owner._run.pending:
+        with contextlib.suppress(RuntimeError), Alone(owner):
+            pass
+    return owner._run
 
 
 def sample_of(t: float, row: np.ndarray, m: Any = None) -> Sample:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from ..kernel import layout, mover, movers, path, records, scene
 from ..kernel.native import machine
 from ..kernel.row import CHUNK, SHOWN, one
 from ..scene.scenario import Scenario
+from .crew import Crew, outlast
 from .monitor import Outcome
 from .run import Run, Workspace
 
@@ -21,6 +22,9 @@ LOOK = 0.02  # [s] of simulated time between two checks for divergence
 
 class VectoredRuns:
     """Runs without a record, and their rows; compiled steps are made by `workers` threads.
+
+    As of a `Run`, what an interrupted call left half done is `pending`, and `mend` completes it.
+    Interrupted steps end where they are, each run at a sample of its own.
 
     Attributes:
         runs: the runs.
@@ -40,7 +44,7 @@ class VectoredRuns:
         self.prepares = np.zeros(n, bool)  # which cannot advance together
         self.takes_gain = np.zeros(n, bool)  # whose gains are nothing but two numbers of the model
         self.movers = [movers.Movers() for _ in range(workers)]
-        self.pool: ThreadPoolExecutor | None = None
+        self.crew, self.pending = Crew(workers), ()
         native = engine == "native"
         self.models: Any = np.zeros(n * native, layout.dtype_of(records.Model))
         self.states: Any = np.zeros(n * native, layout.dtype_of(records.State))
@@ -53,8 +57,47 @@ class VectoredRuns:
 
     def close(self) -> None:
         """Ends its threads."""
-        if self.pool is not None:
-            self.pool.shutdown()
+        self.crew.end()
+
+    # ---- interruptions
+
+    def mend(self, but: Sequence[int] = ()) -> None:
+        """Waits for threads that are still at work, and completes what was left half done.
+
+        but: runs that are about to restart.
+
+        Raises:
+            RuntimeError: a step of another run was interrupted within, see `Run.mend`.
+        """
+        self._end_work()
+        if self.pending:
+            name, *arguments = self.pending
+            getattr(self, name)(*arguments)
+        for k, run in enumerate(self.runs):
+            if k not in but and not self.over[k]:
+                self._mend_run(k, run)
+        self.is_shown[:] = self.over
+        self.pending = ()
+
+    def _end_work(self) -> None:
+        if self.crew.is_at_work:
+            self.models["halts"] = 1
+            self.crew.end()
+        if len(self.models):
+            self.models["halts"] = 0
+
+    def _mend_run(self, k: int, run: Run) -> None:
+        """Brings a run to a sample, and its entries of this to the run."""
+        try:
+            run.mend()
+        except RuntimeError as error:
+            raise RuntimeError(f"run {k}: {error}") from None
+        if run.outcome is not None:
+            self._end(k, run)
+        elif run.row.s.code != path.OPEN or run.filled >= CHUNK - 1:
+            self._settle(k)
+        if not self.over[k]:
+            self.times[k] = run.t
 
     # ---- one run
 
@@ -66,7 +109,6 @@ class VectoredRuns:
     def _begin(self, k: int) -> None:
         """Notes that a run is at its start."""
         s, run = self.given[k], self.runs[k]
-        run.row.m.drops_events = 1
         self.over[k], self.changed[k], self.times[k] = False, False, 0.0
         self.force[k], self.gain[k] = s.force[:2], s.gain
         self.looked_at[k], self.diverging[k] = -np.inf, False
@@ -90,31 +132,44 @@ class VectoredRuns:
         """The scenario of a run, with all that is now in effect."""
         return self._sync(k).scenario
 
-    def restart(self, k: int, scenario: Scenario | None) -> None:
-        """Restarts a run."""
+    def restart(self, which: Sequence[int], scenarios: Sequence[Scenario | None]) -> None:
+        """Restarts runs, in other scenarios where there are any."""
+        self.pending = "restart", which, scenarios
+        try:
+            for k, scenario in zip(which, scenarios, strict=True):
+                self._restart(k, scenario)
+        except Exception:  # a scenario is refused: the runs before it have restarted
+            self.pending = ()
+            raise
+        self.pending = ()
+
+    def _restart(self, k: int, scenario: Scenario | None) -> None:
         run = self.runs[k]
         if scenario is None and not self.changed[k] and not run.prepares:
             run.restart()
             run.scenario = self.given[k]
             run.push_steadily()
         else:
-            self.given[k] = scenario or self.given[k]
-            self.runs[k] = self._new(k, self.given[k], run.workspace)
+            scenario = scenario or self.given[k]
+            self.runs[k] = self._new(k, scenario, run.workspace)
+            self.given[k] = scenario
         self._begin(k)
 
     def change(self, k: int, change: Callable[[Scenario], Scenario]) -> None:
         """Continues with other numbers, unless the run has ended."""
         if self.over[k]:
             return
+        self.changed[k], self.is_shown[k] = True, False
         run = self._sync(k)
         run.change(change(run.scenario))
-        run.row.m.drops_events = 1
-        self.changed[k], self.is_shown[k] = True, False
 
     def set_gain(self, which: np.ndarray, gain: np.ndarray) -> None:
         """Continues with other gains, in runs that have not ended."""
         other = (gain != self.gain[which]).any(axis=1) & ~self.over[which]
-        which, gain = which[other], gain[other]
+        self._put_gain(which[other], gain[other])
+
+    def _put_gain(self, which: np.ndarray, gain: np.ndarray) -> None:
+        self.pending = "_put_gain", which, gain
         self.gain[which], self.changed[which] = gain, True
         self.is_shown[which] = False
         plain = self.takes_gain[which]
@@ -123,7 +178,7 @@ class VectoredRuns:
             which = which[~plain]
         for k in which.tolist():
             self._sync(k)
-            self.runs[k].row.m.drops_events = 1
+        self.pending = ()
 
     # ---- steps
 
@@ -133,6 +188,10 @@ class VectoredRuns:
         which, force = which[other], force[other]
         if not len(which):
             return
+        self._put_force(which, force)
+
+    def _put_force(self, which: np.ndarray, force: np.ndarray) -> None:
+        self.pending = "_put_force", which, force
         self.force[which], self.is_shown[which] = force, False
         steady = force.copy()
         for j, k in enumerate(which.tolist()):
@@ -145,17 +204,23 @@ class VectoredRuns:
         else:
             for k, f in zip(which.tolist(), steady.tolist(), strict=True):
                 self.runs[k].push_evenly((0.0, *f, 0.0, 0.0))
+        self.pending = ()
 
     def advance(self, which: np.ndarray, n: int, shows: bool = False) -> None:
         """Makes steps of runs that have not ended; `shows`: their samples will be asked for."""
         if not len(which):
             return
+        self.pending = ("stop",)
         self.is_shown[which] = False
         alone, together = self._split(which)
         for k in alone.tolist():
             self._one(k, n)
         self._draw(together, n + shows)
         self._together(together, n, shows)
+        self.pending = ()
+
+    def stop(self) -> None:
+        """Ends interrupted steps where they are: `mend` brings each run to its sample."""
 
     def _split(self, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Runs that advance one by one, in Python or with something to prepare, and the others."""
@@ -214,24 +279,16 @@ class VectoredRuns:
         parts = np.array_split(which, min(self.workers, len(which)))
         for thread, part in enumerate(parts):
             self.models["engine"][part] = self.engines[thread, part]
-        if len(parts) == 1:
-            work(0, parts[0])
-            return
-        self.pool = self.pool or ThreadPoolExecutor(self.workers)
-        futures = [self.pool.submit(work, i, part) for i, part in enumerate(parts) if i]
         try:
-            work(0, parts[0])
-            wait(futures)
-        finally:
-            for x in futures:
-                x.result()
+            self.crew.do([partial(work, thread, part) for thread, part in enumerate(parts)])
+        except BaseException:
+            outlast(self._end_work)
+            raise
 
     def _settle(self, k: int) -> None:
         """Judges the rows of a run: they are full, or it is over."""
         run = self._sync(k)
-        run.count_steps()
-        run.note_end()
-        run.flush()
+        run.settle()
         if run.outcome is not None:
             self._end(k, run)
 
@@ -246,6 +303,7 @@ class VectoredRuns:
         """The present samples, shape (n, SHOWN)."""
         stale = np.flatnonzero(~(self.over | self.is_shown))
         if len(stale):
+            self.pending = ("stop",)
             alone, together = self._split(stale)
             for k in alone.tolist():
                 self.shown[k] = self.runs[k].ahead()
@@ -253,6 +311,7 @@ class VectoredRuns:
                 self._draw(together, 1)
                 self._call(self._peek, together)
             self.is_shown[stale] = True
+            self.pending = ()
         return self.shown
 
     def torque_reached(self, n: int, k: int) -> np.ndarray:

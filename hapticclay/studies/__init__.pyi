@@ -16,6 +16,8 @@ from .identification import Noise as Noise
 from .identification import identify as identify
 from .impedance import MeasuredImpedance as MeasuredImpedance
 from .impedance import measure_impedance as measure_impedance
+from .joint_motion import JointMotion as JointMotion
+from .joint_motion import joint_motion as joint_motion
 from .joint_runs import JointRuns as JointRuns
 from .joint_runs import joint_runs as joint_runs
 from .labs import Lab as Lab

@@ -9,18 +9,21 @@ sampled evenly and stamped on arrival. All else is resampled by cubic splines. W
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from .. import matrices
 from ..columns.stamps import EVEN, Stamps
 from ..errors import ParameterError
 from .outliers import robust_deviation, times
 
 MODULI = (2.0**16, 2.0**32)  # at which counters of clocks and of encoders begin again
 LEAST_MODULUS = 100.0  # usual steps
+MOST_ACROSS = 20.0  # usual steps over the turn of a counter
 TICKS = (1.0, 1e-3, 1e-6, 1e-9)  # of clocks [s]
 DISORDER = 0.02, 20.0  # share of rows that may be out of order, and usual steps by which
 LEAST_JUDGED = 50  # rows by which it is judged where a stamp comes from
@@ -30,6 +33,8 @@ CLOSE = 0.25  # of a step: rows nearer than that are averaged
 SMOOTHER = 0.7  # ratio of deviations from cubics below which rows were sampled evenly
 BRIDGED = 24  # rows missing in a gap that is bridged ...
 LOST = 0.05  # ... if no larger share of all rows is missing
+SIDES = (8, 4)  # rows on each side of a long step by which it is known whether one is missing, ...
+SURE = 3.0  # ... and the logarithm of how much likelier it is that decides
 TICK = 0.02  # of the duration: stamps of a coarser clock are no times of rows
 TURNS = (math.tau, 360.0)  # at which angles begin again [rad, deg]
 WIDEST = 64  # bits of a counter
@@ -59,7 +64,7 @@ def even_columns(columns: Mapping[str, np.ndarray], input: Between = "spline") -
     stamps = Stamps(rows["t"])
     if len(stamps.t) < 3 or not stamps.step > 0.0 or _is_even(stamps.t):
         return Even(_without_last(rows), tuple(notes))
-    if (grid := _on_grid(stamps)) is not None:
+    if (grid := _on_grid(stamps, rows["output"])) is not None:
         rows["t"] = grid
         if _is_even(grid):
             where = f"{1.0 / Stamps(grid).step:.6g} Hz"
@@ -77,7 +82,7 @@ def even_columns(columns: Mapping[str, np.ndarray], input: Between = "spline") -
     if _is_even(rows["t"]):
         return Even(_without_last(rows), (*notes, *note))
     made, more = _resampled(rows, input)
-    return Even(made, (*notes, *note, *more))
+    return Even(made, (*notes, *note, *(more if grid is None else ())))
 
 
 def unwrapped(x: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
@@ -95,6 +100,14 @@ def unwrapped(x: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
         if jumps.any() and span <= turn * (1.0 + 1e-6) and _go_on(on, jumps, turn):
             return _along(x, steps - on), turn, np.flatnonzero(jumps) + 1
     return x, 0.0, np.zeros(0, dtype=int)
+
+
+def unwrapped_where(x: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
+    """As `unwrapped`, with NaN where a cell is missing."""
+    there = np.flatnonzero(np.isfinite(x))
+    out, (known, turn, at) = x.copy(), unwrapped(x[there])
+    out[there] = known
+    return out, turn, there[at]
 
 
 def held_rows(x: np.ndarray) -> int:
@@ -137,15 +150,53 @@ def _unwrapped_clock(t: np.ndarray) -> tuple[np.ndarray, list[str]]:
     if not len(stamps.backward) or not stamps.step > 0.0:
         return t, []
     for modulus in (m * tick for m in MODULI for tick in TICKS):
-        back = stamps.steps[stamps.backward - 1]
-        if modulus > LEAST_MODULUS * stamps.step and np.all(
-            np.abs(back + modulus) < 20.0 * stamps.step
-        ):
+        if modulus > LEAST_MODULUS * stamps.step and _wraps(stamps, modulus):
             turns = np.zeros(len(t))
             turns[stamps.backward] = modulus
             words = f"the clock begins again after {modulus:.8g} s, at row {stamps.backward[0] + 1}"
             return t + np.cumsum(turns), [f"{words}: unwrapped"]
     return t, []
+
+
+def _wraps(stamps: Stamps, modulus: float) -> bool:
+    """Whether stamps that go back go on by a step as others, had they a modulus.
+
+    Some rows may be missing there, but not where the clock begins with the first stamp again, as
+    that of another run does, or where steps are uneven and nearly any would be as others.
+    """
+    ahead = stamps.steps[(stamps.steps > 0.0) & (stamps.steps <= stamps.longest)]
+    spread = float(np.max(np.abs(ahead - stamps.step)))
+    across = stamps.steps[stamps.backward - 1] + modulus
+    count = np.round(across / stamps.step)
+    restarts = stamps.t[stamps.backward] == stamps.t[0]
+    most = np.where(restarts | (spread > EVEN * stamps.step), 1.0, MOST_ACROSS)
+    near = np.where(restarts, spread + 1e-6 * stamps.step, max(spread, EVEN * stamps.step))
+    on = np.abs(across - count * stamps.step) <= near
+    return bool(np.all(on & (count >= 1.0) & (count <= most)))
+
+
+def begins_again(t: np.ndarray) -> bool:
+    """Whether the time goes back for long, and is no counter that begins again."""
+    try:
+        _in_order({"t": _unwrapped_clock(t)[0]})
+    except Restarted:
+        return True
+    return False
+
+
+class Restarted(ParameterError):
+    """The time goes back for long.
+
+    Args:
+        field: name for the error.
+        value: the time.
+        bound: what is accepted, in words.
+    """
+
+    def told_apart_by(self, where: str) -> ParameterError:
+        """The same error with the rows to choose, as "episode=0"; with "" as it is."""
+        hint = f" read one of them by where (--where {shlex.quote(where)})" if where else ""
+        return ParameterError(self.field, self.value, self.bound + hint)
 
 
 def _in_order(rows: Columns) -> tuple[Columns, list[str]]:
@@ -160,7 +211,7 @@ def _in_order(rows: Columns) -> tuple[Columns, list[str]]:
                 f"must ascend; it goes back by {-stamps.steps[row - 1]:.6g} s at row {row + 1}: "
                 "two logs in one file?"
             )
-            raise ParameterError(f"t[{row}]", float(stamps.t[row]), bound)
+            raise Restarted(f"t[{row}]", float(stamps.t[row]), bound)
         notes.append(f"rows that came out of order are sorted by their stamps: {len(back)}")
         order = np.argsort(stamps.t, kind="stable")
         rows = {key: x[order] for key, x in rows.items()}
@@ -192,28 +243,77 @@ def _is_even(t: np.ndarray) -> bool:
 # ---- grids
 
 
-def _on_grid(stamps: Stamps) -> np.ndarray | None:
+def _on_grid(stamps: Stamps, x: np.ndarray) -> np.ndarray | None:
     """Times of an even grid on which the rows lie, some perhaps missing; None if they lie on none.
 
-    Rounding alone, or 5 % of a step, parts them from it.
+    Rounding alone, or 5 % of a step, parts them from it. Where a lost row and the rounding of a
+    slower clock explain the same stamps, the position x decides.
     """
+    by_row, by_step = _even_grid(stamps), _grid_with_gaps(stamps)
+    if by_row is None or by_step is None or by_step[1][-1] == len(stamps.t) - 1:
+        return by_row if by_row is not None else by_step and by_step[0]
+    return by_step[0] if _rows_are_lost(by_step[1], x) else by_row
+
+
+def _even_grid(stamps: Stamps) -> np.ndarray | None:
+    """Times of rows of which none is missing, whose stamps are rounded; None for other stamps."""
     t, n, tick = stamps.t, np.arange(len(stamps.t), dtype=float), 1.01 * stamps.rounding
-    if tick <= TICK * stamps.duration:
-        step, start = np.polyfit(n, t, 1)
-        off = np.max(np.abs(t - start - step * n)), np.max(np.abs(stamps.steps - step))
-        if max(off) <= tick:  # no step is longer by more than a tick: none is missing
-            return start + step * n
+    if tick > TICK * stamps.duration:
+        return None
+    step, start = np.polyfit(n, t, 1)
+    off = np.max(np.abs(t - start - step * n)), np.max(np.abs(stamps.steps - step))
+    return start + step * n if max(off) <= tick else None
+
+
+def _grid_with_gaps(stamps: Stamps) -> tuple[np.ndarray, np.ndarray] | None:
+    """Times of rows of which some may be missing, and their numbers; None if they lie on none."""
+    t, tick = stamps.t, 1.01 * stamps.rounding
     k = np.concatenate(([0.0], np.cumsum(np.round(stamps.steps / stamps.step))))
     step, start = np.polyfit(k, t, 1)
     whole = np.all(np.diff(k) > 0.0)
     off = np.max(np.abs(t - start - step * k))
-    return start + step * k if whole and off <= max(min(tick, 0.5 * step), EVEN * step) else None
+    near = off <= max(min(tick, 0.5 * step), EVEN * step)
+    return (start + step * k, k) if whole and near else None
+
+
+def _rows_are_lost(k: np.ndarray, x: np.ndarray) -> bool:
+    """Whether rows are missing where their numbers k jump; else their clock is slower than k.
+
+    By the cubics around the jumps that the position x follows better; where noise hides it, by how
+    many jumps there are and whether they come evenly, as those of a slower clock do.
+    """
+    at = np.flatnonzero(np.diff(k) > 1.0)
+    evidence = max((_evidence(at, k, x, side) for side in SIDES), key=abs)
+    if abs(evidence) > SURE:
+        return evidence > 0.0
+    spacing = np.diff(at)
+    comes_evenly = len(at) > 2 and np.ptp(spacing) <= 1
+    return len(at) <= LOST * len(k) and not comes_evenly
+
+
+def _evidence(at: np.ndarray, k: np.ndarray, x: np.ndarray, side: int) -> float:
+    """Logarithm of how much likelier a position is with missing rows than without."""
+    n, values = np.arange(len(k), dtype=float), []
+    for i in at[(at >= side - 1) & (at < len(k) - side)].tolist():
+        rows = slice(i + 1 - side, i + 1 + side)
+        values.append([_off_cubic(times[rows], x[rows]) for times in (n, k)])
+    if not values:
+        return 0.0
+    without, with_gaps = np.sum(values, axis=0) + 1e-300
+    return 0.5 * len(values) * (2 * side - 4) * math.log(without / with_gaps)
+
+
+def _off_cubic(t: np.ndarray, x: np.ndarray) -> float:
+    """Sum of squares of what a cubic leaves of some rows."""
+    powers = np.vander((t - t[0]) / (t[-1] - t[0]), 4)
+    return float(np.sum((x - powers @ matrices.least_squares(powers, x)) ** 2))
 
 
 def _stamped_late(rows: Columns) -> bool:
     """Whether rows were sampled evenly and stamped later.
 
-    Their stamps then come in bunches, or the position is smoother over the number of the row.
+    Their stamps then come in bunches, and the position is not smoother over them, or else it is
+    smoother over the number of the row.
     """
     x, stamps = rows["output"], Stamps(rows["t"])
     n = np.arange(float(len(x)))
@@ -221,11 +321,12 @@ def _stamped_late(rows: Columns) -> bool:
         LATE * stamps.step
     ):
         return False
-    if np.mean(stamps.steps < BUNCH[0] * stamps.step) > BUNCH[1]:
-        return True
+    in_bunches = np.mean(stamps.steps < BUNCH[0] * stamps.step) > BUNCH[1]
     if len(stamps.repeats):
-        return False
+        return bool(in_bunches)
     by_stamp, by_row = (_roughness(x, s) for s in (stamps.t, n))
+    if in_bunches:  # of which each row is a reading at another time, or all are of one time
+        return by_stamp >= SMOOTHER * by_row
     return by_row < SMOOTHER * by_stamp
 
 
@@ -252,7 +353,7 @@ def _longest_part(rows: Columns, stamps: Stamps) -> tuple[Columns, list[str]]:
     missing = int(np.sum(lengths[gaps]))
     share = missing / (missing + len(t))
     where = f"{len(gaps)} gap{'s' * (len(gaps) > 1)}, at t = {times(t[gaps])} s"
-    told = f"{missing} rows are missing in {where}"
+    told = f"{missing} row{'s are' if missing > 1 else ' is'} missing in {where}"
     if np.max(lengths) <= BRIDGED and share <= LOST:
         return rows, [f"{told}: bridged by cubics"]
     ends = gaps[lengths[gaps] > (BRIDGED if share <= LOST else 1.0)]

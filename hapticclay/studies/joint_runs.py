@@ -1,8 +1,7 @@
 """Runs of an arm from a file at its gains and beside their limit, against the exact map.
 
 The runs are those of the map: small motion about the pose, without Coulomb friction and torque
-limits. Modes are read from samples of all joints by linear prediction of low rank (ESPRIT: Roy,
-Kailath, IEEE Trans. ASSP 37, 1989).
+limits.
 """
 
 from __future__ import annotations
@@ -14,11 +13,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
 from ..arms.joint_law import JointPD, compensated
+from ..arms.joint_ranges import without_ranges
 from ..arms.mjcf_arm import MjcfArm
 from ..errors import ParameterError
 from ..model.hardware import Hardware
+from ..model.sampled_controller import Controller
 from ..results import Result, Tables
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
@@ -26,6 +28,8 @@ from ..simulation.simulate import simulate
 from ..theory.client_loop import Delay, Sample
 from ..theory.joint_gains import Study
 from ..theory.joint_loop import JointLoop, timing_words
+from .joint_motion import Mode, modes_of_motion
+from .sampled_drive import SampledDrive
 
 BESIDE = 0.005  # share of the common limit at which runs are made on either side
 PARTS = 8, 4  # physics steps a control sample, of a serial arm and of a closed chain
@@ -34,12 +38,8 @@ SIZE, LEAST_SIZE = 1e-4, 1e-8  # [rad] of the motion at the start; of one that g
 GROWN, DECAYED = 30.0, 150.0  # a run ends where the motion has grown or decayed by so much ...
 PERIODS, LONGEST = 30.0, 4.0  # ... or after so many periods, or at this time [s]
 FEWEST = 80  # control samples of a run
-A_PERIOD = 12  # samples of a period from which modes are read
-ROWS, LEAST_ROWS = 96, 12  # of the Hankel matrix, of all joints and of one
-RANKED = 1e-5  # smaller singular values are nonlinear motion
 AGREEMENT = 0.1  # of the expected growth or decay ...
 SLACK = 1e-4  # ... and of the angular frequency: what such a step leaves, of damped light joints
-ROOM = 2.0  # times SIZE that a joint must have to either end of its range
 ALIKE = 0.95  # of the largest motion: a joint that moves so much is not another one
 OFFSET, BUILT = 0.01, 1.0  # [rad] of the reference, and length [s], of the run as built
 
@@ -127,18 +127,6 @@ class JointRuns(Result):
         return {**more, "tables": self.tables(), "assumed": self.assumed}
 
 
-class Mode(NamedTuple):
-    """One motion of all joints: log of its factor a second, and shares of the joints."""
-
-    s: complex  # [1/s, rad/s]
-    shares: np.ndarray
-
-    @property
-    def frequency(self) -> float:
-        """Frequency [Hz]."""
-        return abs(self.s.imag) / (2.0 * math.pi)
-
-
 @checked
 def joint_runs(
     arm: MjcfArm,
@@ -160,11 +148,10 @@ def joint_runs(
         progress: wraps the factors of the runs, to show how many are done.
 
     Raises:
-        ParameterError: as `joint_limits`; a joint is at the end of its range, or has no Kp and a
-            weight or spring pulls it away from the pose.
+        ParameterError: as `joint_limits`; a joint is outside its range, or has no Kp and a weight
+            or spring pulls it away from the pose.
     """
     study = Study(arm, law, Ts, delay)
-    _check_room(arm)
     scale = study.family("Kp").limit().high
     factors = [1.0]
     if math.isfinite(scale) and scale > 0.0:
@@ -216,9 +203,14 @@ class _Beside(NamedTuple):
     def motion(self) -> np.ndarray:
         """Position of the joint, less the one at which it rests [rad]."""
         s, j = self.record.scenario, self.joint
-        arm, law = s.arm, s.controller
-        assert isinstance(arm, MjcfArm) and isinstance(law, JointPD) and law.reference
-        rests = arm.q[j] + law.reference[j] - holding(arm, law)[j]
+        arm, law = s.file_arm, s.controller
+        if isinstance(law, Controller):
+            drive: SampledDrive = law.law
+            arm, law, reference = drive.arm, drive.law, drive.reference
+        else:
+            assert law is not None
+            reference = law.reference
+        rests = arm.q[j] + reference[j] - holding(arm, law)[j]  # type: ignore[index]
         return self.record.q[:, j] - rests
 
     @property
@@ -236,7 +228,7 @@ def _beside(study: Study, factor: float) -> _Beside:
 
 def expected_mode(loop: JointLoop) -> Mode:
     """The motion of a map that grows fastest, or decays most slowly."""
-    values, vectors = np.linalg.eig(loop.map())
+    values, vectors = matrices.eigenvectors(loop.map())
     i = int(np.argmin(np.abs(np.abs(values) - loop.radius())))
     s = np.log(complex(values[i])) / loop.Ts
     return Mode(complex(s.real, abs(s.imag)), np.abs(vectors[: loop.n, i]))
@@ -255,17 +247,21 @@ def buzz(arm: MjcfArm, law: JointPD, Ts: float, delay: float) -> tuple[Record, M
 def near_limit(arm: MjcfArm, law: JointPD, Ts: float, delay: float, factor: float) -> Scenario:
     """Small motion of an arm at its pose, with all Kp times a factor: what the map describes."""
     n = len(arm.names)
-    free = replace(arm, friction=(0.0,) * n, torque_limit=(math.inf,) * n)
+    free = without_ranges(replace(arm, friction=(0.0,) * n, torque_limit=(math.inf,) * n))
     scaled = replace(law, Kp=tuple(factor * k for k in law.Kp))
-    study = Study(free, scaled, Ts, delay)
-    mode = expected_mode(study.loop)
+    mode = expected_mode(Study(free, scaled, Ts, delay).loop)
     span, size = _length(mode, Ts)
     shape = mode.shares / mode.shares.max()
     reference = holding(free, scaled) + size * shape
+    controller: Any = replace(scaled, reference=tuple(reference.tolist()))
+    if law.drive_rate is not None:
+        drive = SampledDrive(free, scaled, reference, Ts, delay)
+        controller, free = drive.controller(free.q), replace(free, gravity="acts")
+        Ts, delay = 1.0 / law.drive_rate, 0.0
     return Scenario(
         name=f"{arm.name}, all Kp times {factor:.5g}",
         arm=free,
-        controller=replace(scaled, reference=tuple(reference.tolist())),
+        controller=controller,
         Ts=Ts,
         dt=Ts / _parts(arm, Ts),
         t_max=span,
@@ -293,6 +289,7 @@ def _length(mode: Mode, Ts: float) -> tuple[float, float]:
 
 def built_scenario(arm: MjcfArm, law: JointPD, Ts: float, delay: float) -> Scenario:
     """An arm as built, from rest 10 mrad off its reference."""
+    law, Ts, delay = law.in_runs(Ts, delay)
     if law.runs == "drive":  # whose torque limits are not simulated
         arm = replace(arm, torque_limit=(math.inf,) * len(arm.names))
     low, high = arm.ranges.T
@@ -326,40 +323,14 @@ def holding(arm: MjcfArm, law: JointPD) -> np.ndarray:
     return arm.q + np.where(pulled, pull / np.where(Kp > 0.0, Kp, 1.0), 0.0)
 
 
-def _check_room(arm: MjcfArm) -> None:
-    """Refuses a pose at the end of a joint's range, where a run ends at once."""
-    low, high = arm.ranges.T
-    tight = (arm.q - low < ROOM * SIZE) | (high - arm.q < ROOM * SIZE)
-    if tight.any():
-        name = arm.names[int(tight.argmax())]
-        bound = f"must be within the range of {name}, not at its end, where a run would end"
-        raise ParameterError("pose", float(arm.q[int(tight.argmax())]), bound)
-
-
 def mode_of_run(record: Record, loop: JointLoop, expected: Mode) -> Mode:
     """The motion of a run that is nearest to an expected one; NaN if the run is too short."""
     held = round(loop.Ts / record.scenario.dt)
     q = record.q[:-1:held]  # the last step may be short
-    skip = max(1, len(q) // 600)
-    if expected.frequency > 0.0:
-        skip = max(1, min(len(q) // 60, int(1.0 / (A_PERIOD * expected.frequency * loop.Ts))))
-    x = np.diff(q[::skip], axis=0)
-    if len(x) < 24:
+    modes, _ = modes_of_motion(q, loop.Ts, expected.frequency)
+    if not modes:
         return Mode(complex(math.nan, math.nan), np.zeros(loop.n))
-    rows, period = min(len(x) // 2, max(ROWS // loop.n, LEAST_ROWS)), skip * loop.Ts
-    windows = np.lib.stride_tricks.sliding_window_view(x, rows, axis=0)
-    hankel = windows.transpose(2, 1, 0).reshape(rows * loop.n, -1)
-    u, size, _ = np.linalg.svd(hankel, full_matrices=False)
-    r = max(1, min(int(np.sum(size > RANKED * size[0])), len(size) // 2))
-    u = u[:, :r]
-    z = np.linalg.eigvals(np.linalg.lstsq(u[: -loop.n], u[loop.n :])[0])
-    z = z[np.abs(z) > 1e-6]
-    s = np.log(z.astype(complex)) / period
-    i = int(np.abs(s - expected.s).argmin())
-    late = np.where(np.abs(z) > 1.0, len(x) - 1, 0)  # one that grows fast would hide the others
-    powers = np.exp((np.arange(len(x))[:, None] - late) * np.log(z.astype(complex)))
-    shares = np.abs(np.linalg.lstsq(powers, x.astype(complex))[0])
-    return Mode(complex(s[i].real, abs(s[i].imag)), shares[i])
+    return min(modes, key=lambda mode: abs(mode.s - expected.s))
 
 
 def _limit(factors: list[float], growth: np.ndarray) -> float:

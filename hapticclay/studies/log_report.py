@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,22 +13,29 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..columns.finding import UNITS, candidates
-from ..columns.heads import Head
+from ..columns.heads import Head, is_unit, powers_of
 from ..columns.log import Log
 from ..columns.stamps import Stamps, times_of
 from ..display import table_of
 from ..errors import ParameterError
 from ..results import Result
 from ..units import Powers, parse_unit, si_unit
-from .even_columns import held_rows, unwrapped
+from .even_columns import begins_again, held_rows, unwrapped
+from .measurement import LEAST_ROWS, ROTARY
 from .outliers import runs_of, times
 from .pair_log import is_pair
+from .restarts import episodes
 
 FEW = 3  # places that a remark names
 STUCK = 0.02  # share of the rows, in a run at the largest or smallest value, that is suspicious
 TREATED = "identify and fit say what they do about it (docs/logs.md)"
 HUGE = 1e50  # a value beyond it is none: squares and sums of others do not overflow
 LEAST = 20  # rows in which columns are judged
+NO_TIME = "no time is known: name its column by --columns t=NAME, or state the rate by --rate 50"
+NO_POSITION = (
+    "no column of a position is known: name all by --columns t=NAME input=NAME output=NAME"
+)
+NO_FORCE = "no force or command is known beside the position: name it by --columns input=NAME"
 MOST_COLUMNS = 1000  # of a report: a log has tens
 
 
@@ -72,7 +81,8 @@ class LogReport(Result):
         """Name, format, rows and rate, in one line."""
         parts = [f"{self.name}: {self.form}", f"{self.rows} rows"]
         if self.stamps is not None and self.stamps.step > 0.0:
-            parts.append(f"{self.stamps.duration:.6g} s at {self.stamps.rate:.6g} Hz")
+            bursts = f", in bursts of {self.stamps.burst}" if self.stamps.burst > 1 else ""
+            parts.append(f"{self.stamps.duration:.6g} s at {self.stamps.rate:.6g} Hz{bursts}")
         return ", ".join(parts)
 
     def tables(self) -> dict[str, dict[str, Any]]:
@@ -115,11 +125,9 @@ def log_report(log: Log) -> LogReport:
     _check_columns(log)
     found = candidates(log, "time")
     time = found[0] if found else ""
-    stamps, warnings = None, [] if log.rows else ["there are no rows of numbers"]
-    if time and log.rows:
-        stamps, warnings = _stamps(log, time)
+    stamps, keep, warnings = _stamps(log, time)
     if stamps is not None:
-        warnings += [_beside(log, stamps, other) for other in found[1:]]
+        warnings += [_beside(log, other, stamps, keep) for other in found[1:]]
     if stamps is not None and stamps.even < 1.0:
         share = 100.0 * (1.0 - stamps.even)
         warnings.append(f"{share:.3g} % of the steps are off by more than 5 %: {TREATED}")
@@ -135,11 +143,15 @@ def log_report(log: Log) -> LogReport:
         still |= set() if low < high else {head.text}
         rows.append((head.text, unit, low, high, "; ".join([*faults, *_remarks(x)])))
         if len(kept) and head.text != time:
-            columns[_label(head, unit)] = size * np.where(np.abs(x) > HUGE, math.nan, x)
+            columns[_label(head, unit)] = size * np.where(np.abs(x) > HUGE, math.nan, x)[keep]
     warnings += _unstated([x.name for x in log.table.heads if x.text in unknown])
     table = table_of(("column", "unit", "lowest", "highest", "remarks"), rows)
+    commands: list[str] = []
+    if stamps is not None and time not in unknown:
+        commands, more = _commands(log, time, stamps, unknown | still)
+        warnings += more
     t = None if stamps is None else stamps.t
-    said = tuple(log.table.notes), tuple(warnings), tuple(_commands(log, time, unknown, still))
+    said = tuple(log.table.notes), tuple(warnings), tuple(commands)
     name, form = log.path.name, log.table.form
     return LogReport(name, form, log.rows, time, table, t, columns, *said)
 
@@ -159,16 +171,28 @@ def _label(head: Head, unit: str) -> str:
     si = unit.rpartition("shown in ")[2]
     if not si or not parse_unit(si) or unit == "none: SI":
         return head.text
-    return f"{head.name if head.unit else next(iter(head.last_words()))[0]} [{si}]"
+    stem = next((stem for stem, word in head.last_words() if is_unit(word)), head.text)
+    return f"{head.name if head.unit else stem} [{si}]"
 
 
-def _stamps(log: Log, time: str) -> tuple[Stamps | None, list[str]]:
-    """The stamps of a log, and what is suspicious in them."""
+def _stamps(log: Log, time: str) -> tuple[Stamps | None, Any, list[str]]:
+    """The stamps of a log, the rows that have one, and what is suspicious in them."""
+    every = slice(None)
+    if not log.rows:
+        return None, every, ["there are no rows of numbers"]
+    if not time:
+        return None, every, [NO_TIME]
     try:
-        t, out = times_of(log, time)
+        t, out = times_of(log, time, holes=True)
     except ParameterError as error:
-        return None, [f"{time} is no time: {error.bound}"]
-    stamps = Stamps(t)
+        return None, every, [f"{time} is no time: {error.bound}"]
+    keep = np.isfinite(t)
+    if not keep.any():
+        return None, every, [f"{time} is no time: it holds no numbers"]
+    if lost := int(np.count_nonzero(~keep)):
+        out.append(f"{_several(lost, 'row')} without a time: left out")
+    stamps = Stamps(t[keep])
+    t = stamps.t
     if len(gaps := stamps.gaps):
         longest = float(np.max(stamps.steps))
         out.append(
@@ -183,16 +207,16 @@ def _stamps(log: Log, time: str) -> tuple[Stamps | None, list[str]]:
         )
     if stamps.step > 0.0 and not 1.0 <= stamps.rate <= 1e5:
         out.append(f"a rate of {stamps.rate:.3g} Hz: is the time in seconds?")
-    return stamps, out
+    return stamps, keep, out
 
 
 def _several(n: int, what: str) -> str:
     return f"{n} {what}{'s' * (n != 1)}"
 
 
-def _beside(log: Log, stamps: Stamps, other: str) -> str:
+def _beside(log: Log, other: str, stamps: Stamps, keep: Any) -> str:
     """How another clock runs beside that of the stamps."""
-    x = log.table.loose_numbers(log.place(other)) * log.size(log.place(other))[0]
+    x = log.table.loose_numbers(log.place(other))[keep] * log.size(log.place(other))[0]
     good = np.isfinite(x)
     if np.count_nonzero(good) < LEAST or not np.ptp(x[good]) * np.ptp(stamps.t[good]) > 0.0:
         return f"{other} is no clock"
@@ -214,7 +238,7 @@ def _unit(log: Log, place: int, accepted: tuple[str, ...]) -> tuple[float, str, 
     """Size of the unit of a column, the unit in words, and what is wrong with it."""
     head = log.table.heads[place]
     try:
-        size, powers = log.size(place, accepted)
+        size, powers = log.size(place, () if place in log.sizes else accepted)
     except ParameterError as error:
         return 1.0, head.unit, [error.bound.partition("; ")[2] or error.bound]
     if powers is None:
@@ -271,26 +295,66 @@ def _remarks(x: np.ndarray) -> list[str]:
     return out
 
 
-def _commands(log: Log, time: str, unknown: set[str], still: set[str]) -> list[str]:
-    """Commands that the columns suit, but those of unknown units and those that do not change."""
-    every = {x: candidates(log, x) for x in ("force", "position", "command")}
-    unfit = unknown | still
-    found = {x: [name for name in names if name not in unfit] for x, names in every.items()}
-    file = shlex.quote(str(log.path))
-    if is_pair(log) and not unknown:
-        return [f"hapticclay pair --data {file}"]
-    if not log.rows or not time or time in unknown or not found["position"]:
-        return []
-    place = found["position"][0]
+def _commands(log: Log, time: str, stamps: Stamps, unfit: set[str]) -> tuple[list[str], list[str]]:
+    """Commands that the columns suit, and why there are none; `unfit`: columns to leave out."""
+    if log.rows < LEAST_ROWS:
+        return [], [f"fewer than {LEAST_ROWS} rows: too few for identify and fit"]
+    words, runs = shlex.quote(str(log.path)) + log.reading.words(), None
+    if begins_again(stamps.t):
+        runs = episodes(log, time)
+        if runs is None:
+            return [], ["the time goes back for long: two logs in one file? Split it there"]
+        words += f" --where {shlex.quote(runs.where())}"
+    if is_pair(log, unfit):
+        return [f"hapticclay pair --data {words}"], []
+    fit = {x: _of_quantity(log, x, unfit) for x in ("force", "position", "command")}
+    place = next(iter(fit["position"]), None)
+    if place is None:
+        return [], [NO_POSITION]
+    inputs = {x: _beside_place(log, names, place) for x, names in fit.items()}
+    t = {} if log.clock else {"t": time}
     out = []
     for meaning, what in (("command", "G"), ("force", "S")):
-        inputs = [x for x in found[meaning] if x != place]
-        if inputs:
-            pairs = {"t": time, "input": inputs[0], "output": place}
-            words = " ".join(shlex.quote(f"{key}={name}") for key, name in pairs.items())
-            out.append(f"hapticclay identify {file} --what {what} --columns {words}")
-    if forces := [x for x in found["force"] if x != place]:
-        pairs = {"t": time, "p": place, "f": forces[0]}
-        words = " ".join(shlex.quote(f"{key}={name}") for key, name in pairs.items())
-        out.append(f"hapticclay fit {file} --columns {words}")
-    return out
+        if inputs[meaning]:
+            chosen = t | {"input": inputs[meaning], "output": place}
+            out.append(f"hapticclay identify {words} --what {what} --columns {_pairs(chosen)}")
+    if inputs["force"]:
+        if inputs["command"]:  # in a closed loop the force follows from the motion too
+            out.append(f"{out[-1]} {_pairs({'reference': inputs['command']})}")
+        if log.powers(log.place(place)) not in ROTARY:
+            chosen = t | {"p": place, "f": inputs["force"]}
+            out.append(f"hapticclay fit {words} --columns {_pairs(chosen)}")
+    return out, [] if out else [NO_FORCE]
+
+
+def _of_quantity(log: Log, meaning: str, unfit: set[str]) -> list[str]:
+    """Names of columns that can be meant and are in no unit of another quantity."""
+    wanted = (None, *powers_of(UNITS[meaning]))
+    return [
+        x for x in candidates(log, meaning) if x not in unfit and _powers(log, x, meaning) in wanted
+    ]
+
+
+def _powers(log: Log, name: str, meaning: str) -> Powers | None:
+    return log.size(log.place(name), () if log.place(name) in log.sizes else UNITS[meaning])[1]
+
+
+def _beside_place(log: Log, names: Sequence[str], place: str) -> str:
+    """The column that goes with a position: about an axis as it is, and of the same part.
+
+    A part is the end of its name, as [1] or .j2. Returns "" where there is none.
+    """
+    end = re.search(r"(\[\d+\]|\.[^.]*)?$", place)
+    rotary = log.powers(log.place(place))
+    some = [x for x in names if x != place and _go_together(rotary, log.powers(log.place(x)))]
+    same = [x for x in some if end and end[0] and x.endswith(end[0])]
+    return next(iter(same or some), "")
+
+
+def _go_together(place: Powers | None, other: Powers | None) -> bool:
+    """Whether a position and a force or command are both along a line or both about an axis."""
+    return None in (place, other) or (place in ROTARY) == (other in ROTARY)
+
+
+def _pairs(names: Mapping[str, str]) -> str:
+    return shlex.join(f"{key}={name}" for key, name in names.items())

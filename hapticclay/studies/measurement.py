@@ -16,12 +16,14 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..columns.finding import find
-from ..columns.log import Log, open_log
+from ..columns.log import Log, Reading, open_log
 from ..columns.stamps import times_of
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
 from ..units import parse_unit
-from .even_columns import Between, even_columns, unwrapped, wrap_note
+from .even_columns import Between, Restarted, even_columns, unwrapped_where, wrap_note
+from .missing_cells import whole_rows
+from .restarts import episodes
 
 COLUMNS = {  # columns of a file and their contents
     "t": "time [s]",
@@ -96,6 +98,7 @@ class Measurement:
         units: Mapping[str, str] | None = None,
         counts: Mapping[str, Any] | None = None,
         held: bool = False,
+        rate: float | None = None,
     ) -> Measurement:
         """Reads a log: text, or a binary format of docs/logs.md.
 
@@ -113,6 +116,7 @@ class Measurement:
                 "0.01 mm".
             held: whether a computer holds the input from row to row; it matters where the rows are
                 not even.
+            rate: rows in a second [Hz], of a file without a time or in place of its own.
 
         Raises:
             ParameterError: the file cannot be read or holds no table; a column is missing, or
@@ -121,7 +125,7 @@ class Measurement:
         """
         for key in columns or {}:
             choice("columns", key, tuple(COLUMNS))
-        log = open_log("path", path, units, counts)
+        log = open_log("path", path, Reading(units or {}, counts or {}, rate=rate))
         return measured(log, named_columns(log, columns or {}), "hold" if held else "spline")
 
     @classmethod
@@ -159,19 +163,35 @@ class Measurement:
 def measured(log: Log, names: Mapping[str, str], between: Between = "spline") -> Measurement:
     """The measurement in some columns of a log, `between` whose rows the input is as said."""
     cells, notes = {}, []
-    cells["t"], more = times_of(log, names["t"])
+    cells["t"], more = times_of(log, names["t"], holes=True)
     notes += more
     for key, name in names.items():
         if key == "t":
             continue
-        cells[key] = log.values(name, UNITS[key]) if key in UNITS else log.raw(name)
-    raw, turn, at = unwrapped(log.raw(names["output"]))
+        units = UNITS.get(key)
+        cells[key] = log.values(name, units, holes=True) if units else log.raw(name, holes=True)
+    raw, turn, at = unwrapped_where(log.raw(names["output"], holes=True))
     if len(at):
         cells["output"] = raw * log.size(log.place(names["output"]), UNITS["output"])[0]
         notes.append(wrap_note(turn, at, cells["t"]))
-    made = even_columns(cells, between)
-    given: dict[str, Any] = {**made.columns, "notes": (*notes, *made.notes)}
+    first = [name for name in names.values() if f"{name}#2" in log.names]
+    notes += [f"{name} is the first of the columns of this name" for name in first]
+    _check_filled(log, cells, names)
+    cells, more = whole_rows(cells, names, {"input": between})
+    try:
+        made = even_columns(cells, between)
+    except Restarted as error:
+        found = episodes(log, names["t"])
+        raise error.told_apart_by(found.where() if found else "") from None
+    given: dict[str, Any] = {**made.columns, "notes": (*notes, *more, *made.notes)}
     return Measurement(**given, name=log.path.name, rotary=_is_rotary(log, names))
+
+
+def _check_filled(log: Log, cells: Mapping[str, np.ndarray], names: Mapping[str, str]) -> None:
+    """Refuses a column without a number."""
+    for key, x in cells.items():
+        if len(x) and not np.isfinite(x).any():
+            raise log.table.bad_cell(0, log.place(names[key]))
 
 
 def _is_rotary(log: Log, names: Mapping[str, str]) -> bool:

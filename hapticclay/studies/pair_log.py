@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..columns.log import Log, open_log
+from ..columns.log import Log, Reading, open_log
 from ..display import brief, one_line
 from ..errors import ParameterError, choice
 from .even_columns import even_columns, unwrapped, wrap_note
@@ -97,6 +97,7 @@ class PairLog:
         columns: Mapping[str, str] | None = None,
         units: Mapping[str, str] | None = None,
         counts: Mapping[str, Any] | None = None,
+        rate: float | None = None,
     ) -> PairLog:
         """Reads a log: text, a binary format of docs/logs.md, or a scope of Simulink.
 
@@ -111,6 +112,7 @@ class PairLog:
                 force, with a minus for a column that holds the negative.
             units: unit of a column by name, in place of what the file says, as {"q1": "deg"}.
             counts: of an encoder's column by name: counts a turn, or the size of a count.
+            rate: rows in a second [Hz], of a file without a time or in place of its own.
 
         Raises:
             ParameterError: the file cannot be read, a column is missing, or as `PairLog`.
@@ -118,11 +120,13 @@ class PairLog:
         given = dict(columns or {})
         for key in given:
             choice("columns", key, tuple(COLUMNS))
-        return logged(open_log("path", path, units, counts), given)
+        reading = Reading(units or {}, counts or {}, rate=rate)
+        return logged(open_log("path", path, reading), given)
 
 
 def logged(log: Log, columns: Mapping[str, str]) -> PairLog:
     """The pair in the columns of a log, at even times."""
+    columns = {"t": log.clock, **columns} if log.clock else columns
     wanted = {_plain(w): key for key, words in SPELLINGS.items() for w in words}
     wanted |= {_plain(w): key for key, w in columns.items()}
     found = {}
@@ -139,9 +143,10 @@ def logged(log: Log, columns: Mapping[str, str]) -> PairLog:
     return PairLog(**even, name=log.path.stem, notes=(*notes, *made.notes))
 
 
-def is_pair(log: Log) -> bool:
-    """Whether columns of a log are those of a pair, by their names."""
-    names = {_plain(head.name) for head in log.table.heads}
+def is_pair(log: Log, unfit: Collection[str] = ()) -> bool:
+    """Whether columns of a log are those of a pair, by their names; not those that are unfit."""
+    names = {_plain(head.name) for head in log.table.heads if head.text not in unfit}
+    names |= {"t"} if log.clock else set()
     wanted = (key for key in COLUMNS if key not in OPTIONAL)
     return all(names.intersection(SPELLINGS[key]) for key in wanted)
 

@@ -16,8 +16,9 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, part
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..formulas import hardware
+from ..model.hardware import Hardware
 from ..model.samples import Samples
 from ..model.spring import STIFFNESS_MAX
 from ..scene.scenario import Scenario
@@ -52,8 +53,8 @@ class Path:
             shape (n,); empty if it does not.
     """
 
-    places: Annotated[tuple[float, ...], Bound(-0.1, 0.1, "m")]
-    middles: Annotated[tuple[float, ...], Bound(-0.1, 0.1, "m")] = ()
+    places: Annotated[tuple[Real, ...], Bound(-0.1, 0.1, "m")]
+    middles: Annotated[tuple[Real, ...], Bound(-0.1, 0.1, "m")] = ()
 
     def __post_init__(self):
         if len(self.places) < 2:
@@ -63,14 +64,14 @@ class Path:
             raise ParameterError("path.middles", self.middles, bound)
 
 
-Amplitude = Annotated[float, Bound(0.0, 0.1, "m", above=True)]
+Amplitude = Annotated[Real, Bound(0.0, 0.1, "m", above=True)]
 Turn = Annotated[tuple[float, float], Bound(1.0, 1e6, names=("p", "q"))]
 Periods = Annotated[int, Bound(1, 10_000)]
 Steps = Annotated[int, Bound(2, 10_000)]
 
 
 @checked
-def zigzag(amplitude: Amplitude, about: Annotated[float, Bound(-0.1, 0.1, "m")] = 0.0) -> Path:
+def zigzag(amplitude: Amplitude, about: Annotated[Real, Bound(-0.1, 0.1, "m")] = 0.0) -> Path:
     """The path at half the sampling frequency, synchronous with the samples: a triangle.
 
     Per sample a wall K with damper B delivers 2 A^2 (K + 2 B/Ts) along it, and a damper b
@@ -151,14 +152,14 @@ def imposed(wall: VirtualWall, path: Path, periods: int, steps: int) -> tuple[Sc
 def _wall_force(wall: VirtualWall, place: np.ndarray, t: np.ndarray, h: float) -> np.ndarray:
     """Mean force of the wall over the kicks at t, for given positions at the samples."""
     scenario, Ts, window = wall.scenario(wall.Ts), wall.Ts, wall.velocity_window
-    counts = (scenario.hardware.encoder if scenario.hardware else None) or 0
+    (count, *_) = (scenario.hardware or Hardware()).count_sizes([True])
     assert scenario.controller is not None
     params, state = scenario.controller.params, (0.0, 0.0)
     lever = params[3]
     rate = -(place[1] - place[0]) / Ts / lever  # at which the joint has turned so far, see Sampled
     q = UPRIGHT - np.arcsin(place / lever)
     q = np.concatenate((q[0] + Ts * rate * np.arange(-window, 0), q))
-    q = [hardware.encode(x, counts) for x in q.tolist()]
+    q = [hardware.encode(x, count) for x in q.tolist()]
     w, held = rate, []
     for k in range(len(place)):
         if wall.velocity == "difference":

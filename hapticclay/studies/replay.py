@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..columns.finding import find
-from ..columns.log import Log, open_log
+from ..columns.log import Log, Reading, open_log
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
 from ..model.arm import Arm
@@ -84,6 +84,7 @@ class Recording:
         columns: Mapping[str, str] | None = None,
         units: Mapping[str, str] | None = None,
         counts: Mapping[str, Any] | None = None,
+        rate: float | None = None,
     ) -> Recording:
         """Reads a log, text or binary; units stand in the heads, as "x [mm]".
 
@@ -93,6 +94,7 @@ class Recording:
                 missing beside the other is 0.
             units: unit of a column by name, in place of what the file says, as {"x": "mm"}.
             counts: of an encoder's column by name: the size of a count, as "0.01 mm".
+            rate: rows in a second [Hz], of a file without a time or in place of its own.
 
         Raises:
             ParameterError: the file cannot be read, lacks a column that was named, the time, or
@@ -101,7 +103,8 @@ class Recording:
         for key in dict(columns or {}):
             choice("columns", key, tuple(COLUMNS))
         try:
-            return recorded(open_log("path", path, units, counts), dict(columns or {}))
+            reading = Reading(units or {}, counts or {}, rate=rate)
+            return recorded(open_log("path", path, reading), dict(columns or {}))
         except OSError as error:
             bound = f"must be a readable file ({error.strerror})"
             raise ParameterError("path", str(path), bound) from None
@@ -110,9 +113,9 @@ class Recording:
 def recorded(log: Log, columns: Mapping[str, str]) -> Recording:
     """The recording in the columns of a log."""
     names = {k: columns.get(k, k) for k in COLUMNS if k in columns or _has(log, k)}
-    if "t" not in names:
+    if "t" not in columns:
         names["t"] = find(log, "columns.t", "t", "time")
-    cells = {key: log.values(name, UNITS[key]) for key, name in names.items()}
+    cells = {key: log.values(names[key], UNITS[key]) for key in COLUMNS if key in names}
     p, f = (_pair(cells, x, y) for x, y in (AXES, ("fx", "fy")))
     if p is None and f is None:
         bound = f"must have a motion or a force: name its columns, as x=NAME of {log.names}"

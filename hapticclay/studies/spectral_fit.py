@@ -8,8 +8,9 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked
-from ..errors import Bound, ParameterError, numbers_of
+from ..errors import Bound, ParameterError, Real, numbers_of
 from ..fields import Axis
 from .even_columns import held_rows
 from .identification import (
@@ -34,8 +35,14 @@ from .plausibility import device_numbers, doubts
 from .sliding import quantum
 
 LEAST_LINES = 20  # of the spectrum in the band, without a period
-LATE = 3.0, 0.05, 0.01  # half intervals, steps and share of a coefficient: a delay that matters
-LEAST_EXCITED = 5  # lines of a periodic input
+# half intervals of a delay that is seen, rows, and half intervals of a coefficient that it moves
+LATE = 1.3, 0.02, 0.1
+LAG_ROUNDS = 4  # of fit and delay
+LAG_LEFT = 0.05  # half intervals of a delay that is left to itself
+MOST_LATE = 1.0  # [s]
+INPUTS = {"G": "command", "S": "force", "Th": "force"}
+LEAST_EXCITED = 5  # lines of a periodic input, ...
+LEAST_STRONG = 12  # ... and of another one, beside the terms of start and end
 EXCITED = 1e-6  # least power of a line, as a share of the strongest in the band
 PERIODIC = 3e-5  # largest share of a periodic input's power in the band between its lines
 REPEATED = 0.95  # least autocorrelation at a period
@@ -45,7 +52,7 @@ USUAL, FAR_BEYOND = 0.99, 2.0  # quantile of a column, and times that an impossi
 NEIGHBOURS = 20  # lines to each side over which noise is averaged, at most
 WEIGHT_ROUNDS = 4  # of fit and noise; the weights settle in two
 
-Delay = Annotated[float, Bound(-1.0, 1.0, "s")]
+Delay = Annotated[Real, Bound(-1.0, 1.0, "s")]
 HELD = "the input changes only every {} rows, as a computer holds it: state it by held (--held)"
 Timing = tuple[bool, float]  # whether the input is held, and the delay of the position [s]
 # frequency [Hz], response, its deviation, coherence
@@ -102,7 +109,7 @@ def identify_data(
     columns = columns._replace(output=place.x)
     timing = held, delay
     found, left_out = _without_wrong_readings(what, columns, data, band, timing)
-    left_out += _lag_warning(what, found, data.dt)
+    left_out += _lag_warning(what, found, data.dt, data.reference is not None)
     value, half, rotary = found.fitted.value, found.fitted.half, data.rotary
     coefficients = coefficients_of(what, axis, value, half, rotary)
     if all(c.high < 0.0 for c in coefficients[: 3 if what == "Th" else 1]):
@@ -207,9 +214,7 @@ def _estimate(
     n = _period(signals[0], high * data.dt)
     periods = len(u) // n - 1 if n else 0
     spectrum = _spectrum(signals[:, -periods * n :], data.dt, (low, high), periods, timing[0])
-    late = np.exp(2j * np.pi * spectrum.frequency * timing[1])
-    side = "u" if what == "Th" else "y"
-    spectrum = spectrum._replace(**{side: getattr(spectrum, side) * late})
+    spectrum = _without_delay(what, spectrum, timing[1])
     _check_coherence(spectrum)
     try:
         with np.errstate(all="ignore"):  # of what cannot be fitted
@@ -294,7 +299,7 @@ def _spectrum(
     rms = float(np.std(signals[0]))
     power = np.abs(r) ** 2
     strong = power > EXCITED * max(power.max(initial=0.0), LINE_FLOOR * rms**2 / max(len(bins), 1))
-    least = LEAST_EXCITED if periods else LEAST_LINES
+    least = LEAST_EXCITED if periods else LEAST_STRONG
     if np.count_nonzero(strong) < least:
         bound = (
             f"must have power at {least} lines or more from {band[0]:.3g} to {band[1]:.3g} Hz; "
@@ -393,25 +398,59 @@ def _lag(what: str, x: _Spectrum, found: _Fitted) -> tuple[float, float, np.ndar
     return float(step[-1]), float(half[-1]), step[:3]
 
 
-def _lag_warning(what: str, found: _Estimate, dt: float) -> list[str]:
+class _Lag(NamedTuple):
+    """Delay of the position [s], half its interval, and by how much it moves the coefficients."""
+
+    late: float
+    half: float
+    change: np.ndarray
+
+
+def _position_lag(what: str, found: _Estimate, instrument: bool) -> _Lag:
+    """The delay with which block and delay together explain the output best.
+
+    The block is fitted again without the delay, until no delay is left: its own misfit would
+    otherwise count as noise and hide it.
+    """
+    spectrum, fitted, total = found.spectrum, found.fitted, 0.0
+    sign = -1.0 if what == "Th" else 1.0  # whose input is the position
+    lag, half, change = _lag(what, spectrum, fitted)
+    for _ in range(LAG_ROUNDS):
+        total += lag
+        spectrum = _without_delay(what, found.spectrum, sign * total)
+        fitted = _fit_spectrum(what, spectrum, instrument)
+        change = found.fitted.value - fitted.value
+        lag, half, _ = _lag(what, spectrum, fitted)
+        if abs(lag) < LAG_LEFT * half:
+            break
+    return _Lag(sign * (total + lag), half, change)
+
+
+def _without_delay(what: str, x: _Spectrum, delay: float) -> _Spectrum:
+    """Spectra of which the position comes earlier by a delay [s]."""
+    ahead = np.exp(2j * np.pi * x.frequency * delay)
+    return x._replace(u=x.u * ahead) if what == "Th" else x._replace(y=x.y * ahead)
+
+
+def _lag_warning(what: str, found: _Estimate, dt: float, instrument: bool) -> list[str]:
     """A sentence about a delay between the columns, if it matters."""
     with np.errstate(all="ignore"):
         try:
-            lag, half, change = _lag(what, found.spectrum, found.fitted)
-        except np.linalg.LinAlgError:
+            lag = _position_lag(what, found, instrument)
+        except (np.linalg.LinAlgError, ValueError):
             return []
-    share = np.abs(change) / np.abs(found.fitted.value)
-    seen = abs(lag) > LATE[0] * half and abs(lag) > LATE[1] * dt
-    if not seen or not np.any((share > LATE[2]) & (np.abs(change) > found.fitted.half)):
+    moved = np.abs(lag.change) / found.fitted.half
+    seen = LATE[0] * lag.half < abs(lag.late) < MOST_LATE and abs(lag.late) > LATE[1] * dt
+    if not seen or not np.any(moved > LATE[2]):
         return []
-    worst = int(np.argmax(share))
-    late = -lag if what == "Th" else lag  # of the position, which is the input of Th
-    way = "later" if late > 0.0 else "earlier"
+    worst, way = int(np.argmax(moved)), "later" if lag.late > 0.0 else "earlier"
+    share = 100.0 * abs(float(lag.change[worst] / found.fitted.value[worst]))
     return [
-        f"the position comes {1e3 * abs(late):.3g} ms (+- {1e3 * half:.2g}) {way} than a block of "
-        "this form has it: a delay between the columns, a filter in one, or a held input; it moves "
-        f"{COEFFICIENT_NAMES[what][worst]} by {100.0 * float(share[worst]):.2g} %. With the delay "
-        f"of {late:.3g} s it goes"
+        f"the {INPUTS[what]} acts {abs(lag.late) / dt:.3g} rows ({1e3 * abs(lag.late):.3g} ms, +- "
+        f"{1e3 * lag.half:.2g}) {way} than it is logged: a delay between the columns, a filter in "
+        f"one, or an input held from row to row (half a row); it moves "
+        f"{COEFFICIENT_NAMES[what][worst]} by {share:.2g} %. With the delay of {lag.late:.3g} s it "
+        "goes"
     ]
 
 
@@ -472,7 +511,7 @@ def _solve(columns: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
     A = real_and_imaginary(columns.T).T
     size = np.linalg.norm(A, axis=0)
     A = A / size
-    found = np.linalg.lstsq(A, real_and_imaginary(y), rcond=None)[0]
+    found = matrices.least_squares(A, real_and_imaginary(y))
     return found / size, float(np.sum((real_and_imaginary(y) - A @ found) ** 2))
 
 
@@ -505,7 +544,7 @@ def _orthogonal(
         J, Z = (real_and_imaginary(_slopes(what, x, u, theta).T / noise).T for u in (x.u, known))
         size = np.linalg.norm(Z, axis=0)
         left = real_and_imaginary(_misfit(what, x, theta) / noise)
-        step = np.linalg.lstsq((Z / size).T @ J / size, (Z / size).T @ left, rcond=None)[0] / size
+        step = matrices.least_squares((Z / size).T @ J / size, (Z / size).T @ left) / size
         theta = theta + step
         if np.all(np.abs(step[:3]) <= 1e-9 * np.abs(theta[:3])):
             break

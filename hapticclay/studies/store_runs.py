@@ -18,6 +18,7 @@ from typing import Any
 
 from ..errors import ParameterError
 from ..simulation.batch import cores
+from ..threads import one_thread
 from . import store
 from .store import P, Plan
 from .workers import ended, started
@@ -79,6 +80,7 @@ def processes(plan: Plan, todo: list[range], workers: int | None) -> int:
     return max(1, min(workers or cores(), tasks))
 
 
+@one_thread
 def run_part(
     plan: Plan,
     runs: range,

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..arms.joint_law import JointPD
+from ..arms.joint_units import Joints, of_joint, table_of
 from ..arms.mjcf_arm import MjcfArm
 from ..errors import Bound, ParameterError
 from ..results import Result, Tables
@@ -48,7 +49,7 @@ OTHERS = (
 
 @named
 @dataclass(frozen=True, repr=False, eq=False)
-class FrictionCycle(Result):
+class FrictionCycle(Joints, Result):
     """Oscillations of the joints of an arm under friction fed forward in excess.
 
     n joints, m oscillations. A joint with Coulomb friction of its own may rest, too: motion between
@@ -81,6 +82,7 @@ class FrictionCycle(Result):
         line_rate: largest rates of a sine, by joint [rad/s], shape (n, l).
         line_growth: growth of the motion at them [1/s], shape (n, l); NaN without a law.
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
+        slides: whether each joint slides; then its units are those of forces and lengths.
     """
 
     drawn_by = "hapticclay.views.joint_plots:friction_plot"
@@ -106,6 +108,7 @@ class FrictionCycle(Result):
     line_rate: np.ndarray
     line_growth: np.ndarray
     assumed: tuple[str, ...] = ()
+    slides: tuple[bool, ...] = ()
 
     def headline(self) -> str:
         """The largest lasting motion in one line."""
@@ -117,10 +120,12 @@ class FrictionCycle(Result):
         if not lasting:
             return f"friction fed forward at {at}: no limit cycle"
         i = max(lasting, key=lambda i: np.nan_to_num(self.amplitude[i], nan=math.inf))
-        name = self.names[self.joint[i]]
+        name, turns = self.names[self.joint[i]], self.turning[self.joint[i]]
         if self.kind[i] == "drift":
-            return f"friction fed forward at {at}: {name} drifts at {self.rate[i]:.3g} rad/s"
-        told = f"{1e3 * self.amplitude[i]:.3g} mrad at {self.frequency[i]:.3g} Hz"
+            rate = f"{self.rate[i]:.3g} {of_joint('rad/s', turns)}"
+            return f"friction fed forward at {at}: {name} drifts at {rate}"
+        size = f"{1e3 * self.amplitude[i]:.3g} {of_joint('mrad', turns)}"
+        told = f"{size} at {self.frequency[i]:.3g} Hz"
         return f"friction fed forward at {at}: limit cycle of {name}, {told}"
 
     def remarks(self) -> Sequence[str]:
@@ -147,9 +152,16 @@ class FrictionCycle(Result):
             "slope at rest [N.m.s/rad]": self.slope,
         }
         growth: dict[str, Any] = {}
-        for name, x, y in zip(self.names, self.line_rate, self.line_growth, strict=True):
-            growth |= {f"rate of {name} [rad/s]": x, f"growth of {name} [1/s]": y}
-        return {"cycles": cycles, "joints": joints, "growth": growth}
+        rows = zip(self.names, self.turning, self.line_rate, self.line_growth, strict=True)
+        for name, turns, x, y in rows:
+            growth[f"rate of {name} [{of_joint('rad/s', turns)}]"] = x
+            growth[f"growth of {name} [1/s]"] = y
+        oscillating = [self.turning[j] for j in self.joint]
+        return {
+            "cycles": table_of(cycles, oscillating),
+            "joints": table_of(joints, self.turning),
+            "growth": growth,
+        }
 
     printed = {
         "cycles": ("joint", "kind", "amplitude [rad]", "frequency [Hz]"),
@@ -197,6 +209,7 @@ def friction_cycle(
         )
     if counts is not None and law.velocity == "exact":
         raise ParameterError("counts", counts, "must be None where the velocity is exact")
+    _check_turns(arm, law, counts)
     linear = replace(law, friction=tuple((0.0, 0.0, Fv) for _, _, Fv in law.friction))
     loop = study.remade(law=linear)
     fed = [Fed(Fc, k, loop, counts) for Fc, k, _ in law.friction]
@@ -224,8 +237,18 @@ def friction_cycle(
         np.array([joint.speeds for joint in joints]),
         np.array([joint.growth for joint in joints]),
         (*study.assumed()[:-1], *([told] if bare else []), OTHERS, LEFT_OUT),
+        tuple(not turns for turns in arm.mechanism.turning),
     )
     return FrictionCycle(*values)
+
+
+def _check_turns(arm: MjcfArm, law: JointPD, counts: int | None) -> None:
+    """Refuses counts a turn of a joint that slides and is fed friction."""
+    fed = zip(arm.names, arm.mechanism.turning, law.friction or (), strict=True)
+    sliding = [name for name, turns, (Fc, *_) in fed if Fc and not turns]
+    if counts is not None and sliding:
+        bound = f"must be None: they are a turn, and {', '.join(sliding)} slides"
+        raise ParameterError("counts", counts, bound)
 
 
 # ---- what is fed forward -------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..arms.joint_units import of_joint
 from ..display import time_words
 from .joint_delays import LATEST
 from .joint_families import Limit
@@ -169,7 +170,7 @@ class _OneGain:
         return getattr(self.study.law, self.kind)[self.joint]
 
     def _unit(self) -> str:
-        return f" {UNITS[self.kind]}"
+        return f" {of_joint(UNITS[self.kind], self.study.arm.mechanism.turning[self.joint or 0])}"
 
     @property
     def _name(self) -> str:
@@ -259,7 +260,8 @@ def _friction(study: Study, most: np.ndarray) -> Iterator[Advice]:
             limit = {"friction": _shared(rows, high / present[j], j)}
             if _tried(study, **change) and _tried(study, **limit):
                 what = f"slope of the friction fed forward at {study.arm.names[j]}"
-                now = f"{high:.4g} N.m.s/rad, such as {low:.4g} (Fc k + Fv, now {present[j]:.4g})"
+                unit = of_joint(UNITS["Kd"], study.arm.mechanism.turning[j])
+                now = f"{high:.4g} {unit}, such as {low:.4g} (Fc k + Fv, now {present[j]:.4g})"
                 yield Advice(f"lower the {what} below {now}", change)
 
 
@@ -304,7 +306,7 @@ def _new_gains(study: Study) -> Iterator[Advice]:
         Kp, Kd = _digits(mass * speed**2), _digits(2.0 * DAMPED * mass * speed)
         for stiff in (Kp, (0.0,) * len(Kp)):
             if _tried(study, Kp=stiff, Kd=Kd):
-                words = f"set Kp to {_listed(stiff)} N.m/rad and Kd to {_listed(Kd)} N.m.s/rad"
+                words = f"set Kp to {_listed(stiff)} and Kd to {_listed(Kd)}, in SI units"
                 yield Advice(words, {"Kp": stiff, "Kd": Kd})
 
 

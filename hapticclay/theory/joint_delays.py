@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from . import joint_scan, roots
 from .joint_crossings import Crossing
 from .joint_loop import JointLoop
@@ -60,7 +61,7 @@ class Late:
     def open_poles(self) -> np.ndarray:
         """Eigenvalues without torques of the host."""
         none = np.zeros((self.loop.n, self.loop.n))
-        return np.linalg.eigvals(replace(self.loop, position=none, rate=none).map())
+        return matrices.eigenvalues(replace(self.loop, position=none, rate=none).map())
 
     def around(self, theta: np.ndarray) -> np.ndarray:
         """The open loop without the whole samples, shape (m, n, n)."""

@@ -11,6 +11,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from . import joint_crossings, joint_scan
 from .joint_crossings import Crossing
 from .joint_loop import JointLoop, grid
@@ -147,7 +148,7 @@ class Family:
     def _at_rest(self) -> list[Crossing]:
         """Changes at which the stiffness of a motion, or the resistance to it, vanishes."""
         at_rest = self.right.T @ self.circle.at_rest(self.of) @ self.left
-        values = np.linalg.eigvals(at_rest)
+        values = matrices.eigenvalues(at_rest)
         real = values[(np.abs(values.imag) <= NEAR * np.abs(values)) & (values.real != 0.0)]
         here = [Crossing(0.0, 0.0)] if self.circle.borders[self.of] else []
         return [Crossing(-1.0 / x, 0.0) for x in real.real.tolist()] + here

@@ -6,7 +6,7 @@ import cmath
 import copy
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,18 +14,19 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..arms.joint_law import JointPD, checked_law, compensated
+from ..arms.joint_units import Joints, table_of
 from ..arms.mechanism import Linear
 from ..arms.mjcf_arm import MjcfArm
 from ..display import time_words
 from ..results import Result, Tables
-from . import joint_changes, joint_scan
+from . import file_servo, joint_changes, joint_scan
 from .client_loop import Delay, Sample
 from .joint_advice import Room, advise, factor_words
 from .joint_changes import Edge, Number, slopes
 from .joint_crossings import Crossing
 from .joint_delays import LATEST, delay_left
 from .joint_families import Circle, Family, Limit
-from .joint_loop import JointLoop, timing_words
+from .joint_loop import Drive, JointLoop, timing_words
 
 SLOWEST = 1.0  # [s] largest control sample that is looked for
 PERIODS = 120  # control samples tried, evenly in their logarithm
@@ -37,7 +38,7 @@ IGNORED = "joint friction, counts, converters, torque limits, backlash, elastic 
 
 @named
 @dataclass(frozen=True, repr=False, eq=False)
-class JointLimits(Result):
+class JointLimits(Joints, Result):
     """What the joints of an arm carry at a pose, all coupled.
 
     A pair (least, largest) is the interval of a gain around the present one in which the loop is
@@ -83,6 +84,7 @@ class JointLimits(Result):
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
         advised: what to change first, in words, tried by the exact map.
         change: fields of the law, Ts or delay with that change; empty for no change.
+        slides: whether each joint slides; then its units are those of forces and lengths.
     """
 
     drawn_by = "hapticclay.views.joint_plots:limits_plot"
@@ -129,6 +131,7 @@ class JointLimits(Result):
     rate_change: np.ndarray
     rate_per_delay: float
     assumed: tuple[str, ...] = ()
+    slides: tuple[bool, ...] = ()
     advised: str = ""
     change: dict[str, Any] = field(default_factory=dict)
 
@@ -224,7 +227,9 @@ class JointLimits(Result):
             "largest factor of Kd per delay [1/s]": self.Kd_scale_per_delay[1],
             "lowest rate per delay [Hz/s]": self.rate_per_delay,
         }
-        return {"joints": joints, "sensitivity": moves, "arm": {k: [v] for k, v in arm.items()}}
+        by_joint = {"joints": joints, "sensitivity": moves}
+        shown = {name: table_of(table, self.turning) for name, table in by_joint.items()}
+        return {**shown, "arm": {k: [v] for k, v in arm.items()}}
 
 
 def _per(unit: str) -> list[str]:
@@ -241,23 +246,27 @@ def joint_loop(
     compensated: bool,
     gains: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> JointLoop:
-    """The loop of an arm at a pose under a law; what a drive does acts between samples.
+    """The loop of an arm at a pose under a law; what a continuous drive does acts between samples.
 
     Gains, if given, replace Kp and Kd of the law, and may be negative.
     """
     stiffness, damping = (np.diag(x) for x in gains or (law.Kp, law.Kd))
-    held, drive = (1.0, 0.0) if law.runs == "host" else (0.0, 1.0)
+    held, driven = (1.0, 0.0) if law.runs == "host" else (0.0, 1.0)
+    drive = None
+    if law.drive_rate is not None:
+        drive = Drive(stiffness, damping, max(1, round(law.drive_rate * Ts)))
     forward = linear.gravity_stiffness * float(compensated)
     return JointLoop(
         linear.inertia,
-        linear.damping + drive * damping,
-        linear.stiffness + linear.gravity_stiffness + drive * stiffness,
+        linear.damping + driven * damping,
+        linear.stiffness + linear.gravity_stiffness + driven * stiffness,
         held * stiffness - forward,
         held * damping - np.diag(law.slopes),
         Ts,
         delay,
         law.velocity,
         law.cutoff,
+        drive,
     )
 
 
@@ -315,6 +324,7 @@ def joint_limits(arm: MjcfArm, law: JointPD, Ts: Sample, delay: Delay = 0.0) -> 
         assumed=study.assumed(),
         advised=advice.words,
         change=advice.change,
+        slides=tuple(not turns for turns in arm.mechanism.turning),
     )
 
 
@@ -341,6 +351,7 @@ class Study:
         self.Ts, self.delay = Ts, delay
         self._known: dict[tuple[int, float, float], tuple[Linear, JointLoop]] = {}
         self.arm, self.law = arm, checked_law(law, arm.names)
+        law.drive_samples(Ts)  # refuses a rate that is no multiple
         self.compensated = compensated(arm, law)
         self.linear = arm.linear(q)
         self._begin()
@@ -499,11 +510,20 @@ class Study:
             "rate_per_delay": float(by_rate[-1]),
         }
 
+    def _elsewhere(self) -> tuple[str, float]:
+        """Where else the law may run, the host or drives, and the radius of its loop there."""
+        if self.law.runs == "drive":
+            at = timing_words(self.Ts, self.delay)
+            return f"in a host at {at}", self.remade(law=replace(self.law, runs="host")).radius()
+        loop = self.remade(law=replace(self.law, runs="drive"))
+        return "in drives, whose own loops count as continuous (runs drive)", loop.radius()
+
     def assumed(self) -> tuple[str, ...]:
         """What the verdict rests on, a sentence each."""
         held = f"{SMALL}, no hand at the handle"
         law = f"law: {self.law.words}"
-        return (*self.arm.notes, gravity_words(self.compensated), law, held, IGNORED)
+        own = file_servo.words(self.arm, self.law, self._elsewhere())
+        return (*own, *self.arm.notes, gravity_words(self.compensated), law, held, IGNORED)
 
 
 # ---- present motion, delay and rate --------------------------------------------------------------

@@ -12,10 +12,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from ..arms import joint_law
 from ..display import time_words
 from ..errors import ParameterError
@@ -32,13 +33,27 @@ BESIDE = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])  # half widths of a resonance, li
 HALVED, TERMS = 0.5, 14  # norm of a matrix whose exponential is a sum of so many terms
 
 
+class Drive(NamedTuple):
+    """What drives hold from sample to sample of their own: -(position q + rate q').
+
+    Attributes:
+        position: [N.m/rad], shape (n, n).
+        rate: [N.m.s/rad], shape (n, n).
+        samples: of the drives in one of the host.
+    """
+
+    position: np.ndarray
+    rate: np.ndarray
+    samples: int
+
+
 @dataclass(frozen=True, eq=False)
 class JointLoop:
     """Joints, and the torque that a host holds.
 
     Attributes:
         inertia: M [kg.m^2], shape (n, n).
-        damping: D of what acts between samples [N.m.s/rad], shape (n, n).
+        damping: D of what acts between samples, drives included [N.m.s/rad], shape (n, n).
         stiffness: S likewise [N.m/rad], shape (n, n).
         position: P of the held torque [N.m/rad], shape (n, n).
         rate: R of the held torque [N.m.s/rad], shape (n, n).
@@ -46,6 +61,7 @@ class JointLoop:
         delay: from a sample to its torque [s].
         velocity: how the rate is had.
         cutoff: of the filter behind the difference [rad/s].
+        drive: the part of D and S that drives hold from sample to sample; None for none.
     """
 
     inertia: np.ndarray
@@ -57,6 +73,7 @@ class JointLoop:
     delay: float = 0.0
     velocity: Literal["exact", "difference", "filter"] = "exact"
     cutoff: float | None = None
+    drive: Drive | None = None
 
     @property
     def n(self) -> int:
@@ -76,15 +93,33 @@ class JointLoop:
     def change(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """As `hold`, of the change of (q, q') over a sample: slow motion keeps its digits."""
         share = self.late[1]
-        whole = self._transition(self.Ts)
-        late = self._transition((1.0 - share) * self.Ts) if share else whole
+        if self.drive is not None:
+            return self._held_by(self.drive, share)
+        whole = self._transition(self.Ts, self.damping, self.stiffness)
+        rest = (1.0 - share) * self.Ts
+        late = self._transition(rest, self.damping, self.stiffness) if share else whole
         return whole[0], late[1], whole[1] - late[1]
 
-    def _transition(self, t: float) -> tuple[np.ndarray, np.ndarray]:
+    def _held_by(self, drive: Drive, share: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`change` with drives that take what the host sends at the next of their own samples."""
+        samples = drive.samples
+        loose = self.damping - drive.rate, self.stiffness - drive.position
+        step, given = self._transition(self.Ts / samples, *loose)
+        step = step - given @ np.hstack([drive.position, drive.rate])
+        late = math.ceil(share * samples - ROUNDING)
+        change, sums = np.zeros_like(step), [0.0 * given]
+        for _ in range(samples):
+            sums.append(sums[-1] + given + change @ given)
+            change = change + step + step @ change
+        return change, sums[samples - late], sums[samples] - sums[samples - late]
+
+    def _transition(
+        self, t: float, damping: np.ndarray, stiffness: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         n, inverse = self.n, np.linalg.inv(self.inertia)
         a = np.zeros((3 * n, 3 * n))
         a[:n, n : 2 * n] = np.eye(n)
-        a[n : 2 * n] = np.hstack([-inverse @ self.stiffness, -inverse @ self.damping, inverse])
+        a[n : 2 * n] = np.hstack([-inverse @ stiffness, -inverse @ damping, inverse])
         with np.errstate(over="ignore", invalid="ignore"):
             e = _expm1(a * t)
         if not np.isfinite(e).all():
@@ -257,15 +292,15 @@ class JointLoop:
     def shape(self, z: complex) -> np.ndarray:
         """Motion of the joints at an eigenvalue, shape (n,); near 1 that which is no rest."""
         if abs(z - 1.0) > AT_REST:
-            values, vectors = np.linalg.eig(self.map())
+            values, vectors = matrices.eigenvectors(self.map())
             return vectors[: self.n, np.abs(values - z).argmin()]
         whole, _, columns = balanced(self.equations(z))
-        return (columns * np.linalg.svd(whole)[2][-1].conj())[: self.n]
+        return (columns * matrices.svd(whole)[2][-1].conj())[: self.n]
 
     def resistance(self) -> np.ndarray:
         """What resists steady motion along directions of rest [N.m.s/rad], one a direction."""
         return (
-            np.linalg.eigvals(self.rest.resistance(slice(2 * self.n, None), slice(0, self.n)))
+            matrices.eigenvalues(self.rest.resistance(slice(2 * self.n, None), slice(0, self.n)))
             * self.Ts
         )
 
@@ -307,6 +342,8 @@ class JointLoop:
 
         Half a small gain, on angles spread evenly and at the joints' own resonances.
         """
+        if self.drive is not None:
+            return False
         if not self.position.any() and not self.rate.any():
             return True
         alone = self._own_poles * self.Ts
@@ -329,7 +366,7 @@ class JointLoop:
         """Poles of the joints alone [1/s]."""
         n, inverse = self.n, np.linalg.inv(self.inertia)
         lower = np.hstack([-inverse @ self.stiffness, -inverse @ self.damping])
-        return np.linalg.eigvals(np.vstack([np.eye(2 * n)[n:], lower]))
+        return matrices.eigenvalues(np.vstack([np.eye(2 * n)[n:], lower]))
 
     def between_responses(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Position and measured rate per torque of a sine between samples, in the closed loop.
@@ -352,7 +389,7 @@ class JointLoop:
 
     def at_rest(self) -> np.ndarray:
         """Position per constant torque added to the host's [rad/(N.m)], shape (n, n)."""
-        return np.linalg.pinv(self.stiffness + self.position, FREE)
+        return matrices.pseudo_inverse(self.stiffness + self.position, FREE)
 
     # ---- the same with other numbers
 
@@ -409,7 +446,7 @@ def resonant_grid(loop: Any) -> np.ndarray:
     """Angles of a search around eigenvalues near the unit circle, > 0 and <= pi."""
     if loop.states > MOST_STATES // 3:
         return np.empty(0)
-    near = near_resonances(np.linalg.eigvals(loop.map()))
+    near = near_resonances(matrices.eigenvalues(loop.map()))
     return near[(near > 0.0) & (near <= math.pi)]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,23 +12,28 @@ from typing import Any
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
+from ..arms.joint_units import Joints, table_of
 from ..display import time_words
 from ..results import Result, Tables
 from ..scene.pair import Pair
-from . import joint_crossings, roots
+from ..scene.pair_hardware import slides_of
+from . import joint_crossings, pair_advice, pair_branches, pair_roots, roots
 from .held_words import pair_words
 from .joint_families import NEAR
-from .joint_loop import MOST_STATES, grid
+from .joint_loop import ROUNDING, grid, is_stable
 from .pair_build import Build
-from .pair_delays import SLOWEST, Delays
 from .pair_loop import PairLoop
 from .pair_onset import LATEST, Onset, onset
+from .rest import FREE
 
-LARGE = 500  # states of a map whose eigenvalues are not worth their time
-HIGHEST = 64.0  # factor of all Kp up to which gains are tried
+LARGE = 200  # states of a map whose eigenvalues are not worth their time
+HIGHEST = 64.0  # factor of all Kp up to which gains are tried ...
+OCTAVE = 5  # ... so many from one to its double
 EXACT = 1e-4  # relative width within which that factor is found
 COARSE = 1e-2  # the same for a map that is LARGE
+SLOW = 1e-4  # [rad] of an angle below which rounding may hide the imaginary part of a response
 STEADY = 1e-6  # [Hz] of a motion that does not oscillate
 OPPOSED, COMMON, NONE = "arms opposed", "common motion", "rest alone"
 GONE = 1e-3  # size of an eigenvalue whose motion is over at the next sample
@@ -35,7 +41,7 @@ GONE = 1e-3  # size of an eigenvalue whose motion is over at the next sample
 
 @named
 @dataclass(frozen=True, repr=False, eq=False)
-class PairLimits(Result):
+class PairLimits(Joints, Result):
     """What a pair of arms carries at its pose, all joints of both arms coupled.
 
     Attributes:
@@ -43,7 +49,7 @@ class PairLimits(Result):
         names: joints of the leader, shape (n,).
         stable: whether the pair is stable as it is.
         radius: largest eigenvalue of the map over a sample, without those of rest: below 1 if
-            stable. With more than 1,200 states, that found nearest to the circle or beyond it.
+            stable.
         structural: directions in which the free pair rests anywhere, whose eigenvalues are 1.
         delay: least one-way delay of the link, both ways alike, at which the pair is unstable [s]:
             below it all are stable; 0 if it is unstable without delay; inf for more than 2 s. Waves
@@ -53,8 +59,8 @@ class PairLimits(Result):
             one if no delay that was looked at is unstable [Hz].
         joint: joint that moves most in it.
         mode: that motion in words.
-        gain: largest factor of all Kp of both arms, from the present ones on, found by doubling;
-            inf for more than 64; 0 if the pair is unstable.
+        gain: largest factor of all Kp of both arms, from the present ones on: with each less the
+            pair is stable; inf for more than 64; 0 if the pair is unstable.
         slope: largest slope of a friction fed forward at one joint of both arms, Fc k + Fv, with
             none at the others [N.m.s/rad], shape (n,).
         law_slope: slopes of the leader's law [N.m.s/rad], shape (n,).
@@ -63,6 +69,8 @@ class PairLimits(Result):
         budget: what the torque from the other arm is late by, cause by cause, one way [s].
         Ts: control sample [s].
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
+        slides: whether each joint slides; then its units are those of forces and lengths.
+        remedy: changes of an unstable pair, each of which alone makes it stable by the exact map.
     """
 
     drawn_by = "hapticclay.views.pair_plots:limits_plot"
@@ -87,6 +95,8 @@ class PairLimits(Result):
     budget: Mapping[str, float]
     Ts: float
     assumed: tuple[str, ...] = ()
+    slides: tuple[bool, ...] = ()
+    remedy: str = ""
 
     @property
     def delay_left(self) -> float:
@@ -109,8 +119,9 @@ class PairLimits(Result):
         if math.isinf(self.delay):
             return f"any delay of the link up to {LATEST:g} s"
         if self.delay == 0.0:
-            return "no delay of the link is stable"
-        return f"one-way delay up to {time_words(self.delay)}"
+            return "unstable without any delay of the link"
+        again = ", and again here" if self.stable and self.delay < self.present else ""
+        return f"one-way delay up to {time_words(self.delay)}{again}"
 
     def remarks(self) -> Sequence[str]:
         """What to change first, and what the verdict rests on."""
@@ -118,21 +129,15 @@ class PairLimits(Result):
 
     def advice(self) -> str:
         """The change that gains most, or that brings an unstable pair back."""
-        if 0.0 < self.friction_fraction < 1.0:
-            over = self.names[int(np.argmax(self.law_slope - self.slope))]
-            return (
-                f"friction feed-forward ({over} most), to {self.friction_fraction:.0%} of it or "
-                "less: an undamped common motion, which Kp and Kd cannot touch"
-            )
+        if not self.stable:
+            return self.remedy
+        if math.isinf(self.delay):
+            return f"nothing: no delay of the link up to {LATEST:g} s is too long"
         cause, late = max(self.budget.items(), key=lambda x: x[1])
         lateness = f"{cause} ({time_words(late)} each way"
-        if self.stable and math.isinf(self.delay):
-            return f"nothing: no delay of the link up to {LATEST:g} s is too long"
-        if self.stable:
-            return f"{lateness}; {time_words(self.delay_left)} are left)"
-        if self.delay > 0.0:
-            return f"{lateness}; the link may have {time_words(self.delay)})"
-        return f"gains and rate: unstable without any delay of the link; {lateness})"
+        if self.delay < self.present:
+            return f"{lateness}, and no less: some shorter delays are unstable)"
+        return f"{lateness}; {time_words(self.delay_left)} are left)"
 
     def tables(self) -> Tables:
         """Friction of each joint, lateness by cause, and the whole pair."""
@@ -157,6 +162,7 @@ class PairLimits(Result):
             "largest factor of all Kp": self.gain,
             "largest share of friction": self.friction_fraction,
         }
+        joints = table_of(joints, self.turning)
         return {"joints": joints, "budget": budget, "pair": {k: [v] for k, v in pair.items()}}
 
 
@@ -165,8 +171,9 @@ def pair_limits(pair: Pair) -> PairLimits:
     """Whether a leader and a follower are stable, and how much delay, gain and friction they carry.
 
     Both arms are linear about their poses, with hand and contact; torques are held between samples.
-    With messages on their way as states the map over a sample is exact; where they are many,
-    eigenvalues are counted on the unit circle instead. Eigenvalues of rest (z = 1), which a free
+    With messages on their way as states the map over a sample is exact; where they are many, its
+    largest eigenvalue is sought without them, and a count beyond it says that there is no larger
+    one. Eigenvalues of rest (z = 1), which a free
     pair has by its structure, are no verdict.
 
     Args:
@@ -197,6 +204,8 @@ def pair_limits(pair: Pair) -> PairLimits:
         study.budget(),
         pair.Ts,
         (pair_words(pair), *study.build.assumed()),
+        slides_of(pair.leader),
+        "" if study.stable else pair_advice.remedy(study, fraction),
     )
 
 
@@ -213,9 +222,9 @@ class Study:
     @cached_property
     def worst(self) -> complex:
         """The largest eigenvalue."""
-        if self.loop.states <= MOST_STATES:
+        if self.loop.states <= LARGE:
             return complex(self.loop.eigenvalues[0])
-        return self._delays(1.0).largest(self.loop.there + self.loop.back)
+        return pair_roots.largest(self.loop, self.loop.there + self.loop.back)
 
     @cached_property
     def radius(self) -> float:
@@ -225,30 +234,41 @@ class Study:
     @cached_property
     def stable(self) -> bool:
         """Whether the pair is stable."""
-        return self.holds(1.0)
+        return is_stable(self.radius)
 
-    def holds(self, gain: float) -> bool:
-        """Whether it is stable with a factor of all Kp."""
-        if self.loop.states <= LARGE:
-            return self.build.loop(gain=gain).stable()
-        return self._delays(gain).count(self.loop.there + self.loop.back) == 0
+    def holds(self, gain: float, friction: tuple[np.ndarray, np.ndarray] | None = None) -> bool:
+        """Whether it is stable with a factor of all Kp, and slopes of the friction."""
+        return _holds(self.build.loop(gain=gain, friction=friction))
 
-    def _delays(self, gain: float) -> Delays:
-        """The pair at all whole delays of its link, with the shares of its own."""
-        shares = [self.build.samples(x)[1] * self.pair.Ts for x in self.build.delays]
-        return Delays(self.build.loop((shares[0], shares[1]), gain))
+    def at(self, late: float) -> bool:
+        """Whether it is stable with a one-way delay of the link [s]."""
+        return _holds(self.build.loop((late, late)))
 
     def gain(self) -> float:
-        """Largest factor of all Kp."""
+        """Largest factor of all Kp: up to it, no eigenvalue reaches the circle between factors."""
         if not self.stable:
             return 0.0
         low = 1.0
-        while self.holds(2.0 * low):
+        while low < HIGHEST:
+            factors = self._followed(np.geomspace(low, 2.0 * low, OCTAVE))
+            held = [self.holds(x) for x in factors]
+            if not all(held):
+                i = held.index(False)
+                exact = EXACT if self.loop.states <= LARGE else COARSE
+                return roots.bisect(self.holds, factors[i - 1], factors[i], exact)[0]
             low *= 2.0
-            if low >= HIGHEST:
-                return math.inf
-        exact = EXACT if self.loop.states <= LARGE else COARSE
-        return roots.bisect(self.holds, low, 2.0 * low, exact)[0]
+        return math.inf
+
+    def _followed(self, factors: np.ndarray) -> list[float]:
+        """Factors of all Kp, with more where an eigenvalue may pass the circle between two."""
+        if self.loop.states > LARGE:
+            return factors.tolist()
+
+        def values(log: np.ndarray) -> np.ndarray:
+            loops = (self.build.loop(gain=x) for x in np.exp(log).tolist())
+            return np.array([loop.eigenvalues for loop in loops])
+
+        return np.exp(pair_branches.followed(values, np.log(factors), ROUNDING)[0]).tolist()
 
     # ---- delay
 
@@ -288,11 +308,12 @@ class Study:
         """Largest slope at each joint of both arms, and largest share of the laws' friction."""
         n, none = self.pair.n, np.zeros(self.pair.n)
         loop = self.build.loop(friction=(none, none))
-        if not self._is_stable(loop):
+        if not _holds(loop):
             return none, 0.0
         angles = grid(loop)
-        angles = angles[angles >= SLOWEST]  # below, rounding hides the imaginary part
         rates, steady = loop.responses(angles)[1], loop.drift()
+        free = np.abs(loop.unresisted()).max(1, initial=0.0)
+        runs_away = free > FREE * free.max()  # under any friction that is fed forward there
         partner = np.abs(self.pair.mapping).argmax(0)
 
         def largest(weights: np.ndarray) -> float:
@@ -300,26 +321,30 @@ class Study:
             used = np.flatnonzero(weights)
             if not len(used):
                 return math.inf
+            if runs_away[used].any():
+                return 0.0
             at, gains = np.ix_(used, used), weights[used][:, None]
 
             def response(theta: np.ndarray) -> np.ndarray:
                 found = rates if theta is angles else loop.responses(theta)[1]
                 return gains * found[:, at[0], at[1]]
 
-            crossed = [-x.change for x in joint_crossings.crossings(response, angles)]
-            every = crossed + _steady(gains * steady[at])
-            return min([x for x in every if x > 0.0], default=math.inf)
+            crossed = joint_crossings.crossings(response, angles)
+            every = [(-x.change, x.theta) for x in crossed]
+            every += [(x, 0.0) for x in _steady(gains * steady[at])]
+            ahead = sorted(x for x in every if x[0] > 0.0)
+            for (factor, theta), after in itertools.zip_longest(ahead, ahead[1:]):
+                beyond = min(0.5 * (factor + after[0]) if after else math.inf, 2.0 * factor)
+                slopes = beyond * weights
+                if not 0.0 < theta < SLOW or not _holds(
+                    self.build.loop(friction=(slopes[:n], slopes[n:]))
+                ):
+                    return factor
+            return math.inf
 
         unit = np.eye(2 * n)
         slope = np.array([largest(unit[j] + unit[n + partner[j]]) for j in range(n)])
         return slope, largest(np.concatenate([law.slopes for law in self.pair.laws]))
-
-    def _is_stable(self, loop: PairLoop) -> bool:
-        if loop.states <= LARGE:
-            return loop.stable()
-        none = np.zeros(self.pair.n)
-        least = self.build.loop((loop.follower.share, loop.leader.share), friction=(none, none))
-        return Delays(least).count(loop.there + loop.back) == 0
 
     # ---- where the time goes
 
@@ -338,8 +363,15 @@ class Study:
         return {cause: late for cause, late in causes.items() if late > 0.0}
 
 
+def _holds(loop: PairLoop) -> bool:
+    """Whether a pair is stable."""
+    if loop.states <= LARGE:
+        return loop.stable()
+    return pair_roots.beyond(loop, loop.there + loop.back) <= 0
+
+
 def _steady(matrix: np.ndarray) -> list[float]:
     """Factors at which steady motion has no resistance."""
-    values = np.linalg.eigvals(matrix)
+    values = matrices.eigenvalues(matrix)
     real = values[(np.abs(values.imag) <= NEAR * np.abs(values)) & (values.real > 0.0)]
     return (1.0 / real.real).tolist()

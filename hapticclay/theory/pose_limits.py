@@ -11,6 +11,7 @@ which is linear in the gain K of either axis.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -72,6 +73,12 @@ class PoseLimits:
         self._loops: dict[tuple[int, float], _CoupledLoop] = {}
         self.known: tuple[Known, Known] = {}, {}
         self._tables: list[np.ndarray | None] = [None, None]  # of the keys of known
+
+    def copied(self) -> PoseLimits:
+        """With the limits known now; what one finds from now on is not known to the other."""
+        made = copy.copy(self)
+        made.known, made._tables = (dict(self.known[0]), dict(self.known[1])), list(self._tables)
+        return made
 
     def at(self, i: int, p: tuple[float, float], b: tuple[float, float]) -> float:
         """The gain limit with the handle at a place [1/kg]; inf for none."""

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ..scene.joint_numbers import references, torque_limits
+from ..arms.joint_units import of_joints
+from ..scene.joint_numbers import references, torque_limits, turning
 from ..simulation.record import Record
 from .captions import scenario_parts
 from .palette import BLUE, GREEN, ORANGE, VERMILION
@@ -52,7 +53,7 @@ def joints_plot(record: Record) -> Figure:
         _widened(q, record.q[:, j])
         q.set_ylabel(name)
     for ax, title in zip(grid[0], ("position [rad]", "rate [rad/s]", "torque [N·m]"), strict=True):
-        set_title(ax, title, panel=True)
+        set_title(ax, of_joints(title, turning(s)), panel=True)
     for ax in grid[-1]:
         ax.set_xlabel("time [s]")
     figure.align_ylabels(grid[:, 0])

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ..arms.joint_units import of_joints
 from ..theory.fed_friction import FrictionCycle
 from ..theory.joint_gains import JointLimits
 from ..theory.joint_poses import OverPoses
@@ -30,8 +31,8 @@ def limits_plot(found: JointLimits) -> Figure:
     n = len(found.names)
     figure = Figure(figsize=figure_size(2, 1.4 + PER_JOINT * n))
     stiff, damped = figure.subplots(1, 2, sharey=True)
-    _intervals(stiff, found.stiffness, found.Kp, "Kp [N.m/rad]")
-    _intervals(damped, found.damping, found.Kd, "Kd [N.m.s/rad]")
+    _intervals(stiff, found.stiffness, found.Kp, of_joints("Kp [N.m/rad]", found.turning))
+    _intervals(damped, found.damping, found.Kd, of_joints("Kd [N.m.s/rad]", found.turning))
     for i, (high, buzz) in enumerate(zip(found.Kp[:, 1], found.Kp_buzz, strict=True)):
         if math.isfinite(buzz):
             text = f" {buzz:.3g} Hz"
@@ -86,7 +87,8 @@ def friction_plot(found: FrictionCycle) -> Figure:
     level(ax)
     ends = found.line_rate.min(), found.line_rate.max()
     ax.set(xscale="log", xlim=ends, ylim=(-1.5 * most, 1.2 * most))
-    label_axes(ax, "largest rate of the joint [rad/s]", "growth [1/s]")
+    label = of_joints("largest rate of the joint [rad/s]", found.turning)
+    label_axes(ax, label, "growth [1/s]")
     if ax.get_legend_handles_labels()[0]:
         ax.legend()
     set_title(

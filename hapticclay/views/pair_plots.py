@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..arms.joint_units import of_joints
 from ..theory.held_words import FREE
 from ..theory.pair_boxes import PairHands
 from ..theory.pair_maps import PairComparison, PairMap
@@ -41,7 +42,8 @@ def limits_plot(found: PairLimits) -> Figure:
     friction.set_yticks(range(n), found.names)
     friction.invert_yaxis()
     friction.set_xlim(0.0)
-    label_axes(friction, "slope of the friction fed forward [N.m.s/rad]")
+    label = of_joints("slope of the friction fed forward [N.m.s/rad]", found.turning)
+    label_axes(friction, label)
     set_title(friction, "stable slope (bars), the law's (dots)", panel=True)
     return figure
 

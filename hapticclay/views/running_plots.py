@@ -9,7 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from ..arms.joint_units import of_joints
 from ..model.constants import AXES
+from ..scene.joint_numbers import turning
 from ..simulation.pair_record import PairRecord
 from ..simulation.record import Record
 from .flow_plots import draw_laws, flows_met
@@ -192,10 +194,10 @@ def _joint_panels(r: Record) -> tuple[Panel, ...]:
         return Panel(r.t, np.concatenate(values), ("time [s]", name), title, curves)
 
     turned = [scale * (r.q[:, j] - r.q[0, j]) for j in most]
-    labels = [names[j] for j in most]
+    labels, kinds = [names[j] for j in most], [turning(r.scenario)[j] for j in most]
     return (
-        panel(f"joints [{unit}]", "", turned, labels),
-        panel("rates [rad/s]", "", [r.qd[:, j] for j in most], labels),
+        panel(of_joints(f"joints [{unit}]", kinds), "", turned, labels),
+        panel(of_joints("rates [rad/s]", kinds), "", [r.qd[:, j] for j in most], labels),
         panel(f"handle [{near}]", "", [*(per * r.p.T)], r.scenario.axes),
     )
 

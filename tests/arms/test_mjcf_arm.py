@@ -145,7 +145,11 @@ def test_what_a_file_leaves_open_is_said():
     assert "joint1, joint2" in notes and "no rotor inertia" in notes
     assert "key frame home" in notes
     notes = " ".join(card("five_bar").notes)
-    assert "constraints" in notes and "right_elbow, left_elbow" in notes and "2 actuators" in notes
+    assert (
+        "constraints" in notes
+        and "right_elbow, left_elbow" in notes
+        and "2 actuators of the file give no torque" in notes
+    )
 
 
 BODY = (
@@ -160,28 +164,33 @@ def xml(body, rest=""):
 
 REFUSED = {
     "no such file": ("nothing.xml", {}, "there is none"),
-    "not a model": ("<a/>", {}, "MuJoCo loads"),
-    "no mass": (xml('<body><joint/><geom size="1" mass="0"/></body>'), {}, "mass and inertia"),
+    "not a model": ("<a/>", {}, r"XML of another kind \(<a>\)"),
+    "not MuJoCo's": (xml("<bdy/>"), {}, "MuJoCo loads"),
+    "no mass": (xml('<body><joint/><geom size="1" mass="0"/></body>'), {}, "have an inertia"),
     "a free joint": (
         xml(BODY.format(SITE).replace('<joint name="j"/>', "<freejoint/>")),
         {},
-        "is free",
+        "no joint moves the handle",
     ),
     "a ball joint": (
         xml(BODY.format(SITE).replace('name="j"', 'name="j" type="ball"')),
         {},
         "is ball",
     ),
-    "a springy tendon": (
+    "friction of a tendon": (
         xml(
             BODY.format(SITE),
-            '<tendon><fixed name="t" stiffness="1"><joint joint="j" coef="1"/></fixed></tendon>',
+            '<tendon><fixed name="t" frictionloss="1"><joint joint="j" coef="1"/></fixed></tendon>',
         ),
         {},
-        "stiffness",
+        "frictionloss = 't': must be 0",
+    ),
+    "a damper that gives energy": (
+        xml(BODY.format(SITE).replace("<joint", '<joint damping="1 -3 1"')),
+        {},
+        "must take energy at all rates",
     ),
     "no such site": (xml(BODY.format(SITE)), {"site": "handel"}, "did you mean 'handle'"),
-    "two sites": (xml(BODY.format(SITE + '<site name="b"/>')), {}, "must be named"),
     "no such joint": (xml(BODY.format(SITE)), {"joints": ["k"]}, "must be a joint"),
     "a joint twice": (xml(BODY.format(SITE)), {"joints": ["j", "j"]}, "each joint once"),
     "wrong name of a pose": (xml(BODY.format(SITE)), {"pose": {"jj": 1.0}}, "did you mean 'j'"),
@@ -271,6 +280,17 @@ def test_without_handle_the_joints_are_judged_alone(tmp_path):
         arm.jacobian()
 
 
+def test_two_sites_on_one_link_leave_the_handle_open(tmp_path):
+    """The joints are the same; what needs a handle names both."""
+    file = tmp_path / "arm.xml"
+    file.write_text(xml(BODY.format(SITE + '<site name="b"/>')))
+    arm = hc.MjcfArm(file, armature=[0.1])
+    assert arm.names == ("j",) and arm.site is None
+    with pytest.raises(hc.ParameterError, match="such as handle, b"):
+        arm.handle()
+    np.testing.assert_array_equal(hc.MjcfArm(file, site="b").handle(), [0.0, 0.0, 0.0])
+
+
 def test_arms_of_the_package_by_name():
     assert hc.MjcfArm("leader_7").names == card("leader_7").names
     with pytest.raises(hc.ParameterError, match="did you mean 'planar_2r'"):
@@ -294,3 +314,13 @@ def test_a_urdf_with_its_tool(tmp_path):
     assert arm.names == ("j",) and arm.ranges.tolist() == [[-1.0, 1.0]]
     assert arm.mass_matrix() == pytest.approx(0.01 + 1.0 * 0.1**2)
     np.testing.assert_allclose(arm.handle([0.5]), [0.2 * math.cos(0.5), 0.2 * math.sin(0.5), 0.0])
+
+
+@pytest.mark.parametrize("name", ["planar_2r", "five_bar", "haptic_3", "leader_7"])
+def test_arms_of_the_same_numbers_are_equal(name):
+    arm = hc.MjcfArm(name)
+    twin = pickle.loads(pickle.dumps(arm))
+    assert twin == arm == hc.MjcfArm(name) and hash(twin) == hash(arm)
+    heavier = hc.MjcfArm(name, armature=[x + 1e-12 for x in arm.armature])
+    others = hc.MjcfArm(name, gravity="acts"), heavier, hc.MjcfArm("planar_2r", damping=(9.0, 9.0))
+    assert all(arm != other for other in others)

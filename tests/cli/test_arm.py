@@ -58,18 +58,24 @@ def test_friction_fed_forward(tmp_path, capsys):
     "words, told",
     [
         (["nothing.xml", *GAINS], "there is none"),
-        ([TWO], "must be given, or --Kp and --Kd"),
-        ([TWO, "--Kp", "100", "--Kd", "1"], "2 numbers, one for each joint"),
-        ([TWO, "--Kp", "1", "2", "--Kd", "1"], "as Kp (2)"),
+        (
+            [TWO],
+            "since the arm's file has none: --gains FILE, or --Kp and --Kd, one number for all",
+        ),
+        ([TWO, "--Kp", "100"], "since the arm's file has none"),
+        ([TWO, "--Kp", "1", "2", "3", "--Kd", "1"], "2 numbers, one for each joint"),
+        ([TWO, "--Kp", "1", "2", "--Kd", "1", "2", "3"], "as Kp (2)"),
+        ([TWO, "--kp", "1"], "did you mean --Kp"),
+        ([TWO, *GAINS, "--pose", "hom"], "did you mean 'home'"),
         ([TWO, *GAINS, "--pose", "shouldr=1"], "did you mean 'shoulder'"),
         ([TWO, *GAINS, "--pose", "1", "elbow=2"], "not both"),
         ([TWO, *GAINS, "--rate", "500", "--Ts", "1ms"], "give --Ts or --rate"),
         ([TWO, *GAINS, "--wall", "z"], "along which the handle can move"),
-        ([TWO, "--wall", "x", "--poses", "3"], "needs gains"),
+        ([TWO, "--wall", "x", "--poses", "3"], "must be given, since"),
         ([TWO, *GAINS, "--B", "2"], "give --wall"),
         ([TWO, *GAINS, "--hand", "0.2", "1", "3"], "give --wall"),
         ([TWO, *GAINS, "--seed", "2"], "--poses"),
-        ([TWO, "--wall", "x", "--run"], "needs gains"),
+        ([TWO, "--wall", "x", "--run"], "must be given, since"),
         ([TWO, *GAINS, "--film", "buzz.webp"], "give --run"),
         ([TWO, *GAINS, "--run", "--film", "buzz.avi"], ".webp"),
         ([TWO, *GAINS, "--counts", "4096"], "file of --gains"),
@@ -94,3 +100,33 @@ def test_runs_beside_the_limit(tmp_path, capsys):
     assert {"runs.json", "runs.png", "as_built.toml"} <= {x.name for x in tmp_path.iterdir()}
     assert main(["run", str(tmp_path / "as_built.toml"), "--out", str(tmp_path / "run")]) == 0
     assert "time limit" in capsys.readouterr().out
+
+
+SERVOS = """<mujoco model="servos"><compiler angle="radian"/><option integrator="implicitfast"/>
+<worldbody><body><joint name="a" axis="0 1 0" damping="1"/><inertial pos=".2 0 0" mass="1"
+diaginertia=".01 .01 .01"/><body pos=".4 0 0"><joint name="b" axis="0 1 0"/><inertial pos=".1 .02 0"
+mass=".5" diaginertia=".003 .003 .003"/><site name="ee" pos=".2 0 0"/></body></body></worldbody>
+<actuator><position joint="a" kp="2000" kv="200"/><position joint="b" kp="90" kv="9" gear="2"/>
+</actuator><keyframe><key name="ready" qpos=".2 .3"/></keyframe></mujoco>"""
+
+
+def gains_of(folder):
+    joints = json.loads((folder / "limits.json").read_text())["tables"]["joints"]
+    return joints["Kp [N.m/rad]"], joints["Kd [N.m.s/rad]"]
+
+
+def test_the_file_s_own_gains(tmp_path, capsys):
+    """The gains that a simulation carries, since it is implicit, are too much for a host."""
+    file, out = tmp_path / "servos.xml", tmp_path / "out"
+    file.write_text(SERVOS)
+    assert main(["arm", str(file), "--out", str(out)]) == 0
+    text = capsys.readouterr().out
+    assert "gains: of the file, position servos at all joints" in text
+    assert "each step of 2 ms (implicitfast), undelayed: stable" in text
+    assert "unstable at 1000 Hz" in text
+    assert gains_of(out) == ([2000.0, 360.0], [200.0, 36.0])
+    words = ["--Kp", "50", "--armature", "0.1", "--pose", "ready", "--out", str(out)]
+    assert main(["arm", str(file), *words]) == 0
+    text = capsys.readouterr().out
+    assert "gains: of the file" not in text and "pose: key frame ready" in text
+    assert gains_of(out) == ([50.0, 50.0], [200.0, 36.0])

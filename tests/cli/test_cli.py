@@ -172,7 +172,6 @@ def test_instability_is_a_result_with_advice(capsys, tmp_path):
         (["stability", "--G", "1", "2"], ["--G = '1 2': must be 3 numbers"]),
         (["zwidth", "--hand", "1", "2s", "0"], ["--hand = '2s': must be a number in N.s/m, not"]),
         (["run", "constant", "--operator=maybe"], ["--operator = 'maybe': must be True or False"]),
-        ([], ["give a command: accuracy, arm, bench"]),
         (["run", "constant", "--every", "0"], ["every = 0"]),
         (["run", "constant", "--error", "1e-6 kg"], ["error = '1e-6 kg'", "such as '1e-7 m'"]),
         (["run", "constant", "--error", "0"], ["error = 0.0", ">= 1e-11"]),

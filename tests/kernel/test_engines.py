@@ -7,6 +7,7 @@ every trait of `model.support` under every method that takes it.
 import dataclasses
 import itertools
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -199,6 +200,15 @@ FILTERED = dict(
 )
 
 
+BENT = """<mujoco><option density="300" viscosity="1" gravity="0 -9.81 0"/><worldbody>
+<body gravcomp="0.5"><joint name="a" damping="0.1 0.2 0.1" stiffness="1 2 3" range="-3 3"/>
+<geom type="capsule" size="0.03" fromto="0 0 0 0.3 0 0"/><body pos="0.3 0 0">
+<joint name="b" ref="90" damping="0 0.3"/><geom type="capsule" size="0.02" fromto="0 0 0 0 0.2 0"/>
+<site name="handle" pos="0 0.25 0"/></body></body></worldbody><tendon><fixed name="t" damping="0.1"
+stiffness="5" springlength="0.2" armature="0.01"><joint joint="a" coef="1"/><joint joint="b"
+coef="-0.5"/></fixed></tendon></mujoco>"""
+
+
 def arms(method, **common):
     """Arms from files: planar, closed, spatial, with all that may act on them."""
     spring = (hc.Spring(), hc.Spring(k=300.0), hc.Spring())
@@ -222,10 +232,40 @@ def arms(method, **common):
             hardware=hc.Hardware(encoder=4096, delay=1.3e-3, dac_bits=12, jitter=2e-5),
         )  # fmt: skip
         out[card] = hc.Scenario(**parts | common)
+    bent = hc.MjcfArm(
+        mujoco.MjSpec.from_string(BENT), friction=[0.05, 0.02], torque_limit=[3.0, 3.0]
+    )
+    out["bent"] = dataclasses.replace(out["planar_2r"], arm=bent)
     return out | {"own law": dataclasses.replace(out["planar_2r"], controller=OWN)}
 
 
-KINDS = {
+def straight(method):
+    """The arm is bent, but measured exactly straight, by encoders of four counts."""
+    return variants(
+        method, LAYERS, dict(hardware=dict(encoder=4), force=(1.0, 150.0), t_max=0.6, dt=2e-3),
+        measured={}, uneven=dict(hardware=dict(encoder=4, jitter=3e-4, dropout_probability=0.1)),
+        rubs=dict(hardware=dict(encoder=4, jitter=3e-4, friction=(1e6, 0.01))),
+    )  # fmt: skip
+
+
+FINE = Profile(
+    tuple(round(1e-4 * i - 0.01, 6) for i in range(300)),
+    tuple(100.0 + 100.0 * (i % 2) for i in range(301)),
+)
+
+
+def thrown(method, velocity, t_max):
+    """A handle that is beyond many borders of fine layers at the end of a step."""
+    hand = hc.Operator(0.0, 1.0, 1e5)
+    common = dict(force=(200.0, 50.0), operator=hand, torque_limit=(1e5, 1e5), dt=0.02)
+    return variants(method, Clay(FINE, FINE), common, thrown=dict(velocity=velocity, t_max=t_max))
+
+
+THROWN = {
+    "fast: over many borders": thrown("fast", (-5.0, 4.0), 0.08),
+    "accurate: over many borders": thrown("accurate", (3.0, -9.0), 0.02),
+}
+KINDS = THROWN | {
     "held: plain arms": arms("held"), "physical: plain arms": arms("physical"),
     "fast: plain": {name: dataclasses.replace(s, dt=2 * TS) for name, s in NEAR.items()} | MORE,
     "accurate: plain": {
@@ -249,6 +289,8 @@ KINDS = {
     "fast: yield by axis": flows("fast", angles=(0.5, -1.0), inertia_shaping=True),
     "fast: yield along the motion": flows("fast", True, b=1e4, operator=None, command=LED),
     "fast: springs": springs(method="fast", operator=HAND, force=(4.0, 1.0), t_max=0.24),
+    "held: measured straight": straight("held"),
+    "physical: measured straight": straight("physical"),
     "fast: groove": grooves("fast", **SHAKEN, inertia_shaping=True, damping=1e5),
     "accurate: signals, growth": signals("accurate", GROWS, inertia_shaping=True, operator=HAND)
     | variants(
@@ -352,6 +394,16 @@ def summary_of(r):
     for name in out.dtype.names[-8:]:
         out[name] = r.energy[name]
     return out
+
+
+@pytest.mark.parametrize("kind", THROWN)
+def test_a_thrown_handle_crosses_each_border_in_turn(kind):
+    """From one to the next, or the same one back; more of them than there is room for at once."""
+    (r,) = hc.simulate_batch(THROWN[kind].values())
+    for axis in "xy":
+        at = [FINE.edges.index(c.border) for c in r.crossings if c.axis == axis]
+        assert np.abs(np.diff(at)).max(initial=0) <= 1
+    assert len(r.crossings) > 64
 
 
 @native

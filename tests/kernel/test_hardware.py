@@ -243,7 +243,7 @@ def test_a_run_that_overflows_has_an_outcome(render, seed):
 
 def test_halves_go_to_the_even_level():
     assert [formula.round_to_even(x, 1.0) for x in (0.5, 1.5, 2.5, -0.5)] == [0.0, 2.0, 2.0, 0.0]
-    assert formula.encode(math.tau * 3 / 1000, 1000) == pytest.approx(
+    assert formula.encode(math.tau * 3 / 1000, math.tau / 1000) == pytest.approx(
         math.tau * 3 / 1000, rel=1e-15
     )
     assert formula.encode(0.123, 0) == 0.123
@@ -276,7 +276,7 @@ def test_window_divides_the_noise_of_an_encoder():
     """
     counts, Ts, w = 4096, 1e-3, 0.7391
     for m in (1, 4, 16):
-        q = [formula.encode(w * k * Ts, counts) for k in range(4000)]
+        q = [formula.encode(w * k * Ts, math.tau / counts) for k in range(4000)]
         v = np.array(
             [formula.velocity_difference(k - m, q[k - m], k, q[k], Ts) for k in range(m, 4000)]
         )

@@ -1,5 +1,6 @@
 """Records in other programs' formats, read back by each format's own library, value for value."""
 
+import csv
 import dataclasses
 import errno
 import json
@@ -116,10 +117,10 @@ def read_parquet(file):
 
 
 def read_csv(file):
-    import pandas as pd
-
-    df = pd.read_csv(file, comment="#")
-    return {n: df[n].to_numpy(float) for n in df}, None, None
+    text = (x for x in file.read_text().splitlines() if not x.startswith("#"))
+    names, *rows = csv.reader(text)
+    values = np.array(rows, dtype=float).reshape(-1, len(names))
+    return dict(zip(names, values.T, strict=True)), None, None
 
 
 def read_mcap(file):
@@ -143,20 +144,38 @@ def read_mcap(file):
     return values, json.loads(told["scenario"]), told["status"]
 
 
+def rrd_tables(file):
+    """Tables of a Rerun file by its own reader; columns are t and /entity:component."""
+    try:
+        from rerun.chunk import RrdReader
+    except ImportError:  # an older one: what is static, then rows
+        from rerun.dataframe import load_recording
+
+        recording = load_recording(file)
+        view = recording.view(index="t", contents="/**")
+        has_rows = "t" in [x.name for x in recording.schema().index_columns()]
+        for read in (view.select_static, view.select)[: 1 + has_rows]:
+            table = read().read_all()
+            yield dict(zip(table.schema.names, table.columns, strict=True))
+        return
+    for chunk in RrdReader(file).stream():
+        batch = chunk.to_record_batch()
+        names = [x if x == "t" else f"{chunk.entity_path}:{x}" for x in batch.schema.names]
+        yield dict(zip(names, batch.columns, strict=True))
+
+
 def read_rrd(file):
-    chunk = pytest.importorskip("rerun.chunk")
     out, names, told = {}, {}, {}
-    for c in chunk.RrdReader(file).stream():
-        batch, where = c.to_record_batch(), c.entity_path[1:]
-        columns = dict(zip(batch.schema.names, batch.columns, strict=True))
-        if "SeriesLines:names" in columns:
-            names[where] = [x.split(" [")[0] for x in columns["SeriesLines:names"].to_pylist()[0]]
-        if "TextDocument:text" in columns:
-            told[where] = columns["TextDocument:text"].to_pylist()[0][0]
-        if "Scalars:scalars" in columns:
-            rows = columns["Scalars:scalars"].to_pylist()
-            t = columns["t"].cast("int64").to_numpy() * 1e-9
-            out.setdefault(where, []).append((t, np.array(rows, dtype=float)))
+    for table in rrd_tables(file):
+        for column, values in table.items():
+            where, _, what = column.removeprefix("/").partition(":")
+            if what == "SeriesLines:names":
+                names[where] = [x.split(" [")[0] for x in values.to_pylist()[0]]
+            elif what == "TextDocument:text":
+                told[where] = values.to_pylist()[0][0]
+            elif what == "Scalars:scalars":
+                t = table["t"].cast("int64").to_numpy() * 1e-9
+                out.setdefault(where, []).append((t, np.array(values.to_pylist(), dtype=float)))
     values = {}
     for where, parts in out.items():
         parts.sort(key=lambda x: x[0][0])

@@ -174,6 +174,27 @@ def test_a_joint_that_leaves_its_range_ends_the_run():
     assert high - 0.05 < r.q[-1, 3] <= high
 
 
+@pytest.mark.parametrize("name", ["haptic_3", "five_bar", "leader_7"])
+@pytest.mark.parametrize("gravity", ["compensated", "acts"])
+def test_gravity_is_compensated_under_any_controller(name, gravity):
+    """The same torques by a law of one's own and by gains: the same motion to rounding."""
+    arm = hc.MjcfArm(name, gravity=gravity)
+    n, aim = len(arm.names), arm.q + 0.02
+
+    def pd(t, q, qd, fh, state, params):
+        return tuple(2.0 * (a - x) - 0.1 * w for a, x, w in zip(aim, q, qd, strict=True)), state
+
+    gains = hc.JointPD((2.0,) * n, (0.1,) * n, reference=aim.tolist())
+    own, law = (
+        hc.simulate(
+            hc.Scenario(arm=arm, controller=c, Ts=1e-3, dt=5e-4, t_max=0.2, force=(0.0, 0.0))
+        )
+        for c in (hc.Controller(pd), gains)
+    )
+    assert np.abs(law.q[-1] - law.q[0]).max() > 1e-3
+    np.testing.assert_allclose(own.q, law.q, rtol=0.0, atol=1e-11)
+
+
 # ---- refusals ------------------------------------------------------------------------------------
 
 ARM, PD = hc.MjcfArm("planar_2r"), hc.JointPD((1.0, 1.0), (0.1, 0.1))

@@ -365,28 +365,164 @@ def test_a_new_beginning_is_a_new_simulation():
             sim.reset(cut)
 
 
-def test_a_thread_of_its_own_is_asked_for():
-    sim = hc.Simulation(CUT)
-    found, begin = [], threading.Event()
+GATE = {"inside": threading.Event(), "may go on": threading.Event()}
+
+
+def waits(t, q, qd, fh, state, params):
+    """A law that waits in its second sample until it may go on."""
+    if t > 0.0 and not GATE["inside"].is_set():
+        GATE["inside"].set()
+        assert GATE["may go on"].wait(60.0)
+    return (0.0, 0.0), state
+
+
+USES = {  # of both kinds, and of a simulation
+    "advance": lambda sim: sim.advance(3),
+    "numbers": lambda sim: sim.numbers(),
+    "set": lambda sim: sim.set(b=1.0),
+    "reset": lambda sim: sim.reset(),
+    "close": lambda sim: sim.close(),
+    "diverging": lambda sim: sim.diverging,
+}
+MORE_USES = {
+    "step": lambda sim: sim.step(force=(1.0, 0.0)),
+    "snapshot": lambda sim: sim.snapshot(),
+    "record": lambda sim: sim.record(),
+    "copy": copy.deepcopy,
+}
+MAKERS = {
+    "simulation": hc.Simulation,
+    "batch": lambda scene, engine: hc.SimulationBatch([scene], engine=engine, workers=1),
+}
+
+
+def hold(holds):
+    """Makes the next run of the law wait, or not."""
+    for event in GATE.values():
+        event.clear() if holds else event.set()
+
+
+@pytest.mark.parametrize("engine", ["python", "auto"])
+@pytest.mark.parametrize("kind", MAKERS)
+def test_a_thread_of_its_own_is_asked_for(kind, engine):
+    """While a thread is inside a step, each use by another is refused, and the run goes on."""
+    scene = replace(CUT, control="sampled", controller=hc.Controller(waits))
+    hold(False)
+    alone, sim, failed = hc.Simulation(scene), MAKERS[kind](scene, engine=engine), []
+    alone.advance(50)
+    hold(True)
 
     def other():
-        begin.wait()
-        for _ in range(2000):
-            try:
-                sim.step()
-            except RuntimeError as e:
-                found.append(str(e))
+        try:
+            sim.advance(50)
+        except Exception as error:
+            failed.append(error)
 
     thread = threading.Thread(target=other)
     thread.start()
-    begin.set()
-    for _ in range(2000):
-        try:
-            sim.step()
-        except RuntimeError as e:
-            found.append(str(e))
-    thread.join()
-    assert found and set(found) == {"another thread uses this simulation: give each thread its own"}
+    try:
+        assert GATE["inside"].wait(60.0)
+        refused = f"another thread uses this {kind}: give each thread its own"
+        for use in (USES | (MORE_USES if kind == "simulation" else {})).values():
+            with pytest.raises(RuntimeError, match=f"^{refused}$"):
+                use(sim)
+    finally:
+        GATE["may go on"].set()
+        thread.join()
+    assert not failed
+    assert np.array_equal(np.ravel(sim.numbers()), alone.numbers())
+
+
+def test_a_law_that_uses_its_own_simulation_is_refused():
+    sims = []
+
+    def meddles(t, q, qd, fh, state, params):
+        sims[0].step()
+        return (0.0, 0.0), state
+
+    scene = replace(CUT, control="sampled", controller=hc.Controller(meddles))
+    sims.append(hc.Simulation(scene))
+    with pytest.raises(RuntimeError, match="another thread uses this simulation"):
+        sims[0].advance(5)
+
+
+def snapshot_of(scene, **how):
+    sim = hc.Simulation(scene, **how)
+    sim.advance(53)
+    return sim.snapshot()
+
+
+BOTH = replace(CUT, operator=(hc.Operator(), None))
+PLANAR = hc.MjcfArm("planar_2r")
+JOINTS = hc.Scenario(
+    arm=PLANAR, controller=hc.JointPD((20.0, 20.0), (0.5, 0.5)), control="sampled", Ts=1e-3,
+    dt=1e-3, t_max=1.0,
+)  # fmt: skip
+OTHERS = {
+    "arm": (CUT, lambda: snapshot_of(JOINTS), "clay"),
+    "clay": (CUT, lambda: snapshot_of(replace(CUT, clay=hc.slab(hc.Flow(Fy=0.3)))), "clay"),
+    "muscle": (CUT, lambda: snapshot_of(replace(CUT, muscle=hc.Step((1.0, 0.0), 0.1))), "muscle"),
+    "dt": (CUT, lambda: snapshot_of(replace(CUT, dt=5e-4)), "dt"),
+    "planar_2r in place of the two-link arm": (
+        replace(JOINTS, arm=hc.Arm(), controller=None), lambda: snapshot_of(JOINTS), "arm"
+    ),
+    "hardware": (
+        replace(CUT, control="sampled", hardware=hc.Hardware(delay=1e-3)),
+        lambda: snapshot_of(replace(CUT, control="sampled", hardware=hc.Hardware(delay=9e-3))),
+        "hardware",
+    ),
+    "operator": (CUT, lambda: snapshot_of(BOTH), "operator"),
+    "every": (CUT, lambda: snapshot_of(CUT, every=7), "every"),
+    "recorded": (CUT, lambda: snapshot_of(CUT, recorded=False), "recorded"),
+    "monitored": (CUT, lambda: snapshot_of(CUT, monitored=False), "monitored"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("engine", ["python", "auto"])
+@pytest.mark.parametrize("name", OTHERS)
+def test_a_snapshot_of_another_scenario_is_refused_and_changes_nothing(name, engine):
+    scene, taken, field = OTHERS[name]
+    sim, twin = (hc.Simulation(scene, engine=engine) for _ in range(2))
+    for each in (sim, twin):
+        each.advance(37)
+    with pytest.raises(hc.ParameterError, match=f"same scenario: {field}") as fault:
+        sim.restore(taken())
+    assert "\n" not in str(fault.value)
+    for each in (sim, twin):
+        each.advance(100)
+    same(sim.record(), twin.record())
+
+
+def test_torques_given_in_steps_return_with_a_snapshot():
+    """Those in effect when it was taken; not into a simulation without any."""
+    scene = replace(CUT, control="sampled")
+    sim = hc.Simulation(scene)
+    sim.advance(40, torque=(0.3, -0.1))
+    taken = sim.snapshot()
+    sim.advance(40)
+    want = sim.numbers()
+    sim.advance(40, torque=(0.0, 0.5))
+    sim.restore(taken)
+    sim.advance(40)
+    assert sim.numbers() == want
+    with pytest.raises(hc.ParameterError, match="torque"):
+        hc.Simulation(scene).restore(taken)
+
+
+def test_a_snapshot_with_another_force_gain_hand_and_clay_is_right():
+    """Of another simulation that began with others, and of one in which they were changed."""
+    scene = replace(CUT, operator=hc.Operator())
+    other = replace(scene, force=(0.4, 0.2), gain=(0.6, 0.4), operator=hc.Operator(0.3, 2.0, 5.0))
+    for begins, changes in ((other, {}), (scene, dict(gain=(0.7, 0.2), b=2.0))):
+        there, here = hc.Simulation(begins), hc.Simulation(scene)
+        there.advance(60)
+        there.set(**changes)
+        there.advance(40, force=(0.3, 0.1))
+        here.advance(37)
+        here.restore(there.snapshot())
+        for each in (there, here):
+            each.advance(5000)
+        same(here.record(), there.record())
 
 
 @pytest.mark.parametrize("engine", ["python", "auto"])

@@ -390,7 +390,7 @@ def good(rng=0, **kw):
             hc.studies.Measurement(T, np.sin(2 * np.pi * 60 * T), X[1]),
             {},
             "input",
-            "20 lines or more",
+            "12 lines or more",
         ),
         (
             hc.studies.Measurement(T, np.sin(2 * np.pi * 2 * T), X[1]),
@@ -444,6 +444,7 @@ def test_a_wrong_sign_is_named(what):
 
 
 ROWS = "".join(f"{i * DT:.4f},{i % 7},{i % 5}\n" for i in range(200))
+EMPTY = "".join(f"{i * DT:.4f},nan,{i % 5}\n" for i in range(200))
 FILE = ["identify", "--csv", "a.csv"]
 
 
@@ -462,11 +463,11 @@ FILE = ["identify", "--csv", "a.csv"]
             [*FILE, "--what", "S"],
             ["columns.input", "fx, fy"],
         ),
-        ("t,input,input\n" + ROWS, [*FILE, "--columns", "output=input"], ["stand once"]),
+        ("t,input,input\n" + ROWS, [*FILE, "--columns", "output=input"], ["input and output"]),
         ("t,a,b\n" + ROWS, [*FILE, "--columns", "input=a", "output=a"], ["different columns"]),
         ("t,input,output\n" + ROWS + "x,1,2\n", FILE, ["line 202", "'t'", "'x'"]),
-        ("t,input,output\n" + ROWS + "0.2,1,\n", FILE, ["line 202", "'output'", "''"]),
-        ("t,input,output\n" + ROWS + "0.2,nan,1\n", FILE, ["line 202", "'input'", "'nan'"]),
+        ("t,input,output\n" + ROWS + "0.2,1,none yet\n", FILE, ["line 202", "'output'", "yet"]),
+        ("t,input,output\n" + EMPTY, FILE, ["line 2", "'input'", "'nan'"]),
         ("t,input,output\n" + ROWS + "0.2,1\n", FILE, ["line 202", "3 cells, has 2"]),
         ('t,input,output\n0,1,"2\n' + ROWS, FILE, ["line 2", "'output'"]),
         ("t,input,output\n" + ROWS + "0.1,1,2\n", FILE, ["t[200]", "goes back by 0.099 s"]),

@@ -9,7 +9,6 @@ import re
 import signal
 import subprocess
 import sys
-import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -401,10 +400,10 @@ def spawn(*args, **kw):
     )
 
 
-@pytest.fixture(scope="module")
-def scheduler(tmp_path_factory):
-    """The process of a scheduler, and its address."""
-    file = tmp_path_factory.mktemp("scheduler") / "scheduler.json"
+@pytest.fixture
+def scheduler(tmp_path):
+    """The process of a scheduler, and its address: one for each test, since tests end it."""
+    file = tmp_path / "scheduler.json"
     words = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
     process = spawn("distributed.cli.dask_scheduler", *words)
     try:
@@ -417,6 +416,8 @@ def scheduler(tmp_path_factory):
 
 def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path, scheduler):
     """A real scheduler, two worker processes without a nanny, one killed with work in hand."""
+    from distributed import Client
+
     s = Sweep("constant", parse_grid("b=10:1000:12log gain.x=1:2:2"), {"t_max": 0.5}, chunk=1)
     _, address = scheduler
     workers = []
@@ -433,6 +434,8 @@ def test_cluster_with_a_worker_killed_gives_the_local_result(tmp_path, scheduler
             )
             for _ in range(2)
         ]
+        with Client(address, set_as_default=False) as client:
+            client.wait_for_workers(2, timeout=PATIENCE)
         killed = []
 
         def kill(n):
@@ -457,14 +460,28 @@ def test_unreachable_scheduler_is_one_line(tmp_path):
     assert 2.0 * store_runs.SCHEDULER_PATIENCE < 10.0  # dask tries for twice as long
 
 
+KILL_WHEN_ASKED = """
+import os, sys, time
+from distributed import Client
+client = Client(sys.argv[1])
+while not client.run_on_scheduler(lambda dask_scheduler: len(dask_scheduler.tasks)):
+    time.sleep(0.05)
+os.kill(int(sys.argv[2]), 9)
+os._exit(0)  # without a word about the scheduler
+"""
+
+
 def test_a_scheduler_that_dies_is_one_line(tmp_path, capfd, scheduler):
-    """The last test that needs it."""
+    """It dies once it has tasks; no worker is there, so the sweep waits for results."""
     process, address = scheduler
-    end = threading.Timer(1.0, process.kill)  # no worker is there: it waits for results
-    end.start()
-    with pytest.raises(ConnectionError, match="has gone; the same command resumes"):
-        sweep.run_sweep(small(), tmp_path, scheduler=address)
-    end.join()
+    killer = subprocess.Popen([sys.executable, "-c", KILL_WHEN_ASKED, address, str(process.pid)])
+    try:
+        with pytest.raises(ConnectionError, match="has gone; the same command resumes"):
+            sweep.run_sweep(small(), tmp_path / "sweep", scheduler=address)
+        assert killer.wait(PATIENCE) == 0
+    finally:
+        killer.kill()
+        killer.wait()
     assert capfd.readouterr().err == ""
 
 

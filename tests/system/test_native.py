@@ -205,7 +205,7 @@ def test_the_self_test_sees_a_bit(monkeypatch):
 
 
 def test_a_short_run_in_python_says_nothing_and_a_long_one_says_it_once(monkeypatch, capsys):
-    monkeypatch.setattr(native, "why_not", lambda: "not built")
+    monkeypatch.setattr(native, "why_not", lambda: "not built: no C compiler (cc)")
     monkeypatch.setattr(engines, "_notice_given", False)
     assert engines.engine_for("auto", 10.0) == "python" and not capsys.readouterr().err
     for _ in range(2):
@@ -230,7 +230,7 @@ def checkout(tmp_path):
     return copy
 
 
-def setup(checkout, *args, **env):
+def run_setup(checkout, *args, **env):
     """Runs setup.py; what it said."""
     env = {k: v for k, v in os.environ.items() if k not in ("CC", "PYTHONPATH")} | env
     done = subprocess.run(
@@ -256,7 +256,7 @@ def test_without_a_compiler_or_headers_the_package_is_built_without_the_kernel(c
             "sysconfig.get_path = lambda x, *a: '/none' if x == 'include' else find(x, *a)\n"
         )
         env = {"PYTHONPATH": str(checkout)}
-    said = setup(checkout, "bdist_wheel", **env)
+    said = run_setup(checkout, "bdist_wheel", **env)
     assert f"no compiled kernel ({why}" in said
     (wheel,) = (checkout / "dist").glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:
@@ -289,7 +289,7 @@ def test_a_wheel_holds_the_kernel_for_this_python_and_later_ones(run, checkout, 
     if (ROOT / "build").is_dir():  # what `make` compiled
         shutil.copytree(ROOT / "build", checkout / "build")
         less = {}
-    setup(checkout, "bdist_wheel", **less)
+    run_setup(checkout, "bdist_wheel", **less)
     (wheel,) = (checkout / "dist").glob("*.whl")
     assert "-cp311-abi3-" in wheel.name or not native.is_there()
     with zipfile.ZipFile(wheel) as archive:

@@ -373,8 +373,18 @@ GAINS = {
     ),
     "plain.toml": "Kp = [1, 2]\nKd = [0.1, 0.2]\nvelocity = 'filter'\ncutoff = 90\n",
     "lerobot.json": '{"follower": {"position_kp": [1, 2], "position_kd": [0.1, 0.2]}}',
+    "franka.yaml": "imp: {ros__parameters: {k_gains: [240, 100], d_gains: [20, 10]}}\n",
     "servo.json": '{"position_p_coefficient": [16], "position_d_coefficient": [32]}',
 }
+
+
+ROS = """controller_manager: {ros__parameters: {update_rate: 500}}
+arm:
+  ros__parameters:
+    gains:
+      a: {p: 600.0, i: 0.0, d: 30.0}
+      b: {p: 400.0, i: 0.0, d: 20.0}
+"""
 
 
 def test_gains_under_the_names_of_projects(tmp_path):
@@ -386,14 +396,47 @@ def test_gains_under_the_names_of_projects(tmp_path):
     assert hc.JointPD.load(tmp_path / "plain.toml").cutoff == 90.0
     assert hc.JointPD.load(tmp_path / "lerobot.json").Kd == (0.1, 0.2)
     assert hc.JointPD.load(tmp_path / "servo.json").Kp == (16.0,)
+    assert hc.JointPD.load(tmp_path / "franka.yaml").Kd == (20.0, 10.0)
+
+
+def test_gains_by_name_are_in_the_order_of_the_joints(tmp_path):
+    (tmp_path / "g.yaml").write_text(ROS)
+    file = tmp_path / "g.yaml"
+    assert hc.JointPD.load(file).Kp == (600.0, 400.0)
+    assert hc.JointPD.load(file, joints=["elbow", "shoulder"]).Kp == (600.0, 400.0)  # own names
+    law = hc.JointPD.load(file, joints=["b", "a"])
+    assert (law.Kp, law.Kd) == ((400.0, 600.0), (20.0, 30.0))
+    with pytest.raises(hc.ParameterError, match="arm.*must have gains of c, too; has a, b"):
+        hc.JointPD.load(file, joints=["a", "c"])
+    file.write_text(ROS.replace("    gains:", "    joints: [b, a]\n    gains:"))
+    assert hc.JointPD.load(file).Kp == (400.0, 600.0)
+
+
+def test_one_of_several_tables_is_chosen(tmp_path):
+    file = tmp_path / "g.yaml"
+    file.write_text("teleop: {kp: [20], kd: [0.5]}\nold: {policy: {kp: [80], kd: [2]}}\n")
+    assert hc.JointPD.load(f"{file}:teleop").Kp == (20.0,)
+    assert hc.JointPD.load(f"{file}:policy").Kp == hc.JointPD.load(f"{file}:old.policy").Kp == (80,)
+    with pytest.raises(hc.ParameterError, match="choose one, as g.yaml:old.policy"):
+        hc.JointPD.load(file)
+    with pytest.raises(
+        hc.ParameterError, match="must name one of its tables of gains: teleop, old"
+    ):
+        hc.JointPD.load(f"{file}:polcy")
 
 
 @pytest.mark.parametrize(
     "name, text, told",
     [
         ("g.txt", "", "must be a file"),
-        ("g.toml", "Kp = [1]", "holds none"),
-        ("g.json", '{"a": {"Kp": [1], "Kd": [1]}, "b": {"Kp": [1], "Kd": [1]}}', "holds a, b"),
+        ("g.toml", "Kp = [1]", "must hold gains: a table with Kp and Kd"),
+        (
+            "g.json",
+            '{"a": {"Kp": [1], "Kd": [1]}, "b": {"Kp": [1], "Kd": [1]}}',
+            r"as g.json:b \(a, b\)",
+        ),
+        ("g.toml", "[c.gains.a]\np = 1\nd = 1\ni = 3\n", "c.a.i = 3: must be 0: the law"),
+        ("g.toml", "Kp = {a = 1, b = 2}\nKd = {a = 1}\n", "the same joints as Kp"),
         ("g.yaml", "a: [1", "cannot be read"),
         ("g.json", '{"Kp": [1, 2], "Kd": [1]}', "for each joint"),
         ("g.json", '{"Kp": ["x"], "Kd": [1]}', "finite number"),
