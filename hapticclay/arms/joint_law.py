@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from ..arguments import checked, part
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from . import gain_files
 from .mjcf_arm import MjcfArm
 
 MOST_GAIN = 1e9
+WHOLE = 1e-6  # relative error of a multiple
 FRICTION = ("Fc", "k", "Fv")  # of the torque Fc tanh(k w) + Fv w
 
 
@@ -27,9 +29,11 @@ class JointPD:
             sample; or that behind a low-pass "filter":
             w_k = (w_k-1 + wc (q_k - q_k-1))/(1 + wc Ts).
         cutoff: wc of the filter [rad/s], > 0, at most 1e6.
-        runs: where the law runs: on the "host", at Ts and behind the delay; or in the "drive",
-            whose own loop is so fast that it counts as continuous, while gravity and friction are
-            still fed forward by the host.
+        runs: where the law runs: on the "host", at Ts and behind the delay; or in the "drive", in
+            a loop of its own, while gravity and friction are still fed forward by the host.
+        drive_rate: rate at which drives measure and hold their torque, without delay [Hz], 10 to
+            1e6, a whole multiple of the host's; None for drives so fast that they count as
+            continuous.
         friction: friction that the host feeds forward at each joint, (Fc, k, Fv) of the torque
             Fc tanh(k w) + Fv w [N.m, s/rad, N.m.s/rad]; None for none.
         gravity: whether the host feeds gravity forward; None for as the arm says.
@@ -39,16 +43,17 @@ class JointPD:
         velocity_range: that converter spans -range to range [rad/s], > 0.
     """
 
-    Kp: Annotated[tuple[float, ...], Bound(0.0, MOST_GAIN, "N.m/rad")]
-    Kd: Annotated[tuple[float, ...], Bound(0.0, MOST_GAIN, "N.m.s/rad")]
+    Kp: Annotated[tuple[Real, ...], Bound(0.0, MOST_GAIN, "N.m/rad")]
+    Kd: Annotated[tuple[Real, ...], Bound(0.0, MOST_GAIN, "N.m.s/rad")]
     velocity: Literal["exact", "difference", "filter"] = "exact"
-    cutoff: Annotated[float | None, Bound(0.0, 1e6, "rad/s", above=True)] = None
+    cutoff: Annotated[Real | None, Bound(0.0, 1e6, "rad/s", above=True)] = None
     runs: Literal["host", "drive"] = "host"
+    drive_rate: Annotated[Real | None, Bound(10.0, 1e6, "Hz")] = None
     friction: Annotated[tuple[tuple[float, ...], ...] | None, Bound(0.0, 1e6)] = None
     gravity: bool | None = None
-    reference: Annotated[tuple[float, ...] | None, Bound(-1e3, 1e3, "rad")] = None
+    reference: Annotated[tuple[Real, ...] | None, Bound(-1e3, 1e3, "rad")] = None
     velocity_bits: Annotated[int | None, Bound(2, 32)] = None
-    velocity_range: Annotated[float | None, Bound(0.0, 1e6, "rad/s", above=True)] = None
+    velocity_range: Annotated[Real | None, Bound(0.0, 1e6, "rad/s", above=True)] = None
 
     def __post_init__(self):
         n = len(self.Kp)
@@ -64,6 +69,9 @@ class JointPD:
         if (self.velocity_bits is None) is not (self.velocity_range is None):
             what = "must be given with velocity_bits, and left out without"
             raise ParameterError("velocity_range", self.velocity_range, what)
+        if self.drive_rate is not None and self.runs != "drive":
+            bound = "must be left out where the law runs on the host"
+            raise ParameterError("drive_rate", self.drive_rate, bound)
         if (self.velocity == "filter") is not (self.cutoff is not None):
             what = "must be given with" if self.cutoff is None else "must be left out without"
             raise ParameterError("cutoff", self.cutoff, f"{what} velocity 'filter'")
@@ -77,7 +85,31 @@ class JointPD:
         rates = {"difference": "by difference", "filter": f"filtered at {self.cutoff} rad/s"}
         rate = rates.get(self.velocity, "exact")
         fed = " with friction fed forward" * (self.friction is not None)
-        return f"PD of {len(self)} joints in the {self.runs}, rates {rate}{fed}"
+        own = "" if self.runs == "host" else f" ({self.drive_words})"
+        return f"PD of {len(self)} joints in the {self.runs}{own}, rates {rate}{fed}"
+
+    @property
+    def drive_words(self) -> str:
+        """The loop of the drives in a few words."""
+        return "continuous" if self.drive_rate is None else f"sampled at {self.drive_rate:g} Hz"
+
+    def drive_samples(self, Ts: float) -> int | None:
+        """Samples of the drives in one of the host; None where they count as continuous.
+
+        Args:
+            Ts: control sample of the host [s].
+
+        Raises:
+            ParameterError: the drives' rate is no whole multiple of the host's.
+        """
+        if self.drive_rate is None:
+            return None
+        many = self.drive_rate * Ts
+        if round(many) < 1 or abs(many - round(many)) > WHOLE * many:
+            near = ", ".join(f"{k / Ts:g}" for k in {max(1, int(many)), int(many) + 1})
+            bound = f"must be a whole multiple of the host's {1.0 / Ts:g} Hz, such as {near}"
+            raise ParameterError("drive_rate", self.drive_rate, bound)
+        return round(many)
 
     @property
     def slopes(self) -> tuple[float, ...]:
@@ -87,6 +119,20 @@ class JointPD:
     @property
     def _frictions(self) -> tuple[tuple[float, ...], ...]:
         return self.friction or ((0.0, 0.0, 0.0),) * len(self)
+
+    def in_runs(self, Ts: float, delay: float) -> tuple[JointPD, float, float]:
+        """The law, control sample and delay of a run: drives that sample are a host of their rate.
+
+        Gravity and friction are then fed forward at that rate, too.
+
+        Args:
+            Ts: control sample of the host [s].
+            delay: from a sample of the host to its torque [s].
+        """
+        if self.drive_rate is None:
+            return self, Ts, delay
+        changes = {"runs": "host", "drive_rate": None, "velocity": "exact", "cutoff": None}
+        return replace(self, **changes), 1.0 / self.drive_rate, 0.0
 
     @classmethod
     @checked

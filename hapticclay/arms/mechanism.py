@@ -7,6 +7,7 @@ Constraints are projected out exactly, where the engine's own are soft.
 from __future__ import annotations
 
 import copy
+import hashlib
 import threading
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -112,6 +113,22 @@ class Mechanism:
         if not hasattr(self._own, "data"):
             self._own.data = self._mujoco.MjData(self._model)
         return self._own.data
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it moves as another one does: models of the same numbers, the same joints."""
+        if not isinstance(other, Mechanism):
+            return NotImplemented
+        return self.dofs == other.dofs and self._numbers == other._numbers
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.dofs))
+
+    @cached_property
+    def _numbers(self) -> bytes:
+        """A digest of the compiled model as the engine stores it."""
+        out = np.empty(self._mujoco.mj_sizeModel(self._model), np.uint8)
+        self._mujoco.mj_saveModel(self._model, None, out)
+        return hashlib.blake2b(out.tobytes()).digest()
 
     # ---- one pose
 
@@ -272,6 +289,12 @@ class Mechanism:
     def weights(self) -> np.ndarray:
         """Torques that hold the arm against its weight where `at` put it [N.m], shape (n,)."""
         return (self._data.qfrc_bias - self._data.qfrc_gravcomp) @ self._follow()
+
+    def taken(self, q: np.ndarray, w: np.ndarray) -> float:
+        """Power that dampers and a fluid take at positions and rates of the joints [W]."""
+        self._at(q)
+        moving = self.moving(w)
+        return float(w @ (moving.damping @ w - moving.drag))
 
     def energy(self, q: np.ndarray, w: np.ndarray) -> float:
         """Energy of motion, weight and springs at positions and rates of the joints [J]."""

@@ -41,6 +41,7 @@ class ArmCommand:
         velocity: How the rate of a joint is had, by default as the file of gains says, or exact.
         cutoff: Cutoff of --velocity filter [rad/s].
         runs: Where the gains act: in the host's loop at the rate, or in the drives' own.
+        drive_rate: Rate at which drives measure and hold [Hz]; by default they are continuous.
         arm: The arm of the file.
         counts: Encoder counts a turn behind the friction that the gains feed forward.
         wall: Axis of the world along which a wall at the handle pushes.
@@ -65,6 +66,7 @@ class ArmCommand:
     velocity: Literal["exact", "difference", "filter"] | None = None
     cutoff: Annotated[float | None, Bound(0.0, unit="rad/s", above=True)] = None
     runs: Literal["host", "drive"] | None = None
+    drive_rate: Annotated[float | None, Bound(10.0, 1e6, "Hz")] = None
     arm: ArmOptions = ArmOptions()
     counts: Annotated[int | None, Bound(1, 10**9)] = None
     wall: Literal["x", "y", "z"] | None = None
@@ -159,7 +161,7 @@ class ArmCommand:
 
         given: dict[str, Any] = {
             name: getattr(self, name)
-            for name in ("velocity", "cutoff", "runs")
+            for name in ("velocity", "cutoff", "runs", "drive_rate")
             if getattr(self, name) is not None
         }
         if self.gains:

@@ -22,7 +22,7 @@ def first_step(m, s, after):
     e, halved = s.e, s.before > 0.0
     if halved:
         kick.by_servo(m, s, e, 0.0)
-        ledger.add_work(m, s.work, s.work_at_event, e, e.o, s.now)
+        ledger.add_work(m, s.work, s.work_at_event, e, e.o, s.now, s.q)
         swap(m, s, e)
     kick.by_servo(m, s, s.k, first)
     if kick.is_limited(m, s.k):

@@ -3,10 +3,11 @@
 from . import hand, joints
 
 
-def add_work(m, of, to, k, w, machine):
+def add_work(m, of, to, k, w, machine, q):
     """The ledger `of` with the works of a kick, into `to`.
 
-    w are the joint rates before it, `machine` is the one whose torques act in it.
+    w are the joint rates before it, q their positions in it; `machine` is the one whose torques act
+    in it.
     """
     x, y, H = k.x, k.y, k.H
     vx, vy = 0.5 * (x.v + x.u), 0.5 * (y.v + y.u)
@@ -14,6 +15,8 @@ def add_work(m, of, to, k, w, machine):
     power = k.tau[0] * (w[0] + k.w[0])
     for i in range(1, m.joints):
         power += k.tau[i] * (w[i] + k.w[i])
+    if m.general:
+        power += by_drives(m, k, w, q)
     motors = 0.5 * H * power
     clay = H * (x.fe * vx + y.fe * vy)
     taken = H * (hand.damping_force(m, k, 0) * vx + hand.damping_force(m, k, 1) * vy)
@@ -33,10 +36,21 @@ def along_z(m, k, muscle, taken):
     return muscle + k.z.uh * way, taken + hand.damping_force(m, k, 2) * way
 
 
+def by_drives(m, k, w, q):
+    """Twice the power of drives that run the law of the joints [W]."""
+    power = 0.0
+    for i in range(m.joints):
+        rate = k.L * w[i] + k.R * k.w[i]
+        torque = m.drive_pull[i] - m.drive_spring[i] * q[i] - m.drive_damper[i] * rate
+        power += torque * (w[i] + k.w[i])
+    return power
+
+
 def taken_by_joints(m, k, w, taken):
     """What the dampers of the joints, and a fluid, take in addition [J]."""
     for i in range(m.joints):
         force = k.L * joints.damping(m, w, i) + k.R * joints.damping(m, k.w, i) - joints.drag(m, i)
+        force -= m.drive_damper[i] * (k.L * w[i] + k.R * k.w[i])
         taken += 0.5 * k.H * force * (w[i] + k.w[i])
     return taken
 

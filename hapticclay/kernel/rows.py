@@ -90,6 +90,6 @@ def keep(m, s, k, after, shows, works):
     if not works:
         return
     if sampled.is_early(s, after):
-        ledger.add_work(m, s.work_at_event, s.work, k, s.e.w, s.next)
+        ledger.add_work(m, s.work_at_event, s.work, k, s.e.w, s.next, s.q)
     else:
-        ledger.add_work(m, s.work, s.work, k, s.w, s.now)
+        ledger.add_work(m, s.work, s.work, k, s.w, s.now, s.q)

@@ -122,7 +122,7 @@ def event(m, s, samples, now):
         across(m, s, e, 0.0)
         for i in range(m.axes):
             s.fh[i] = hand.force(m, e, i)
-        ledger.add_work(m, s.work, s.work_at_event, e, e.o, s.now)
+        ledger.add_work(m, s.work, s.work_at_event, e, e.o, s.now, s.q)
     else:
         rest(m, s, e)
         memory.copied(s.work_at_event, s.work)

@@ -18,10 +18,8 @@ def stored(scenario: Scenario, m: Any, s: Any) -> tuple[float, float]:
     n = m.joints
     w = np.array(s.w[:n])
     q = np.array(s.q[:n]) - s.before * w  # where the kick was
-    spring, pull = np.array(m.drive_spring[:n]), np.array(m.drive_pull[:n])
     start = np.array(m.start[:n])
     arms = arm.mechanism.energy(q, w) - arm.mechanism.energy(start, 0.0 * w)
-    arms += float(0.5 * spring @ (q**2 - start**2) - pull @ (q - start))
     axes = ["xyz".index(c) for c in arm.axes]
     p = arm.handle(q)[axes] - np.array(m.at[: m.axes])
     v = arm.jacobian(q)[axes] @ w

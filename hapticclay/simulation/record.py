@@ -67,8 +67,10 @@ class Record:
         scenario: what was run.
         outcome: how the run ended.
         crossings: of borders, in order.
-        energy: work of the operator's muscle and of the motors; energy taken by the clay and by the
-            damper of Th, gained by the arm (kinetic) and by mass and spring of Th (hand_stored);
+        energy: work of the operator's muscle and of the motors, drives that run a joint law
+            included; energy taken by the clay and by the damper of Th, gained by the arm (kinetic;
+            of an arm from a file, weight and springs included) and by mass and spring of Th
+            (hand_stored); of an arm from a file, what its dampers and a fluid take (joint_dampers);
             what these fail to balance by (residual), and the energy that came into play
             (throughput): that at the start, and the magnitudes of both works, step by step [J].
             For clay that springs back, the part of the clay's share that its springs store and

@@ -726,7 +726,9 @@ class Run:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The samples kept, by the names of Record's arrays."""
-        indices, made, forces, extra = zip(*self.kept, strict=True)
+        more = joints.width(self.row.m) if self.row.m.general else 0
+        nothing = Kept(np.zeros(0, int), *(np.zeros((0, n)) for n in (rows.ROW, 3, more)))
+        indices, made, forces, extra = zip(*(self.kept or [nothing]), strict=True)
         t = np.concatenate(indices) * self.scenario.dt
         if self.end_time is not None and len(t):
             t[-1] = self.end_time

@@ -13,12 +13,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
 from ..arms.joint_law import JointPD, compensated
 from ..arms.joint_ranges import without_ranges
 from ..arms.mjcf_arm import MjcfArm
 from ..errors import ParameterError
 from ..model.hardware import Hardware
+from ..model.sampled_controller import Controller
 from ..results import Result, Tables
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
@@ -27,6 +29,7 @@ from ..theory.client_loop import Delay, Sample
 from ..theory.joint_gains import Study
 from ..theory.joint_loop import JointLoop, timing_words
 from .joint_motion import Mode, modes_of_motion
+from .sampled_drive import SampledDrive
 
 BESIDE = 0.005  # share of the common limit at which runs are made on either side
 PARTS = 8, 4  # physics steps a control sample, of a serial arm and of a closed chain
@@ -200,9 +203,14 @@ class _Beside(NamedTuple):
     def motion(self) -> np.ndarray:
         """Position of the joint, less the one at which it rests [rad]."""
         s, j = self.record.scenario, self.joint
-        arm, law = s.arm, s.controller
-        assert isinstance(arm, MjcfArm) and isinstance(law, JointPD) and law.reference
-        rests = arm.q[j] + law.reference[j] - holding(arm, law)[j]
+        arm, law = s.file_arm, s.controller
+        if isinstance(law, Controller):
+            drive: SampledDrive = law.law
+            arm, law, reference = drive.arm, drive.law, drive.reference
+        else:
+            assert law is not None
+            reference = law.reference
+        rests = arm.q[j] + reference[j] - holding(arm, law)[j]  # type: ignore[index]
         return self.record.q[:, j] - rests
 
     @property
@@ -220,7 +228,7 @@ def _beside(study: Study, factor: float) -> _Beside:
 
 def expected_mode(loop: JointLoop) -> Mode:
     """The motion of a map that grows fastest, or decays most slowly."""
-    values, vectors = np.linalg.eig(loop.map())
+    values, vectors = matrices.eigenvectors(loop.map())
     i = int(np.argmin(np.abs(np.abs(values) - loop.radius())))
     s = np.log(complex(values[i])) / loop.Ts
     return Mode(complex(s.real, abs(s.imag)), np.abs(vectors[: loop.n, i]))
@@ -241,15 +249,19 @@ def near_limit(arm: MjcfArm, law: JointPD, Ts: float, delay: float, factor: floa
     n = len(arm.names)
     free = without_ranges(replace(arm, friction=(0.0,) * n, torque_limit=(math.inf,) * n))
     scaled = replace(law, Kp=tuple(factor * k for k in law.Kp))
-    study = Study(free, scaled, Ts, delay)
-    mode = expected_mode(study.loop)
+    mode = expected_mode(Study(free, scaled, Ts, delay).loop)
     span, size = _length(mode, Ts)
     shape = mode.shares / mode.shares.max()
     reference = holding(free, scaled) + size * shape
+    controller: Any = replace(scaled, reference=tuple(reference.tolist()))
+    if law.drive_rate is not None:
+        drive = SampledDrive(free, scaled, reference, Ts, delay)
+        controller, free = drive.controller(free.q), replace(free, gravity="acts")
+        Ts, delay = 1.0 / law.drive_rate, 0.0
     return Scenario(
         name=f"{arm.name}, all Kp times {factor:.5g}",
         arm=free,
-        controller=replace(scaled, reference=tuple(reference.tolist())),
+        controller=controller,
         Ts=Ts,
         dt=Ts / _parts(arm, Ts),
         t_max=span,
@@ -277,6 +289,7 @@ def _length(mode: Mode, Ts: float) -> tuple[float, float]:
 
 def built_scenario(arm: MjcfArm, law: JointPD, Ts: float, delay: float) -> Scenario:
     """An arm as built, from rest 10 mrad off its reference."""
+    law, Ts, delay = law.in_runs(Ts, delay)
     if law.runs == "drive":  # whose torque limits are not simulated
         arm = replace(arm, torque_limit=(math.inf,) * len(arm.names))
     low, high = arm.ranges.T

@@ -13,9 +13,10 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
 from ..display import fields_of, table_of
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..results import Result
 from .block_fit import BlockFit, Unknown, block_fit
 from .coulomb_axis import Axis, follow
@@ -163,7 +164,7 @@ class IdentifiedPair(Result):
 def identify_pair(
     log: PairLog,
     *,
-    band: Annotated[float, Bound(0.1, 1e5, "Hz")] = BAND,
+    band: Annotated[Real, Bound(0.1, 1e5, "Hz")] = BAND,
     level: Annotated[float, Bound(0.5, 0.999)] = 0.95,
 ) -> IdentifiedPair:
     """Finds gains, delays, friction and inertia of a pair from its log, each with an interval.
@@ -337,7 +338,7 @@ def _axis_guess(log: PairLog) -> list[Unknown]:
     rows, fast = fitted_rows(len(q), T, band), 0.1 * float(np.std(v)) or 1.0
     columns = (np.gradient(v, T), v, np.tanh(v / fast), np.ones_like(v))
     A = np.column_stack([x[rows] for x in columns])
-    J, b, friction, offset = np.linalg.lstsq(A, u[rows], rcond=None)[0].tolist()
+    J, b, friction, offset = matrices.least_squares(A, u[rows]).tolist()
     torque = float(np.std(u)) or 1.0
     J = J if J > 0.0 else torque / (float(np.std(columns[0])) or 1.0)
     b_size = max(abs(b), 0.1 * torque / (float(np.std(v)) or 1.0))

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from .block_fit import BlockFit, Unknown, block_fit
 
 LATEST = 0.4  # [s] largest delay that is looked for
@@ -149,7 +150,7 @@ def apart(law: PairLaw, m: Motion, band: float) -> float:
     sizes = np.linalg.norm(columns, axis=0)
     if not np.all(sizes > 0.0):
         return 0.0
-    return float(np.linalg.svd(columns / sizes, compute_uv=False)[-1])
+    return float(matrices.singular_values(columns / sizes)[-1])
 
 
 def _fit(m: Motion, band: float, filters: bool, level: float) -> tuple[PairLaw, BlockFit]:
@@ -284,5 +285,5 @@ def _delays(t: np.ndarray) -> list[float]:
 def _solved(columns: tuple[np.ndarray, ...], y: np.ndarray) -> tuple[np.ndarray, float]:
     """Linear least squares, and the sum of squares that is left."""
     A = np.column_stack(columns)
-    gains, *_ = np.linalg.lstsq(A, y, rcond=None)
+    gains = matrices.least_squares(A, y)
     return gains, float(np.sum((y - A @ gains) ** 2))

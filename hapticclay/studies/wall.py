@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from ..arguments import part
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..model.constants import AXES
 from ..model.operator import Operator
 from ..model.shapes import Constant
@@ -61,9 +61,9 @@ class Press:
             not see.
     """
 
-    force: Annotated[float, Bound(0.0, 1e3, "N")] = 1.0
-    speed: Annotated[float, Bound(0.0, 1.0, "m/s")] = boundary.LARGE_PUSH
-    still: Annotated[float | None, Bound(1e-9, 1e-2, "m")] = None
+    force: Annotated[Real, Bound(0.0, 1e3, "N")] = 1.0
+    speed: Annotated[Real, Bound(0.0, 1.0, "m/s")] = boundary.LARGE_PUSH
+    still: Annotated[Real | None, Bound(1e-9, 1e-2, "m")] = None
 
     def rest(self, quantum: float) -> float:
         """Largest motion that counts as rest [m].
@@ -345,8 +345,8 @@ class DeviceWall(Wall):
         return w.scenario(n * w.Ts, push=press.speed, muscle=muscle, steps=steps)
 
     def trial(self, t_max: float, push: float | None) -> Scenario:
-        push = push or min(SAMPLE_PUSH / self.subject.Ts, 1.0)
-        return self.subject.scenario(t_max, push=push, steps=self.engine_steps(GROWTH_STEPS))
+        speed = push or min(SAMPLE_PUSH / self.subject.Ts, 1.0)
+        return self.subject.scenario(t_max, push=speed, steps=self.engine_steps(GROWTH_STEPS))
 
     def check_trial(self, made: Scenario) -> None:
         hardware = made.hardware

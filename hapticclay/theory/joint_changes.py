@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from ..arms.mechanism import Linear
 from .joint_loop import JointLoop
 
@@ -93,5 +94,5 @@ def slopes(edge: Edge, over: Sequence[Number]) -> np.ndarray:
 
 def _open(loop: JointLoop, theta: float) -> complex:
     """The eigenvalue of the open loop that is 1 at a limit."""
-    x = np.linalg.eigvals(loop.opened(np.array([theta])))[0]
+    x = matrices.eigenvalues(loop.opened(np.array([theta])))[0]
     return complex(x[np.argmin(np.abs(x - 1.0))])

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from . import joint_crossings, roots
 from .joint_crossings import Crossing
 from .joint_loop import JointLoop, grid
@@ -128,7 +129,7 @@ class Family:
         found = joint_crossings.crossings(self.response, self.circle.angles)
         if self.of == "position":
             at_rest = self.right.T @ self.circle.at_rest() @ self.left
-            values = np.linalg.eigvals(at_rest)
+            values = matrices.eigenvalues(at_rest)
             real = values[(np.abs(values.imag) <= NEAR * np.abs(values)) & (values.real != 0.0)]
             found += [Crossing(-1.0 / x, 0.0) for x in real.real.tolist()]
         return sorted(found)

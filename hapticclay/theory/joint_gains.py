@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
 from ..arms.joint_law import JointPD, checked_law, compensated
 from ..arms.joint_units import Joints, of_joint, table_of
@@ -22,7 +23,7 @@ from .client_loop import Delay, Sample
 from .joint_changes import Edge, Number, slopes
 from .joint_crossings import Crossing
 from .joint_families import Circle, Family, Limit
-from .joint_loop import JointLoop, grid, is_stable, timing_words
+from .joint_loop import Drive, JointLoop, grid, is_stable, timing_words
 
 LATEST = 2.0  # [s] largest added delay that is looked for
 SLOWEST = 1.0  # [s] largest control sample that is looked for
@@ -246,23 +247,27 @@ def joint_loop(
     compensated: bool,
     gains: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> JointLoop:
-    """The loop of an arm at a pose under a law; what a drive does acts between samples.
+    """The loop of an arm at a pose under a law; what a continuous drive does acts between samples.
 
     Gains, if given, replace Kp and Kd of the law, and may be negative.
     """
     stiffness, damping = (np.diag(x) for x in gains or (law.Kp, law.Kd))
-    held, drive = (1.0, 0.0) if law.runs == "host" else (0.0, 1.0)
+    held, driven = (1.0, 0.0) if law.runs == "host" else (0.0, 1.0)
+    drive = None
+    if law.drive_rate is not None:
+        drive = Drive(stiffness, damping, max(1, round(law.drive_rate * Ts)))
     forward = linear.gravity_stiffness * float(compensated)
     return JointLoop(
         linear.inertia,
-        linear.damping + drive * damping,
-        linear.stiffness + linear.gravity_stiffness + drive * stiffness,
+        linear.damping + driven * damping,
+        linear.stiffness + linear.gravity_stiffness + driven * stiffness,
         held * stiffness - forward,
         held * damping - np.diag(law.slopes),
         Ts,
         delay,
         law.velocity,
         law.cutoff,
+        drive,
     )
 
 
@@ -339,6 +344,7 @@ class Study:
         self.Ts, self.delay = Ts, delay
         self._known: dict[tuple[int, float, float], tuple[Linear, JointLoop]] = {}
         self.arm, self.law = arm, checked_law(law, arm.names)
+        law.drive_samples(Ts)  # refuses a rate that is no multiple
         self.compensated = compensated(arm, law)
         self.linear = arm.linear(q)
         self.loop = self.remade()
@@ -467,7 +473,7 @@ class Study:
 
 def worst_motion(loop: JointLoop) -> tuple[float, float, int]:
     """Size of the largest eigenvalue, its frequency [Hz], and the joint that moves most in it."""
-    values, vectors = np.linalg.eig(loop.map())
+    values, vectors = matrices.eigenvectors(loop.map())
     size = loop.radius()
     i = int(np.argmin(np.abs(np.abs(values) - size)))
     frequency = abs(np.angle(values[i])) / (2.0 * math.pi * loop.Ts)

@@ -12,10 +12,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from ..arms import joint_law
 from ..display import time_words
 from ..errors import ParameterError
@@ -27,13 +28,27 @@ AT_REST = 1e-6  # modes this near to z = 1 may be rest
 ROUNDING = 1e-10  # of an eigenvalue
 
 
+class Drive(NamedTuple):
+    """What drives hold from sample to sample of their own: -(position q + rate q').
+
+    Attributes:
+        position: [N.m/rad], shape (n, n).
+        rate: [N.m.s/rad], shape (n, n).
+        samples: of the drives in one of the host.
+    """
+
+    position: np.ndarray
+    rate: np.ndarray
+    samples: int
+
+
 @dataclass(frozen=True, eq=False)
 class JointLoop:
     """Joints, and the torque that a host holds.
 
     Attributes:
         inertia: M [kg.m^2], shape (n, n).
-        damping: D of what acts between samples [N.m.s/rad], shape (n, n).
+        damping: D of what acts between samples, drives included [N.m.s/rad], shape (n, n).
         stiffness: S likewise [N.m/rad], shape (n, n).
         position: P of the held torque [N.m/rad], shape (n, n).
         rate: R of the held torque [N.m.s/rad], shape (n, n).
@@ -41,6 +56,7 @@ class JointLoop:
         delay: from a sample to its torque [s].
         velocity: how the rate is had.
         cutoff: of the filter behind the difference [rad/s].
+        drive: the part of D and S that drives hold from sample to sample; None for none.
     """
 
     inertia: np.ndarray
@@ -52,6 +68,7 @@ class JointLoop:
     delay: float = 0.0
     velocity: Literal["exact", "difference", "filter"] = "exact"
     cutoff: float | None = None
+    drive: Drive | None = None
 
     @property
     def n(self) -> int:
@@ -65,22 +82,38 @@ class JointLoop:
         Shapes (2n, 2n), (2n, n), (2n, n).
         """
         share = self.late[1]
-        whole = self._transition(self.Ts)
-        late = self._transition((1.0 - share) * self.Ts) if share else whole
+        if self.drive is not None:
+            return self._held_by(self.drive, share)
+        whole = self._transition(self.Ts, self.damping, self.stiffness)
+        rest = (1.0 - share) * self.Ts
+        late = self._transition(rest, self.damping, self.stiffness) if share else whole
         return whole[0], late[1], whole[1] - late[1]
 
-    def _transition(self, t: float) -> tuple[np.ndarray, np.ndarray]:
-        from scipy.linalg import expm
+    def _held_by(self, drive: Drive, share: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`hold` with drives that take what the host sends at the next of their own samples."""
+        samples = drive.samples
+        loose = self.damping - drive.rate, self.stiffness - drive.position
+        step, given = self._transition(self.Ts / samples, *loose)
+        step = step - given @ np.hstack([drive.position, drive.rate])
+        late = math.ceil(share * samples - ROUNDING)
+        power, sums = np.eye(2 * self.n), [0.0 * given]
+        for _ in range(samples):
+            sums.append(sums[-1] + power @ given)
+            power = step @ power
+        return power, sums[samples - late], sums[samples] - sums[samples - late]
 
+    def _transition(
+        self, t: float, damping: np.ndarray, stiffness: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         n, inverse = self.n, np.linalg.inv(self.inertia)
         a = np.zeros((3 * n, 3 * n))
         a[:n, n : 2 * n] = np.eye(n)
-        a[n : 2 * n] = np.hstack([-inverse @ self.stiffness, -inverse @ self.damping, inverse])
+        a[n : 2 * n] = np.hstack([-inverse @ stiffness, -inverse @ damping, inverse])
         with np.errstate(over="ignore", invalid="ignore"):
-            e = expm(a * t)
+            e = matrices.exponential(a * t)
         if not np.isfinite(e).all():
             bound = f"must be smaller at this rate: motion over {t:g} s is beyond all numbers"
-            raise ParameterError("damping", float(np.abs(self.damping).max()), bound)
+            raise ParameterError("damping", float(np.abs(damping).max()), bound)
         return e[: 2 * n, : 2 * n], e[: 2 * n, 2 * n :]
 
     @cached_property
@@ -137,14 +170,14 @@ class JointLoop:
     def structural(self) -> int:
         """Directions of motion without stiffness, which rest anywhere."""
         total = self.stiffness + self.position
-        size = np.linalg.svd(total, compute_uv=False)
+        size = matrices.singular_values(total)
         scale = max(np.abs(self.stiffness).max(), np.abs(self.position).max())
         return int(np.sum(size <= FREE * scale)) if scale else self.n
 
     @cached_property
     def eigenvalues(self) -> np.ndarray:
         """Eigenvalues of the map, largest first, without those of rest anywhere (z = 1)."""
-        z = np.linalg.eigvals(self.map())
+        z = matrices.eigenvalues(self.map())
         for _ in range(2 * self.structural):
             i = int(np.abs(z - 1.0).argmin())
             if abs(z[i] - 1.0) > AT_REST:
@@ -206,7 +239,7 @@ class JointLoop:
 
     def at_rest(self) -> np.ndarray:
         """Position per constant torque added to the host's [rad/(N.m)], shape (n, n)."""
-        return np.linalg.pinv(self.stiffness + self.position, FREE)
+        return matrices.pseudo_inverse(self.stiffness + self.position, FREE)
 
     # ---- the same with other numbers
 
@@ -250,7 +283,7 @@ def resonant_grid(loop: Any) -> np.ndarray:
     """Angles of a search around eigenvalues near the unit circle, > 0 and <= pi."""
     if loop.states > MOST_STATES // 3:
         return np.empty(0)
-    near = near_resonances(np.linalg.eigvals(loop.map()))
+    near = near_resonances(matrices.eigenvalues(loop.map()))
     return near[(near > 0.0) & (near <= math.pi)]
 
 

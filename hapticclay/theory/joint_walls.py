@@ -14,7 +14,7 @@ from ..arguments import checked, named
 from ..arms.joint_law import JointPD, compensated
 from ..arms.mechanism import STILL
 from ..arms.mjcf_arm import MjcfArm
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..model.operator import NO_HAND, Operator
 from ..results import Result, Tables
 from . import joint_changes
@@ -114,7 +114,7 @@ class WallLimit(Result):
 def wall_limit(
     arm: MjcfArm,
     axis: Axis,
-    B: Annotated[float, Bound(0.0, 1e6, "N.s/m")],
+    B: Annotated[Real, Bound(0.0, 1e6, "N.s/m")],
     operator: Operator | None,
     Ts: Sample,
     delay: Delay = 0.0,

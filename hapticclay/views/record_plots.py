@@ -121,12 +121,21 @@ def energies(record: Record) -> dict[str, np.ndarray]:
         "clay": work((record.fe * record.v).sum(axis=1)),
     }
     if not record.scenario.is_closed_form:
-        arm = record.scenario.file_arm
-        lost = np.array(arm.damping) * record.qd**2 + np.array(arm.friction) * np.abs(record.qd)
-        return out | {"joints": work(lost.sum(axis=1)), "stored": _stored(record)}
+        return out | {"joints": work(_lost(record)), "stored": _stored(record)}
     I1, I2 = record.scenario.arm.links[2:4]
     rates = record.qd[:, 0], record.qd.sum(axis=1)  # of the links
     return out | {"kinetic": 0.5 * (I1 * rates[0] ** 2 + I2 * rates[1] ** 2)}
+
+
+def _lost(record: Record) -> np.ndarray:
+    """Power that dampers, friction and a fluid take in the joints of an arm from a file [W]."""
+    arm = record.scenario.file_arm
+    rubbed = (np.array(arm.friction) * np.abs(record.qd)).sum(axis=1)
+    if not arm.mechanism.is_computed:
+        return rubbed + (np.array(arm.damping) * record.qd**2).sum(axis=1)
+    shown = spread(np.arange(len(record.t)), MOST_STORED)
+    found = [arm.mechanism.taken(record.q[k], record.qd[k]) for k in shown]
+    return rubbed + np.interp(record.t, record.t[shown], found)
 
 
 def _stored(record: Record) -> np.ndarray:
@@ -171,10 +180,7 @@ def _added_up(record: Record) -> dict[str, float]:
     if not {"muscle", "hand_damper", "hand_stored", "motors", "clay"} <= set(e):
         return {}
     hand = e["muscle"] - e["hand_damper"] - e["hand_stored"]
-    out = {"hand": hand, "motors": e["motors"], "clay": e.get("rendered_clay", e["clay"])}
-    if getattr(record.scenario.controller, "runs", "host") == "drive":
-        del out["motors"]  # the balance has the drives' springs as stored energy
-    return out
+    return {"hand": hand, "motors": e["motors"], "clay": e.get("rendered_clay", e["clay"])}
 
 
 def _with_picture(figure: Figure) -> Figure:

@@ -314,3 +314,13 @@ def test_a_urdf_with_its_tool(tmp_path):
     assert arm.names == ("j",) and arm.ranges.tolist() == [[-1.0, 1.0]]
     assert arm.mass_matrix() == pytest.approx(0.01 + 1.0 * 0.1**2)
     np.testing.assert_allclose(arm.handle([0.5]), [0.2 * math.cos(0.5), 0.2 * math.sin(0.5), 0.0])
+
+
+@pytest.mark.parametrize("name", ["planar_2r", "five_bar", "haptic_3", "leader_7"])
+def test_arms_of_the_same_numbers_are_equal(name):
+    arm = hc.MjcfArm(name)
+    twin = pickle.loads(pickle.dumps(arm))
+    assert twin == arm == hc.MjcfArm(name) and hash(twin) == hash(arm)
+    heavier = hc.MjcfArm(name, armature=[x + 1e-12 for x in arm.armature])
+    others = hc.MjcfArm(name, gravity="acts"), heavier, hc.MjcfArm("planar_2r", damping=(9.0, 9.0))
+    assert all(arm != other for other in others)

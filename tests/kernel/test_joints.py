@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 from types import SimpleNamespace
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -394,3 +395,37 @@ def test_a_late_law_holds_the_weight_from_the_start():
     r = hc.simulate(hc.Scenario(arm=arm, controller=law, Ts=2e-3, t_max=0.05, hardware=late))
     # rounding of torques of 2.6 N.m over an inertia of 0.02 kg.m^2, in 0.05 s: 1e-16
     assert np.abs(r.q - arm.q).max() < 1e-14 and np.abs(r.tau - r.tau[0]).max() < 1e-12
+
+
+@pytest.mark.parametrize("runs", ["host", "drive"])
+@pytest.mark.parametrize("card", ["planar_2r", "leader_7"])
+def test_each_entry_of_the_energy_balance_is_an_integral_of_the_record(card, runs):
+    """Trapezoids over the samples: held torques jump at some, so their error falls as the step."""
+    arm = hc.MjcfArm(card, gravity="acts", torque_limit=[math.inf] * len(hc.MjcfArm(card).names))
+    n, off = len(arm.names), []
+    law = hc.JointPD((40.0,) * n, (1.0,) * n, runs=runs, reference=tuple(arm.q + 0.2))
+    for ratio in (2, 4):
+        r = hc.simulate(scene(arm, law, 1e-3, ratio, operator=hc.Operator(0.0, 0.0, 0.0)))
+        taken = r.qd**2 @ np.array(arm.damping)
+        motors, dampers = (
+            np.trapezoid(x, r.t) for x in ((r.tau * r.qd).sum(axis=1), taken)
+        )  # fmt: skip
+        motion = 0.5 * r.qd[-1] @ arm.mass_matrix(r.q[-1]) @ r.qd[-1]
+        lifted = lifted_by(arm, r.q[-1]) - lifted_by(arm, r.q[0])
+        size, e = r.energy["throughput"], r.energy
+        entries = (e["motors"] - motors, e["joint_dampers"] - dampers)
+        off.append(max(abs(x) / size for x in (*entries, e["kinetic"] - motion - lifted)))
+        assert abs(e["residual"]) < 2e-3 * size
+        rubs = e.get("friction", 0.0)
+        left = e["motors"] - e["joint_dampers"] - e["kinetic"] - rubs - e["residual"]
+        assert abs(left) < 1e-12 * size
+    assert off[1] < 1e-2 and off[1] < 0.6 * off[0] + 1e-6, off
+
+
+def lifted_by(arm, q):
+    """Energy of weight, by the places of the bodies."""
+    model = mujoco.MjModel.from_xml_path(str(joint_motion.CARDS / f"{arm.file}.xml"))
+    data = mujoco.MjData(model)
+    data.qpos[:] = q
+    mujoco.mj_fwdPosition(model, data)
+    return -float(model.body_mass @ (data.xipos @ model.opt.gravity))
