@@ -15,6 +15,7 @@ from .block_fit import BlockFit, Unknown, block_fit
 LATEST = 0.4  # [s] largest delay that is looked for
 TRIED = 24  # delays tried, evenly spaced up to a few samples, then in their logarithm
 LONGEST = 2.0  # [s] of delay and lag of a follower whose torque is unknown
+LINES = 8  # between rows: of a sine of a tenth of the rate they leave (2 pi/80)^2/12 = 5e-4
 SETTLES = 0.5  # [s] in which its start is forgotten
 LAGS = (0.0, 3.0)  # [samples] tried at the start
 EARLY = 2.0  # [samples] by which one column may be ahead of another
@@ -216,19 +217,24 @@ def fit_reflection(
 
 
 def followed(
-    t: np.ndarray, leader: np.ndarray, delay: float, lag: float, start: float, by_row: bool
+    t: np.ndarray, leader: np.ndarray, delay: float, lag: float, start: float, parts: int = 0
 ) -> np.ndarray:
     """A first-order lag behind a delayed leader, (n,); it begins at a position.
 
-    By row, as a filter that is computed once a row: the leader at t - delay acts for the row up to
-    t. Else in continuous time, exact for a leader that moves in lines from row to row.
+    As a filter that is computed once a row, where the leader at t - delay acts for the row up to t;
+    or in continuous time, behind a leader that moves in that many lines from row to row.
     """
+    from scipy.interpolate import CubicSpline
     from scipy.signal import lfilter
 
-    T, u = float(t[-1] - t[0]) / (len(t) - 1), delayed(t, leader, delay)
+    n, fine = len(t), max(parts, 1)
+    times = np.interp(np.arange(fine * (n - 1) + 1) / fine, np.arange(n), t)
+    T, u = float(t[-1] - t[0]) / (n - 1) / fine, leader
+    if delay or fine > 1:
+        u = CubicSpline(t, leader)(np.clip(times - delay, t[0], t[-1]))
     a = math.exp(-T / lag) if lag > 0.0 else 0.0
-    now = 1.0 - (a if by_row else lag / T * (1.0 - a))
-    return lfilter([now, 1.0 - a - now], [1.0, -a], u, zi=[start - now * u[0]])[0]
+    now = 1.0 - (lag / T * (1.0 - a) if parts else a)
+    return lfilter([now, 1.0 - a - now], [1.0, -a], u, zi=[start - now * u[0]])[0][::fine]
 
 
 def fit_following(
@@ -238,12 +244,12 @@ def fit_following(
 
     By row or in continuous time, whichever leaves less.
     """
-    tries = [_following(t, leader, follower, level, by_row) for by_row in (True, False)]
+    tries = [_following(t, leader, follower, level, parts) for parts in (0, LINES)]
     return min(tries, key=lambda x: x[1].rms)
 
 
 def _following(
-    t: np.ndarray, leader: np.ndarray, follower: np.ndarray, level: float, by_row: bool
+    t: np.ndarray, leader: np.ndarray, follower: np.ndarray, level: float, parts: int
 ) -> tuple[np.ndarray, BlockFit]:
     T, begin = float(t[-1] - t[0]) / (len(t) - 1), float(follower[0])
     delays, lags = [*_delays(t), *_later(t)], [0.0, *_delays(t)[1:]]
@@ -252,10 +258,10 @@ def _following(
 
     def model(delay: float, lag: float, scale: float, offset: float) -> np.ndarray:
         start = (begin - offset) / scale if scale else begin
-        return offset + scale * followed(t, leader, delay, lag, start, by_row)
+        return offset + scale * followed(t, leader, delay, lag, start, parts)
 
     def solved(delay: float, lag: float) -> tuple[np.ndarray, float]:
-        x = followed(t, leader, delay, lag, begin, by_row)[rows]
+        x = followed(t, leader, delay, lag, begin, min(parts, 1))[rows]
         return _solved((x, np.ones_like(x)), y)
 
     delay, lag = min(((d, k) for d in delays for k in lags), key=lambda x: solved(*x)[1])

@@ -352,7 +352,7 @@ def test_a_follower_whose_torque_is_unknown_is_late_and_lags(by_row, rate, delay
     np.savetxt(path, columns, "%.9g", ",", header=head, comments="")
     assert hc.studies.log_report(hc.Log.read(path)).commands == (f"hapticclay pair --data {path}",)
     found = hc.studies.identify_pair(hc.studies.PairLog.load(path))
-    # lines between rows, of sines up to 1.5 Hz at 30 rows a second: (0.31)^2/12 = 1 %
+    # lines between rows, of sines up to 1.5 Hz at 30 rows a second; splines of a leader by row
     for name, true in (("delay", delay), ("lag", lag), ("scale", 1.0), ("offset", 0.1)):
         assert found[name].value == pytest.approx(true, abs=1e-3 + 0.01 * true), name
     assert found["explained"].value > 0.99
