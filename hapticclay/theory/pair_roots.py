@@ -146,11 +146,12 @@ class _Pair:
         i, shift = np.flatnonzero(np.abs(log.real) < NEAR), self.N * math.log(r)
         for _ in range(STEPS if len(i) else 0):
             every = self.values(math.log(r) + 1j * theta[i])
-            value = _nearest(every, np.exp(log[i] + shift))
+            with np.errstate(over="ignore", invalid="ignore"):  # far beyond: no root is near
+                value = _nearest(every, np.exp(log[i] + shift))
             turned = log[i].imag + np.angle(value * np.exp(-1j * log[i].imag))
             new = log_size(value) - shift + 1j * turned
             miss = self.N * theta[i] - turned - 2.0 * math.pi * turn[i]
-            move = -miss / (self.N - slope[i].real)
+            move = _bounded(-miss / (self.N - slope[i].real), LONGEST)
             theta[i] += move
             log[i] = new + 1j * slope[i] * move
             if np.abs(move).max() <= SOLVED:

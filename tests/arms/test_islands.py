@@ -78,7 +78,8 @@ SCENES = {
     ),
     "a springy tendon of the hand": model(
         limb(),
-        rest='<tendon><fixed stiffness="5" frictionloss="1"><joint joint="g1" coef="1"/>'
+        actuator='<position tendon="t" kp="3" damping="2" armature=".1"/>',
+        rest='<tendon><fixed name="t" stiffness="5" frictionloss="1"><joint joint="g1" coef="1"/>'
         '<joint joint="g2" coef="-1"/></fixed></tendon>',
     ),
     "fingers closed by a connect": model(

@@ -314,6 +314,31 @@ def test_no_delay_below_the_limit_is_unstable(seed, kind):
         assert build.loop((late, late)).radius() < 1.0 + 1e-9
 
 
+@pytest.mark.parametrize("kind", KINDS[:3])
+def test_slow_motions_at_high_rates_have_the_limit_of_lower_rates(kind):
+    """Motion of 0.4 to 2 Hz turns by 1e-5 to 6e-5 rad in a sample at 200 kHz.
+
+    A hold of 0.1 ms is late by half of it, of limits of 45 ms and more: 2e-3 is twice that.
+    """
+    slow = hc.theory.pair_limits(one(kind=kind, Ts=1e-4, **HELD))
+    fast = hc.theory.pair_limits(one(kind=kind, Ts=5e-6, **HELD))
+    assert fast.delay == pytest.approx(slow.delay, rel=2e-3)
+    assert fast.frequency == pytest.approx(slow.frequency, rel=2e-3)
+
+
+def test_friction_that_feeds_a_slow_motion_is_limited():
+    """A hand's spring and a heavy pair: 6e-5 rad in a sample; the map flips at the share."""
+    law = hc.JointPD((700.0,), (2.0,), friction=[(0.0, 1.0, 0.5)])
+    device = hc.Device(8.0, 0.01)
+    hand = hc.Operator(0.5, 0.3, 0.3)
+    pair = hc.Pair(device, device, law, hc.Link(delay=1e-3), Ts=5e-4, leader_operator=hand)
+    share, build = hc.theory.pair_limits(pair).friction_fraction, Build(pair)
+    for factor, stable in ((0.99, True), (1.01, False)):
+        loop = build.loop(friction=(0.5 * factor * share * np.ones(1),) * 2)
+        assert loop.stable() is stable
+        assert abs(np.angle(loop.eigenvalues[0])) < 1e-4
+
+
 def test_a_window_between_two_whole_samples_is_a_limit():
     """Stable at 0, 1, 2, 3 and 4 samples, unstable from 0.064 to 0.969 of one: by the map."""
     law = hc.JointPD((2.702e6,), (114.05,), runs="drive")
