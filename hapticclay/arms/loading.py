@@ -63,6 +63,13 @@ def load(arm: Any) -> Loaded:
     Raises:
         ParameterError: the file cannot be loaded, or holds no arm of this kind.
     """
+    from ..physics import warnings_caught
+
+    with warnings_caught():  # of locked links without mass; those of the file are notes
+        return _loaded(arm)
+
+
+def _loaded(arm: Any) -> Loaded:
     file = model_file.opened(arm.file)
     grip = handles.handle(file.model, arm.site, _named_joints(file.model, arm.joints))
     joints = _arm_joints(file.model, arm.joints, grip.chain)

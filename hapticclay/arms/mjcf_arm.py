@@ -212,7 +212,7 @@ class MjcfArm:
         if self.site is None:
             names = self._loaded.handles  # type: ignore[attr-defined]
             such = f", such as {', '.join(names)}" * bool(names)
-            bound = f"must name a site or body at the handle{such}: the file leaves it open"
+            bound = f"must name a site or body at the handle (--site NAME){such}"
             raise ParameterError("site", None, bound)
 
     def _place(self, q: Sequence[float] | np.ndarray | None) -> np.ndarray:

@@ -24,7 +24,8 @@ class ComputedTerms:
 
     Attributes:
         handle: place of the handle [m], and where it is tried.
-        failed: Ctrl-C and its like, which compiled code would drop; the terms are NaN then, too.
+        failed: Ctrl-C and its like, which compiled code would drop; the terms are NaN from then
+            on, too.
     """
 
     def __init__(self, scenario: Scenario, places: dict[str, np.ndarray]):
@@ -33,7 +34,8 @@ class ComputedTerms:
         of, n = arm.mechanism, len(arm.names)
         self.chain = Mechanism(copy.copy(of.model), of.dofs, of.site, of.pose)
         self.rows = ["xyz".index(c) for c in arm.axes]
-        self.pose, self.rates = places["pose"][:n], places["pose"][n:]
+        self.pose, self.rates = places["pose"][:n], places["pose"][n : 2 * n]
+        self._calls, self._answers = places["pose"][2 * n :], 0.0
         self.inertia = places["joint_M"].reshape(n, n)
         self.dampers, self.drag = places["joint_D"].reshape(n, n), places["joint_F"]
         self.own_dampers = np.diag(arm.damping)
@@ -57,6 +59,8 @@ class ComputedTerms:
 
     def _try(self, compute: Callable[[], None], *terms: np.ndarray) -> None:
         try:
+            self._answers += 1.0
+            self.note_dropped()
             if not self.failed:
                 compute()
                 return
@@ -66,6 +70,16 @@ class ComputedTerms:
             self.failed.append(error)
         for array in terms:
             array[:] = np.nan
+
+    def note_dropped(self) -> None:
+        """Notes a call that Ctrl-C ended before it could be stored."""
+        if not self.failed and self._answers != self._calls[0]:
+            self.failed.append(KeyboardInterrupt())
+
+    def forgive(self) -> None:
+        """Begins anew after a failure."""
+        self.failed.clear()
+        self._answers = float(self._calls[0])
 
     def _at_pose(self) -> None:
         found = self.chain.at(self.pose)

@@ -242,7 +242,7 @@ class Row:
     @property
     def is_torn(self) -> bool:
         """Whether a step was interrupted within, so that the state is none of the run."""
-        errors = [*self.failed, *self.mover.failed]
+        errors = [*self.failed, *self.mover.failures()]
         errors += [] if self.caller is None else [self.caller.error]
         return self._is_amid or any(x and not isinstance(x, Exception) for x in errors)
 
@@ -253,7 +253,7 @@ class Row:
 
     def check(self) -> None:
         """Raises what functions of the user raised, and Ctrl-C that came within one of Python."""
-        for error in (*self.failed, *self.mover.failed):
+        for error in (*self.failed, *self.mover.failures()):
             raise error
         if self.caller is not None:
             self.caller.check()
@@ -289,7 +289,7 @@ class Row:
         for x, before in zip(self.written, saved.arrays, strict=True):
             x[:] = before
         self.failed.clear()
-        self.mover.failed.clear()
+        self.mover.forgive()
         if self.caller is not None:
             self.caller.error = None
         self._is_amid = False

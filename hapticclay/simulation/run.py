@@ -796,6 +796,13 @@ def check_same_run(run: Run, x: Snapshot) -> None:
     for name, now in run.kind.items():
         if x.kept[name] != now:
             raise ParameterError("snapshot", x, f"{OTHER}: {name} is {x.kept[name]!r}, not {now!r}")
+    sizes = _sizes(run.row.saved())
+    if any(_sizes(y) != sizes for y in (x.saved, x.before)) or len(x.rows) >= CHUNK:
+        raise ParameterError("snapshot", x, "must be as it was taken, by this release")
+
+
+def _sizes(saved: Saved) -> list[int]:
+    return [len(x) for x in (saved.state, *saved.arrays)]
 
 
 def _note_stop(stops: list[Stop], axis: str, begins: bool, t: float) -> None:

@@ -15,7 +15,10 @@ ROUNDS, FINEST = 40, 1e-13  # of halving intervals of angles; their least width
 
 
 def followed(
-    values: Callable[[np.ndarray], np.ndarray], theta: np.ndarray, scale: float = 0.0
+    values: Callable[[np.ndarray], np.ndarray],
+    theta: np.ndarray,
+    scale: float = 0.0,
+    noise: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Angles, with more where an eigenvalue turns, and branches there, shape (m, k).
 
@@ -24,13 +27,15 @@ def followed(
         theta: angles to begin with [rad], ascending, shape (m,).
         scale: logarithm of the size that matters: smaller eigenvalues are followed loosely, and
             tops and hollows of sizes are resolved that may reach it.
+        noise: rounding of that logarithm, times the square of the angle: what is less is no top.
     """
     found = values(theta)
     for _ in range(ROUNDS):
         found = branches(found)
         size = log_size(found) - scale
         gap = np.diff(theta)
-        i = np.flatnonzero((_turns(found, size) | _reaches(size)).any(axis=1) & (gap > FINEST))
+        clear = np.where(np.abs(size) * theta[:, None] ** 2 >= noise, size, np.nan)
+        i = np.flatnonzero((_turns(found, size) | _reaches(clear)).any(axis=1) & (gap > FINEST))
         if not len(i):
             break
         middle = theta[i] + 0.5 * gap[i]

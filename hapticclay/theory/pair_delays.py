@@ -23,8 +23,8 @@ from .joint_loop import MOST_STATES, ROUNDING, near_resonances
 from .pair_loop import PairLoop
 from .rest import FREE, NO_DRAG
 
-SLOWEST = 1e-7  # [rad] least angle of the search
-NOISE = 1e-14  # of the logarithm of a size, times the angle
+SLOWEST = 1e-6  # [rad] least angle of the search
+NOISE = 1e-16  # of the logarithm of a size, times the square of the angle
 TURN = 1e-6  # of an angle: of differences
 EVEN, BY_FACTORS = 300, 300  # angles of the search
 REAL = 1e-9  # imaginary part over size of an eigenvalue that counts as real
@@ -81,10 +81,10 @@ class Delays:
     @cached_property
     def _crossings(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles at which an eigenvalue of H has size 1, its argument, and how its size moves."""
-        theta, values = pair_branches.followed(self._values, self.angles)
+        theta, values = pair_branches.followed(self._values, self.angles, noise=NOISE)
         size = joint_crossings.log_size(values)
-        # near rest H is 1 but for a square of the angle, and rounding, which grows as 1/angle
-        unclear = np.abs(size) < NOISE / theta[:, None]
+        # near rest H is 1 but for the square of the angle, and rounding, which grows as its inverse
+        unclear = np.abs(size) * theta[:, None] ** 2 < NOISE
         side = np.where(unclear, 0.0, np.sign(size))
         for i in range(len(side) - 2, -1, -1):
             side[i] = np.where(side[i] == 0.0, side[i + 1], side[i])

@@ -182,6 +182,29 @@ def test_ctrl_c_itself_waits_for_the_end_of_a_step(engine):
         same(to_end(sim, 208).record(), want, k)
 
 
+@native  # Python itself says what it drops
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_ctrl_c_within_the_terms_of_a_chain_is_not_dropped():
+    """Python computes them for compiled steps, which would go on with those of the step before."""
+    arm = hc.MjcfArm("five_bar")
+    law = hc.JointPD((2.0, 2.0), (0.02, 0.02))
+    scene = hc.Scenario(arm=arm, controller=law, Ts=1e-3, dt=1e-3, t_max=0.1, force=(0.2, 0.1))
+    sim = hc.Simulation(scene)
+    sim.advance(20)
+    start = sim.snapshot()
+    sim.advance(3)
+    want, told = sim.numbers(), 0
+    for k in places(lambda: (sim.restore(start), sim.advance(3))):
+        sim.restore(start)
+        interrupted(lambda: sim.advance(3), k)
+        try:
+            assert to_end(sim, 23).numbers() == want, k
+        except RuntimeError as error:
+            assert "reset it, or restore a snapshot" in str(error)
+            told += 1
+    assert told
+
+
 # ---- batches -------------------------------------------------------------------------------------
 
 HEAVY = dataclasses.replace(
