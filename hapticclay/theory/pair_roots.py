@@ -22,6 +22,7 @@ from .pair_branches import followed, log_size
 from .pair_loop import PairLoop
 
 BESIDE = 1e-9  # of a radius: by so much the circle of a count is larger than an eigenvalue
+RIM = 1e-6  # the same of the circle around rest, near which rounding grows as 1/distance^2
 BESIDE_POLE = 2.0**-50  # of it
 EVEN, BY_FACTORS = 300, 150  # angles to begin with
 LEAST = 1e-10  # [rad] smallest of them
@@ -40,7 +41,7 @@ INWARD = 0.8  # where between a radius and 1 the next circle of a stable pair li
 def largest(loop: PairLoop, samples: float) -> complex:
     """The largest eigenvalue at a number of samples there and back, but for those of rest."""
     pair = _Pair(loop, samples)
-    low, high, best = 0.0, 1.0 + BESIDE, 0j
+    low, high, best = 0.0, 1.0 + pair.rim, 0j
     matches, count = pair.matches(high)
     best = pair.roots(high, matches)
     while count > 0 and high < LARGEST:
@@ -65,9 +66,10 @@ def largest(loop: PairLoop, samples: float) -> complex:
     return best
 
 
-def beyond(loop: PairLoop, samples: float, r: float = 1.0 + BESIDE) -> int:
-    """Number of eigenvalues beyond a circle of radius r, which passes through none."""
-    return _Pair(loop, samples).matches(r)[1]
+def beyond(loop: PairLoop, samples: float, r: float | None = None) -> int:
+    """Number of eigenvalues beyond a circle that passes through none: of radius r, or around 1."""
+    pair = _Pair(loop, samples)
+    return pair.matches(r or 1.0 + pair.rim)[1]
 
 
 class _Match(NamedTuple):
@@ -93,6 +95,11 @@ class _Pair:
         self.loop, self.N = loop, samples
         self.poles = loop.open_poles()
         self._singular: dict[complex, bool] = {}
+
+    @property
+    def rim(self) -> float:
+        """Distance from 1 at which rounding does not hide eigenvalues of rest, where there are."""
+        return RIM if self.loop.structural else BESIDE
 
     def values(self, log: np.ndarray) -> np.ndarray:
         """Eigenvalues of H at z = exp(log), shape (m, k)."""
@@ -173,7 +180,7 @@ class _Pair:
         """Whether a root is none of rest: near 1, by a count on both sides of it."""
         if abs(z - 1.0) > CLOSE:
             return True
-        if abs(abs(z) - 1.0) <= 2.0 * BESIDE:
+        if abs(abs(z) - 1.0) <= 2.0 * self.rim:
             return False
         sides = [self.matches((1.0 + x) * abs(z))[1] for x in (-BESIDE, BESIDE)]
         return sides[0] > sides[1]

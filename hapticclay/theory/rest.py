@@ -50,6 +50,16 @@ class Rest:
         L, R = self._vectors
         return L.T @ self._slope() @ R
 
+    def resistance(self, pushed: slice, moved: slice) -> np.ndarray:
+        """Push per sample's step of steady motion, whatever the basis of L and R.
+
+        Args:
+            pushed: equations in which the push stands.
+            moved: unknowns that move.
+        """
+        L, R = self._vectors
+        return np.linalg.solve(L[pushed].T @ R[moved], self.drag)
+
     @cached_property
     def free(self) -> int:
         """Directions of rest in which nothing resists steady motion: eigenvalues 1 once more."""
