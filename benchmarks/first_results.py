@@ -83,7 +83,8 @@ SCENES = {
     "Z-width of a wall": "wall = hc.VirtualWall(device=hc.Device(mass=0.1, damper=0.5))\n"
     "zwidth(wall, quick=True)",
     "`hapticclay run constant`": ("run", "constant"),
-    "`hapticclay identify --quick`": ("identify", "--quick", "--axis", "x"),
+    "identification of a block": "hc.studies.identify('x', 'G', periods=1, lines=20, period=2.5,"
+    " band=(0.3, 20.0))",
     "`hapticclay video constant`":
     ("video", "constant", "--out", "film.gif", "--size", "320", "160"),
     "limits of an arm from a file": f"{ARM}\nprint(hc.theory.joint_limits(arm, law, 1e-3, 1e-3))",

@@ -994,8 +994,11 @@ def ask_ledger(place: Place) -> Answer:
 
 def ask_identify_command(place: Place) -> Answer:
     """`hapticclay identify`: the table and identify.json."""
-    words = "identify --quick --axis x --noise --seed 2 --out identified"
-    said = command(place, words.split())
+    from hapticclay.cli.identify import IdentifyCommand
+
+    words = "--quick --axis x --noise --seed 2 --out identified"
+    named = ["--simulated"] * hasattr(IdentifyCommand, "simulated")  # from 0.4 on
+    said = command(place, ["identify", *named, *words.split()])
     found = read(place.work / "identified" / "identify.json")
     names = ("coefficients", "frequency", "real", "imaginary", "deviation", "coherence", "noise")
     return {

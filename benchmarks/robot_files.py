@@ -29,7 +29,7 @@ from hapticclay.results import json_ready
 from hapticclay.theory.joint_gains import Study, first_joint
 
 from . import common
-from .peers.held_arm import HeldArm, urdf_inertia
+from .peers.held_arm import FEWEST, HeldArm, urdf_inertia
 from .recordings import had
 
 LIST = Path(__file__).with_suffix(".tsv")
@@ -40,6 +40,7 @@ FREQUENCY, RATIO = 5.0, 0.7  # [Hz] and damping ratio of each joint alone under 
 BESIDE = 0.005  # share of the common limit, to either side
 ROUNDING = 1e-12  # relative, of M
 MOST_NAMES = 4  # in a cell
+MOST_STEPS = 1000  # of MuJoCo in a sample
 
 
 class RobotFile(NamedTuple):
@@ -121,15 +122,15 @@ def compared(file: Path, arm: hc.MjcfArm, law: hc.JointPD, scale: float) -> dict
     try:
         plain = HeldArm(file, arm)
     except ValueError as error:
-        other = urdf_inertia(file, arm)
+        stated = not any(x.startswith("no inertia in the file") for x in arm.notes)
+        other = urdf_inertia(file, arm) if stated else None
         found = {"oracle": "" if other is None else "Pinocchio", "without": str(error)}
         return found if other is None else {**found, "inertia": _off(arm, other)}
-    radii = [plain.radius(law, f * scale, TS) for f in (1.0 - BESIDE, 1.0 + BESIDE)]
-    return {
-        "oracle": "MuJoCo",
-        "inertia": _off(arm, plain.inertia(arm.q)),
-        "radii": radii if math.isfinite(scale) else [],
-    }
+    found = {"oracle": "MuJoCo", "inertia": _off(arm, plain.inertia(arm.q)), "radii": []}
+    if math.isfinite(scale) and plain.steps_of(TS) <= MOST_STEPS:
+        sides = 1.0 - BESIDE, 1.0 + BESIDE
+        found["radii"] = [plain.radius(law, f * scale, TS) for f in sides]
+    return found
 
 
 def _off(arm: hc.MjcfArm, other: np.ndarray) -> float:
@@ -148,7 +149,9 @@ def _send(pipe: Any, file: Path, handle: str) -> None:
 
 def alone(file: Path, handle: str, patience: float = PATIENCE) -> dict[str, Any]:
     """`judged` in a process that may crash or take too long."""
-    context = multiprocessing.get_context("spawn")
+    kinds = multiprocessing.get_all_start_methods()
+    context = multiprocessing.get_context("forkserver" if "forkserver" in kinds else "spawn")
+    context.set_forkserver_preload([__spec__.name])  # imported once for all
     here, there = context.Pipe(duplex=False)
     process = context.Process(target=_send, args=(there, file, handle))
     process.start()
@@ -213,6 +216,7 @@ def page(rows: list[dict[str, Any]], missing: int) -> str:
     """The Markdown page."""
     answered = [r for r in rows if "joints" in r]
     named = [r for r in answered if r["result"] != "answered"]
+    xacro = [r for r in rows if "xacro" in r.get("why", "")]
     exact = [r for r in answered if "inertia" in r]
     held = [r for r in answered if r.get("radii")]
     text = [
@@ -224,7 +228,8 @@ def page(rows: list[dict[str, Any]], missing: int) -> str:
         f"{len(rows)} files of {len({r['repository'] for r in rows})} repositories: "
         f"{len(answered)} are answered ({100.0 * len(answered) / len(rows):.0f} %), {len(named)} "
         "of them once the handle is named, since they hold several arms or tools. The others are "
-        "refused in the line that the table shows.",
+        f"refused in the line that the table shows; {len(xacro)} of them are xacro, a program that "
+        f"makes a URDF ({100.0 * len(answered) / max(1, len(rows) - len(xacro)):.0f} % without).",
         f"Of {len(exact)} there is another M(q), MuJoCo's own of the file as it is, or where "
         "MuJoCo does not load the file, Pinocchio's: "
         f"{sum(r['inertia'] < ROUNDING for r in exact)} agree within {ROUNDING:g} of the largest "
@@ -238,7 +243,7 @@ def page(rows: list[dict[str, Any]], missing: int) -> str:
         f"Gains: {FREQUENCY:g} Hz and a damping ratio of {RATIO:g} for each joint if the others "
         f"are free, at 1 kHz, torques a sample late, rates exact. Limit: the map of a sample is "
         "measured with MuJoCo's M(q), bias and passive forces under held torques, by RK4 in steps "
-        f"of Ts/{HeldArm.steps} and central differences; its radius must be below 1 at "
+        f"of Ts/{FEWEST} or less and central differences; its radius must be below 1 at "
         f"{100.0 * (1.0 - BESIDE):g} % and above at {100.0 * (1.0 + BESIDE):g} %.",
         "## Data and machine",
         "All numbers, names and notes: [robot_files.json](robot_files.json).",

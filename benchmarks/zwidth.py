@@ -46,7 +46,7 @@ def measure(case: Case, quick: bool) -> list[dict[str, Any]]:
     about, vary, wall, values = case
     if quick:
         values = values[:: len(values) - 1] if vary != "filter" else (None, 30.0, 3.0)
-    found = hc.walls.zwidth(wall, vary, values, quick=quick)
+    found = hc.walls.zwidth(wall, vary, values, quick=quick, press=hc.walls.Press(still=1e-6))
     return [
         {
             "about": about,

@@ -9,6 +9,7 @@
 All quantities are SI; axes are ordered (x, y); force signs are fixed in docs/equations.md.
 """
 
+import os
 from importlib.metadata import PackageNotFoundError, version
 
 from .doors import attach
@@ -21,3 +22,11 @@ try:
     __version__ = version("hapticclay")
 except PackageNotFoundError:  # a checkout that was never installed
     __version__ = "unknown"
+
+_here = os.path.dirname(os.path.abspath(__file__))
+if os.path.isfile(os.path.join(os.path.dirname(_here), "setup.py")) and not os.path.isfile(
+    os.path.join(_here, "native", "built.py")
+):  # a clone that was never built, which a program in its folder gets before what is installed
+    from .simulation.engines import give_notice
+
+    give_notice("not built")

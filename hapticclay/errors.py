@@ -11,7 +11,7 @@ import os
 import reprlib
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from .display import names_words, one_line
 from .units import from_unit, is_quantity
@@ -308,9 +308,17 @@ def choice(field: str, value: object, valid: Sequence[str], wants: str = "") -> 
     raise ParameterError(field, value, f"must be {wants}{hint}")
 
 
+if TYPE_CHECKING:  # a caller may write 0.002 or "2 ms", which is checked when it arrives
+    Real: TypeAlias = float | Any
+else:
+    Real = float  # what arrives
+
+
 @dataclass(frozen=True)
 class Bound:
     """Bounds and unit of a number, or of each number in a tuple: `Annotated[float, Bound(...)]`.
+
+    With a unit it is `Annotated[Real, Bound(...)]`, which type checkers let be a text.
 
     Attributes:
         low: smallest value, or the name of the field that holds it.

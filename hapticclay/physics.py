@@ -57,10 +57,16 @@ class warnings_caught:
 
 def _at_work(told: Any) -> Any:
     """What the engine tells of warnings, without collectors that have ended."""
+    newest = told = _first_at_work(told)
+    while type(told) is warnings_caught:
+        before = told.before = _first_at_work(told.before)
+        told = before
+    return newest
+
+
+def _first_at_work(told: Any) -> Any:
     while type(told) is warnings_caught and told.over:
         told = told.before
-    if type(told) is warnings_caught:
-        told.before = _at_work(told.before)
     return told
 
 

@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from hypothesis import Phase, settings
+from hypothesis import HealthCheck, Phase, settings
 
 os.environ.setdefault("MPLBACKEND", "agg")
 # before NumPy: workers share the cores, and oracles, which are no questions, have small matrices
@@ -44,6 +44,7 @@ for name, handler in (("SIGINT", signal.default_int_handler), ("SIGHUP", signal.
 settings.register_profile(
     "default",
     deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
     derandomize=not HUNTS,
     max_examples=MORE * EXAMPLES,
     phases=[x for x in Phase if x is not Phase.explain],  # which takes minutes where runs are tried

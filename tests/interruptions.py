@@ -5,6 +5,7 @@ them. A second interruption comes at one of the next calls or returns, by a prof
 """
 
 import contextlib
+import signal
 import sys
 from pathlib import Path
 
@@ -35,23 +36,26 @@ def lines_of(call):
     return count
 
 
-def interrupted(call, k, again=None):
+def interrupted(call, k, again=None, by_signal=False):
     """Makes a call, ended by Ctrl-C before its k-th line; returns whether it was.
 
     Args:
         call: without arguments.
         k: number of the line, from 1.
         again: after how many calls and returns a second Ctrl-C comes; None for none.
+        by_signal: whether the signal comes there, which handlers may put off, or its exception.
     """
     left, more = k, again
 
     def local(frame, event, _):
         nonlocal left
         left -= event == "line"
-        if left == 0:
+        if left == 0 and event == "line":
             if again is not None:
                 sys.setprofile(profile)
-            raise KeyboardInterrupt
+            if not by_signal:
+                raise KeyboardInterrupt
+            signal.raise_signal(signal.SIGINT)
         return local
 
     def profile(frame, event, _):
@@ -72,3 +76,20 @@ def interrupted(call, k, again=None):
     finally:
         sys.setprofile(None)
         sys.settrace(before)
+
+
+@contextlib.contextmanager
+def signals_within(file):
+    """Lets Ctrl-C raise KeyboardInterrupt within the functions of a file of the package alone."""
+
+    def raise_within(number, frame):
+        while frame is not None and not frame.f_code.co_filename.endswith(file):
+            frame = frame.f_back
+        if frame is not None:
+            raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, raise_within)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

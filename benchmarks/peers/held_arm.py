@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from hapticclay.physics import warnings_caught
+
 HOME = "home"
+FEWEST = 8  # steps of RK4 in a sample ...
+STIFFEST = 0.5  # ... and the largest product of a step and a rate of decay by joint damping
 SIZES = 1e-6, 1e-4, 1e-4  # differences of positions [rad], rates [rad/s], torques per inertia
 
 
@@ -23,14 +28,14 @@ class HeldArm:
         ValueError: MuJoCo does not load it, or other joints follow those of the arm.
     """
 
-    steps = 8  # of RK4 in a sample
-
     def __init__(self, file: Path, arm: Any):
         if arm.mechanism.following:
             raise ValueError("joints that follow")
-        spec = mujoco.MjSpec.from_file(str(file))
-        spec.compiler.fusestatic = False  # fused, a link without mass loses its inertia
-        self.model = spec.compile()
+        with warnings_caught(), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            spec = mujoco.MjSpec.from_file(str(file))
+            spec.compiler.fusestatic = False  # fused, a link without mass loses its inertia
+            self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         keys = [self.model.key(i).name for i in range(self.model.nkey)]
         if HOME in keys:
@@ -43,7 +48,10 @@ class HeldArm:
             raise ValueError(f"no joint of the name {missing[0]}")
         self.places = self.model.jnt_qposadr[[joints[x] for x in arm.names]]
         self.dofs = self.model.jnt_dofadr[[joints[x] for x in arm.names]]
+        self.steps = FEWEST
         self.home = arm.q
+        if Path(file).suffix == ".urdf":  # MuJoCo reads no rotors of transmissions
+            self.model.dof_armature[self.dofs] = arm.armature
 
     def inertia(self, q: np.ndarray) -> np.ndarray:
         """M(q) of the joints, shape (n, n)."""
@@ -70,6 +78,12 @@ class HeldArm:
         force = torque + (self.data.qfrc_passive - self.data.qfrc_bias)[self.dofs]
         return np.array([qd, np.linalg.solve(inertia, force)])
 
+    def steps_of(self, Ts: float) -> int:
+        """Steps of RK4 in a sample."""
+        damping = np.diag(self.model.dof_damping[self.dofs].reshape(len(self.dofs), -1)[:, 0])
+        rates = np.abs(np.linalg.eigvals(np.linalg.solve(self.inertia(self.home), damping)))
+        return max(FEWEST, int(np.ceil(rates.max() * Ts / STIFFEST)))
+
     def sample(self, state: np.ndarray, torque: np.ndarray, Ts: float) -> np.ndarray:
         """Positions and rates, shape (2, n), after a sample under held torques."""
         h = Ts / self.steps
@@ -83,7 +97,7 @@ class HeldArm:
 
     def radius(self, law: Any, scale: float, Ts: float) -> float:
         """Spectral radius of a sample about the pose: torques a sample late, all Kp times scale."""
-        n = len(self.home)
+        n, self.steps = len(self.home), self.steps_of(Ts)
         Kp, Kd = scale * np.array(law.Kp), np.array(law.Kd)
         M = self.inertia(self.home)
         sizes = np.array([SIZES[0]] * n + [SIZES[1]] * n + [*(SIZES[2] * np.diag(M) / Ts)])
@@ -108,7 +122,10 @@ def urdf_inertia(file: Path, arm: Any) -> np.ndarray | None:
         import pinocchio as pin  # type: ignore[import-not-found]
     except ImportError:
         return None
-    model = pin.buildModelFromXML(text)
+    try:
+        model = pin.buildModelFromXML(text)
+    except ValueError:  # a link that is not declared
+        return None
     data, q = model.createData(), pin.neutral(model)
     for name, value in arm.pose.items():
         if model.existJointName(name):

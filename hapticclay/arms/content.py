@@ -6,7 +6,8 @@ writes; what it says is noted or refused is noted or refused here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,7 +65,10 @@ CONTENT = (
     Content("body", "plugin flexcomp", NOTED, "elastic parts take no part"),
     Content("body", "name", USED, "the handle may be a body: `site`"),
     Content("body", "mocap sleep simple fuse user camera light", IGNORED, "nothing of mechanics"),
-    Content("joint", "type", USED, "hinge or slide"),
+    Content(
+        "joint", "type", USED,
+        "hinge or slide. A free joint is held where it is, a ball that is not of the arm is locked",
+    ),
     Content("joint", "name", USED, "without one: joint 1, joint 2, ... in the order of the file"),
     Content("joint", "pos axis ref class", USED, "as MuJoCo compiles them"),
     Content(
@@ -93,7 +97,7 @@ CONTENT = (
     Content("joint", "actuatorgravcomp group user", IGNORED, "the sum of torques is the same"),
     Content("tendon", "springlength stiffness damping armature", USED, "as those of joints"),
     Content("tendon", "springyield", NOTED, "the spring stays elastic"),
-    Content("tendon", "frictionloss", REFUSED, "give the friction of joints"),
+    Content("tendon", "frictionloss", REFUSED, "of the arm's joints: give their friction"),
     Content("tendon", "limited range", NOTED, "a tendon's limits take no part"),
     Content("tendon", "site geom pulley joint class name", USED, "as MuJoCo compiles them"),
     Content(
@@ -140,6 +144,55 @@ CONTENT = (
 
 
 # ---- sentences -----------------------------------------------------------------------------------
+
+
+LARGEST = {  # arrays of a model, and the largest size of their numbers, far beyond any arm
+    "opt.gravity": 1e6,  # [m/s^2]
+    "opt.wind": 1e6,  # [m/s]
+    "opt.density": 1e6,  # [kg/m^3]
+    "opt.viscosity": 1e6,  # [Pa.s]
+    "body_mass": 1e9,  # [kg]
+    "body_inertia": 1e12,  # [kg.m^2]
+    "body_pos": 1e6,  # [m]
+    "body_ipos": 1e6,
+    "body_gravcomp": 1e3,
+    "jnt_pos": 1e6,
+    "jnt_axis": 2.0,
+    "jnt_stiffness": 1e12,  # [N.m/rad, N/m]
+    "jnt_stiffnesspoly": 1e12,
+    "qpos0": 1e6,  # [rad, m]
+    "qpos_spring": 1e6,
+    "key_qpos": 1e6,
+    "site_pos": 1e6,
+    "dof_armature": 1e9,  # [kg.m^2, kg]
+    "dof_damping": 1e12,  # [N.m.s/rad, N.s/m]
+    "dof_dampingpoly": 1e12,
+    "dof_frictionloss": 1e12,  # [N.m, N]
+    "tendon_stiffness": 1e12,
+    "tendon_stiffnesspoly": 1e12,
+    "tendon_damping": 1e12,
+    "tendon_dampingpoly": 1e12,
+    "tendon_armature": 1e9,
+    "actuator_gear": 1e9,
+    "actuator_armature": 1e9,
+    "actuator_damping": 1e12,
+    "actuator_dampingpoly": 1e12,
+    "eq_data": 1e9,
+}
+
+
+def check_numbers(model: Any, error: Callable[[str], ParameterError]) -> None:
+    """Refuses numbers that are not finite, or so large that sums of them are not.
+
+    Raises:
+        ParameterError: as `error` makes it of the reason.
+    """
+    for name, most in LARGEST.items():
+        values = np.abs(np.ravel(attrgetter(name)(model)))
+        if not (values <= most).all():
+            worst = float(values[np.argmax(~(values <= most))])
+            why = "is not finite" if not np.isfinite(worst) else f"must be at most {most:g}"
+            raise error(f"{name.removeprefix('opt.')} {why}: {worst:g}")
 
 
 def refuse(model: Any) -> None:

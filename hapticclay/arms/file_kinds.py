@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import re
 from pathlib import Path
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
@@ -10,8 +12,10 @@ from ..errors import ParameterError
 from ..files import MOST_SETTINGS, read_bytes
 
 DEEPEST = 300  # elements in one another
+PART = "mujocoinclude"
+MOST_TRIED = 200  # files in which a part's name is looked for
 ROOTS = {
-    "mujocoinclude": "is a part of a model (mujocoinclude): give the file that includes it",
+    PART: "is a part of a model (mujocoinclude): give the file that includes it",
     "sdf": "is SDF: MJCF and URDF are read",
     "world": "is a world: MJCF and URDF are read",
 }
@@ -43,8 +47,22 @@ def is_urdf(path: Path) -> bool:
     tag = _first_tag(path)
     if tag not in ("robot", "mujoco"):
         other = f"is XML of another kind (<{tag}>): MJCF (<mujoco>) and URDF (<robot>) are read"
-        raise ParameterError("file", str(path), ROOTS.get(tag, other))
+        of = f", such as {whole}" if tag == PART and (whole := _includer(path)) else ""
+        raise ParameterError("file", str(path), ROOTS.get(tag, other) + of)
     return tag == "robot"
+
+
+def _includer(path: Path) -> str:
+    """A model beside a part, or a folder above, that includes it; "" if none is found."""
+    named = re.compile(
+        rb"""<include\s+file\s*=\s*["'](?:[^"']*/)?%s["']""" % re.escape(path.name.encode())
+    )
+    for folder in (path.parent, path.absolute().parent.parent):
+        for other in sorted(folder.glob("*.xml"))[:MOST_TRIED]:
+            with contextlib.suppress(ParameterError):  # of a file that cannot be read, or is no XML
+                if named.search(content(other)) and _first_tag(other) == "mujoco":
+                    return other.name if folder == path.parent else str(other)
+    return ""
 
 
 def xacro_words(path: Path) -> str:

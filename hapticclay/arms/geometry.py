@@ -113,6 +113,8 @@ def _found(file: str, folder: str, spec: Any, path: Path | None) -> Path | None:
     """A file that a spec names, in its folder of such files or elsewhere."""
     start = Path(spec.modelfiledir or (path.parent if path else "."))
     name = os.path.basename(file) if spec.strippath else file
+    if spec.assets and {name, file, os.path.join(folder or "", name)} & spec.assets.keys():
+        return Path(file)  # in memory
     return place_of(name, path or start / "model.xml", start / (folder or ""), start)
 
 

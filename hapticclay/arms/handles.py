@@ -48,6 +48,13 @@ def handle(model: Any, wanted: Any, joints: Sequence[int] | None) -> Handle:
     return _unnamed(model, sites)
 
 
+def _names_at(model: Any, tip: int, sites: list[int]) -> list[str]:
+    """Sites at the end of a limb, or the body there."""
+    chain = limbs.joints_to_root(model, tip)
+    names = [model.site(i).name for i in sites if _chain(model, i) == chain]
+    return [x for x in names if x] or [model.body(tip).name or f"body {tip}"]
+
+
 def _shared(model: Any, body: int) -> Iterator[str]:
     """A sentence on joints before a handle that carry other limbs, as a torso's."""
     chain, shared, inner = limbs.joints_to_root(model, body), list[int](), body
@@ -114,11 +121,8 @@ def _unnamed(model: Any, sites: list[int]) -> Handle:
     except limbs.Several as several:
         if loop := islands.loop_on_base(model):
             return Handle(None, loop, names)
-        shown = [names_words(names)] * bool(names) + [f"bodies such as {names_words(several.tips)}"]
-        bound = (
-            "must be named (--site NAME), since the file has several limbs: there are "
-            f"{' and '.join(shown)}"
-        )
+        ends = names_words([x for tip in several.tips for x in _names_at(model, tip, sites)])
+        bound = f"must be named (--site NAME), since the file has several limbs, such as {ends}"
         raise ParameterError("site", None, bound) from None
     if limb is None:
         return Handle(None, [], names)

@@ -162,10 +162,7 @@ def _island(acting: Sequence[Tie], joints: Iterable[int]) -> set[int]:
 
 def _actuated(model: Any) -> list[int]:
     """Joints that actuators drive, in the order of the actuators."""
-    from ..physics import mujoco
-
-    at = int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
-    first = [i for i in range(model.nactuator) if model.actuator_trntype[i] in at]
+    first = [i for i in range(model.nactuator) if model.actuator_trntype[i] in _at_joints()]
     return _unique(int(model.actuator_trnid[i, 0]) for i in first)
 
 
@@ -221,15 +218,42 @@ def release(model: Any, joints: Sequence[int]) -> Iterator[str]:
             model.eq_active0[tie.number] = 0
         if tie.target and tie.joints & own:
             yield f"a constraint to {tie.target}, which is moved by hand (mocap), takes no part"
-    for tendon in range(model.ntendon):
-        if not tendon_joints(model, tendon) & own:
-            for name in ("stiffness", "damping", "frictionloss", "armature"):
-                getattr(model, f"tendon_{name}")[tendon] = 0.0
-
+    _still(model, own)
     moved = _moved_bodies(model, own)
     still = [i for i in range(model.nbody) if i not in moved]
     if moved:  # weight that moves nothing is not compensated differently
         model.body_gravcomp[still] = model.body_gravcomp[moved[-1]]
+
+
+def _still(model: Any, own: set[int]) -> None:
+    """Takes what is passive off tendons and joints that are locked, and their actuators."""
+    from ..physics import mujoco
+
+    tendons = [i for i in range(model.ntendon) if not tendon_joints(model, i) & own]
+    joints = [j for j in range(model.njnt) if j not in own]
+    for name in (
+        "stiffness",
+        "stiffnesspoly",
+        "damping",
+        "dampingpoly",
+        "armature",
+        "frictionloss",
+    ):
+        getattr(model, f"tendon_{name}")[tendons] = 0.0
+    model.jnt_stiffnesspoly[joints] = model.dof_dampingpoly[joints] = 0.0
+    of = {int(mujoco.mjtTrn.mjTRN_TENDON): tendons}
+    of |= dict.fromkeys(_at_joints(), joints)
+    for i in range(model.nactuator):
+        if int(model.actuator_trnid[i, 0]) in of.get(int(model.actuator_trntype[i]), ()):
+            for name in ("damping", "dampingpoly", "armature"):
+                getattr(model, f"actuator_{name}")[i] = 0.0
+
+
+def _at_joints() -> tuple[int, int]:
+    """MuJoCo's numbers of actuators that drive a joint."""
+    from ..physics import mujoco
+
+    return int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 
 
 def _moved_bodies(model: Any, joints: set[int]) -> list[int]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from ..arguments import checked, part
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from . import gain_files
 from .mjcf_arm import MjcfArm
 
@@ -43,17 +43,17 @@ class JointPD:
         velocity_range: that converter spans -range to range [rad/s], > 0.
     """
 
-    Kp: Annotated[tuple[float, ...], Bound(0.0, MOST_GAIN, "N.m/rad")]
-    Kd: Annotated[tuple[float, ...], Bound(0.0, MOST_GAIN, "N.m.s/rad")]
+    Kp: Annotated[tuple[Real, ...], Bound(0.0, MOST_GAIN, "N.m/rad")]
+    Kd: Annotated[tuple[Real, ...], Bound(0.0, MOST_GAIN, "N.m.s/rad")]
     velocity: Literal["exact", "difference", "filter"] = "exact"
-    cutoff: Annotated[float | None, Bound(0.0, 1e6, "rad/s", above=True)] = None
+    cutoff: Annotated[Real | None, Bound(0.0, 1e6, "rad/s", above=True)] = None
     runs: Literal["host", "drive"] = "host"
-    drive_rate: Annotated[float | None, Bound(10.0, 1e6, "Hz")] = None
+    drive_rate: Annotated[Real | None, Bound(10.0, 1e6, "Hz")] = None
     friction: Annotated[tuple[tuple[float, ...], ...] | None, Bound(0.0, 1e6)] = None
     gravity: bool | None = None
-    reference: Annotated[tuple[float, ...] | None, Bound(-1e3, 1e3, "rad")] = None
+    reference: Annotated[tuple[Real, ...] | None, Bound(-1e3, 1e3, "rad")] = None
     velocity_bits: Annotated[int | None, Bound(2, 32)] = None
-    velocity_range: Annotated[float | None, Bound(0.0, 1e6, "rad/s", above=True)] = None
+    velocity_range: Annotated[Real | None, Bound(0.0, 1e6, "rad/s", above=True)] = None
 
     def __post_init__(self):
         n = len(self.Kp)

@@ -10,10 +10,10 @@ class Several(Exception):
     """A file has several limbs, none of which is the arm.
 
     Args:
-        tips: names of the bodies at their ends.
+        tips: bodies at their ends.
     """
 
-    def __init__(self, tips: list[str]):
+    def __init__(self, tips: list[int]):
         super().__init__(tips)
         self.tips = tips
 
@@ -44,7 +44,8 @@ def bodies_to_root(model: Any, body: int) -> Iterator[int]:
         body = int(model.body_parentid[body])
 
 
-def _free_joint() -> int:
+def free_joint() -> int:
+    """MuJoCo's number of a free joint."""
     from ..physics import mujoco
 
     return int(mujoco.mjtJoint.mjJNT_FREE)
@@ -60,7 +61,7 @@ def is_scalar(model: Any, joint: int) -> bool:
 
 def joints_to_root(model: Any, body: int) -> list[int]:
     """Joints between a body and the nearest free body or the world, from the base on."""
-    out, free = list[int](), _free_joint()
+    out, free = list[int](), free_joint()
     for place in bodies_to_root(model, body):
         first, count = int(model.body_jntadr[place]), int(model.body_jntnum[place])
         if count and model.jnt_type[first] == free:
@@ -113,7 +114,7 @@ def arm_limb(model: Any) -> Limb | None:
         first = max(limbs, key=lambda limb: limb.depth)
         rivals = [limb for limb in limbs if 2 * limb.depth > first.depth]
         if len(rivals) > 1:
-            raise Several([_name(model, tip) for limb in rivals for tip in _tips(limb)])
+            raise Several([tip for limb in rivals for tip in _tips(limb)])
         joints += first.joints
         if not first.branches or max(limb.depth for limb in first.branches) <= len(joints):
             return Limb(joints, first.tip, first.branches)
@@ -128,10 +129,6 @@ def _tips(limb: Limb) -> list[int]:
     return [tip for x in limb.branches if 2 * x.depth > deepest for tip in _tips(x)]
 
 
-def _name(model: Any, body: int) -> str:
-    return model.body(body).name or f"body {body}"
-
-
 def _limbs(model: Any) -> list[Limb]:
     """The limbs that stand on the world or on a free body."""
     children = _moving_children(model)
@@ -140,7 +137,7 @@ def _limbs(model: Any) -> list[Limb]:
 
 def _moving_children(model: Any) -> dict[int, list[int]]:
     """Bodies with joints by the nearest body with joints that carries them; 0 for a base."""
-    carrier, out, free = {0: 0}, dict[int, list[int]](), _free_joint()
+    carrier, out, free = {0: 0}, dict[int, list[int]](), free_joint()
     for body in range(1, model.nbody):
         above = carrier[int(model.body_parentid[body])]
         first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])

@@ -10,13 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import ParameterError, choice, is_series, number
-from ..units import is_quantity
-from . import actuators, content, handles, islands, limbs, model_file, passive
+from ..display import names_words
+from ..errors import ParameterError, is_series, number
+from . import actuators, content, handles, islands, limbs, model_file, passive, poses
 from .joint_ranges import outside_words
 from .mechanism import Mechanism
 from .servo_gains import ServoGains, servo_gains
 
+MOST_LOCKED = 400  # characters of their names; arm.pose has all
 LIGHTEST = 1e-12  # [kg.m^2] least eigenvalue of M of a mechanism with an inverse
 BOUNDS = {  # least and largest value, units at a hinge and at a slide
     "pose": (-1e3, 1e3, "rad", "m"),
@@ -62,13 +63,19 @@ def load(arm: Any) -> Loaded:
     Raises:
         ParameterError: the file cannot be loaded, or holds no arm of this kind.
     """
+    from ..physics import warnings_caught
+
+    with warnings_caught():  # of locked links without mass; those of the file are notes
+        return _loaded(arm)
+
+
+def _loaded(arm: Any) -> Loaded:
     file = model_file.opened(arm.file)
     grip = handles.handle(file.model, arm.site, _named_joints(file.model, arm.joints))
     joints = _arm_joints(file.model, arm.joints, grip.chain)
     without = _without_mass(file, joints)
-    wanted = _wanted_pose(arm.pose, joints)
-    key = keyframe(file.model, wanted)
-    position = file.model.qpos0 if key is None else file.model.key_qpos[key]
+    wanted, position = poses.placed(file.model, poses.wanted(arm.pose, joints))
+    floating = poses.floating(file.model, position, joints)
     model, numbers, locked = islands.hold(file.spec, file.model, position, grip.site)
     file.finish(model)
     whole = copy.copy(file.model)  # as the file's own simulation has it
@@ -97,7 +104,8 @@ def load(arm: Any) -> Loaded:
     _refuse_no_torque(names, given)
     fields["torque_limit"] = tuple(given)
     _check_inertia(mechanism, names)
-    fields["pose"] = {model.joint(j).name: float(q) for j, q in enumerate(mechanism.pose)}
+    at = {model.joint(j).name: float(q) for j, q in enumerate(mechanism.pose)}
+    fields["pose"] = at | floating
     own = _notes(model, arm, mechanism, joints, wanted)
     return Loaded(
         file.name,
@@ -191,6 +199,8 @@ def _arm_joints(model: Any, wanted: Any, chain: Sequence[int]) -> list[int]:
     chosen = _named_joints(model, wanted)
     if chosen is None:
         chosen = islands.driven(model, chain)
+    if not model.njnt:
+        raise ParameterError("joints", None, "must be some that move: the file has none")
     if not chosen:
         raise ParameterError("joints", None, "must be named: no joint moves the handle")
     islands.check_kinds(model, chosen)
@@ -254,41 +264,9 @@ def _refuse_negative(field: str, values: np.ndarray, model: Any) -> None:
         raise ParameterError(f"{field}[{name}]", float(values[j]), bound)
 
 
-def _wanted_pose(pose: Any, joints: Sequence[int]) -> Any:
-    """A pose as it is given; of an arm with one joint a text may be its position."""
-    if len(joints) > 1 or not isinstance(pose, str):
-        return pose
-    try:
-        return [float(pose)]
-    except ValueError:
-        return [pose] if is_quantity(pose) else pose
-
-
-def keyframe(model: Any, pose: Any) -> int | None:
-    """The key frame of a pose: the one of this name or number, or "home" if none is wanted.
-
-    Raises:
-        ParameterError: there is none of this name or number.
-    """
-    names = [model.key(i).name for i in range(model.nkey)]
-    if not isinstance(pose, str | int) or isinstance(pose, bool):
-        return names.index("home") if "home" in names else None
-    word = str(pose)
-    if word in names:
-        return names.index(word)
-    if word.isdigit() and int(word) < len(names):
-        return int(word)
-    if not names:
-        bound = "must be positions, by joint or one for each: the file has no key frames"
-        raise ParameterError("pose", pose, bound)
-    shown = [name or str(i) for i, name in enumerate(names)]
-    choice("pose", word, shown, f"a key frame ({', '.join(shown)}), or positions")
-    raise AssertionError
-
-
 def _pose(model: Any, given: Any, joints: list[int]) -> np.ndarray:
     """Positions of all joints [rad or m]."""
-    key = keyframe(model, given)
+    key = poses.keyframe(model, given)
     start = np.array(model.qpos0 if key is None else model.key_qpos[key], float)
     if isinstance(given, str | int):
         return start
@@ -367,7 +345,7 @@ def _moved(model: Any, wanted: Any, mechanism: Mechanism, pose: np.ndarray) -> I
 def _pose_notes(model: Any, wanted: Any, mechanism: Mechanism, joints: list[int]) -> Iterator[str]:
     """Whose the pose is, unless it is given, and whether the arm can take it."""
     by_key = wanted is None or isinstance(wanted, str | int)
-    key = keyframe(model, wanted) if by_key else None
+    key = poses.keyframe(model, wanted) if by_key else None
     whose = (
         "zero position of the file"
         if key is None
@@ -401,7 +379,7 @@ def _notes(model: Any, arm: Any, mechanism: Mechanism, joints: list[int], wanted
     used = {*mechanism.dofs, *mechanism.following}
     locked = [model.joint(j).name for j in range(model.njnt) if j not in used]
     if locked:
-        notes.append(f"locked: {', '.join(locked)}")
+        notes.append(f"locked: {names_words(locked, MOST_LOCKED)}")
     if mechanism.following:
         tied = [model.joint(j).name for j in mechanism.following]
         notes.append(f"constraints, taken as rigid, move {', '.join(tied)}")

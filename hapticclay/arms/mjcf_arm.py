@@ -25,23 +25,26 @@ Pose = Mapping[str, float] | Sequence[float] | str | int | None
 class MjcfArm:
     """An arm that MuJoCo loads: any chain of hinges and slides, open or closed by constraints.
 
-    Joints between the handle and the world are the arm's, unless `joints` names others; a joint
-    that equality constraints tie to them follows; all others are locked at the pose. The file's
-    contacts and the forces of its actuators take no part. What the file leaves open is in `notes`.
+    Joints between the handle and the world, or a floating base, are the arm's, unless `joints`
+    names others; a joint that constraints of the file tie to them follows; all others are locked at
+    the pose, and the base is held. The file's contacts and the forces of its actuators take no
+    part. What the file leaves open, and what is locked, is in `notes`.
 
     Attributes:
         file: MJCF or URDF file, an mujoco.MjSpec, or the name of an arm of the package: planar_2r,
             five_bar, haptic_3, leader_7.
-        site: site, or body, at which the hand holds the arm; None for the only site on a moving
-            body.
+        site: site, or body, at which the hand holds the arm; None for the only site at the end of
+            an arm. Without any the arm ends where its hand branches, and has no handle.
         joints: names of the arm's joints, in the order of its gains; None for those between the
             handle and the world. Then those in use. Joints without a name in the file are joint 1,
             joint 2, ... in its order.
-        pose: joint positions [rad or m] by name, or one for each joint of the arm; None for the
-            key frame "home", or the positions of the file. Then those of all joints, by name.
-        armature: reflected inertia of the rotors [kg.m^2], 0 to 1e3, by joint name, or one for
-            each joint of the arm; None for the file's, actuators included. Then those of the arm's
-            joints.
+        pose: joint positions [rad or m] by name, or one for each joint of the arm; or a key frame
+            of the file, by name or number; None for the key frame "home", or the positions of the
+            file. Then those of all joints, by name; of a base that floats elsewhere than in the
+            file, its place (x, y, z and a quaternion).
+        armature: reflected inertia of the rotors [kg.m^2], 0 to 1e3, by joint name, one for all,
+            or one for each joint of the arm; None for the file's, actuators included. Then those
+            of the arm's joints.
         damping: viscous damping of the joints [N.m.s/rad], 0 to 1e6, likewise.
         friction: Coulomb friction of the joints [N.m], 0 to 1e6, likewise; that of joints which
             follow them included.
@@ -209,7 +212,7 @@ class MjcfArm:
         if self.site is None:
             names = self._loaded.handles  # type: ignore[attr-defined]
             such = f", such as {', '.join(names)}" * bool(names)
-            bound = f"must name a site or body at the handle{such}: the file leaves it open"
+            bound = f"must name a site or body at the handle (--site NAME){such}"
             raise ParameterError("site", None, bound)
 
     def _place(self, q: Sequence[float] | np.ndarray | None) -> np.ndarray:

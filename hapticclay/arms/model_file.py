@@ -16,7 +16,7 @@ import numpy as np
 
 from ..display import one_line
 from ..errors import ParameterError, choice
-from . import file_kinds, geometry, includes, urdf_text
+from . import content, file_kinds, geometry, includes, model_text, urdf_text
 from .joint_names import name_joints
 
 UNNAMED = "MuJoCo Model"  # MuJoCo's name of a model without one
@@ -73,13 +73,11 @@ def opened(file: Any) -> Opened:
         try:
             read = _read(file)
             model, more = compiled(read.spec)
-        except ValueError as error:
+        except (ValueError, RuntimeError, MemoryError) as error:
             if isinstance(error, ParameterError):
                 raise
             raise bad_file(file, one_line(error, MOST_OF_FAULT)) from None
-    for array in ("body_mass", "body_inertia", "dof_armature", "dof_damping", "jnt_axis"):
-        if not np.isfinite(getattr(model, array)).all():
-            raise bad_file(file, f"{array} is not finite")
+    content.check_numbers(model, lambda why: bad_file(file, why))
     told = [one_line(x, MOST_OF_FAULT) for x in (*caught, *(w.message for w in shown))]
     heard = [f"MuJoCo warns: {x}" for x in dict.fromkeys(told) if not _is_of_saving(x)]
     read.finish(model)
@@ -125,6 +123,7 @@ def _read(file: Any) -> Opened:
             joint.armature = armature.get(joint.name, joint.armature)
         more = {"guessed": guessed, "tensors": tensors}
     else:
+        model_text.check(path)
         spec, notes = includes.spec_of(path)
     spec.compiler.fusestatic = False  # a URDF's tool keeps its name
     name = spec.modelname if spec.modelname != UNNAMED else path.stem

@@ -76,11 +76,16 @@ def servo_gains(
             Kp[j] += servo.kp * arm[j] ** 2
             Kd[j] += servo.kv * arm[j] ** 2
             kinds.setdefault(servo.kind, []).append(names[j])
-    taken = "; ".join(f"{kind} at {', '.join(dict.fromkeys(at))}" for kind, at in kinds.items())
+    taken = "; ".join(f"{kind} at {_joint_words(at, names)}" for kind, at in kinds.items())
     notes = [f"{what}: {', '.join(which)}" for what, which in left.items()]
     return ServoGains(
         tuple(Kp.tolist()), tuple(Kd.tolist()), taken, tuple(notes), *_simulation(model)
     )
+
+
+def _joint_words(at: Sequence[str], names: Sequence[str]) -> str:
+    own = list(dict.fromkeys(at))
+    return "all joints" if len(own) == len(names) > 1 else ", ".join(own)
 
 
 def _simulation(model: Any) -> tuple[float, str]:

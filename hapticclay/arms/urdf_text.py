@@ -130,7 +130,7 @@ def _drop_geometry(robot: Element, static: set[str], path: Path) -> tuple[list[s
                 link.remove(element)
         elif link.find("collision") is not None:
             guessed.append(name)
-    absent = [x for x in dict.fromkeys(dropped) if place_of(x, path, path.parent) is None]
+    absent = [x for x in dict.fromkeys(dropped) if x and place_of(x, path, path.parent) is None]
     return guessed, [x.rpartition("/")[2] for x in absent]
 
 

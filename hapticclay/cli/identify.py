@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from ..errors import Bound
+from ..errors import Bound, ParameterError
 from ..files import writable
 from ..model.constants import AXES
 from . import console
@@ -25,20 +25,23 @@ QUICK_SIGNALS: dict[str, dict[str, Any]] = {  # period [s], band [Hz]
     "S": {"periods": 1, "lines": 20, "period": 2.5, "band": (0.3, 20.0)},
     "Th": {"periods": 1, "lines": 20, "period": 5.0, "band": (0.15, 3.0)},
 }
+OF_SIMULATED = ("noise", "map", "quick", "seed", "control")
 SPACING, QUICK_SPACING = 0.08, 0.2  # [m] between the poses of the map
 
 
 @dataclass(frozen=True)
 class IdentifyCommand:
-    """Identify G, Sh and Th on the simulated arm (Figs. 4, 5, 6); takes a minute.
+    """Identify G, Sh or Th from a log of your own device: mass, damper, spring, with intervals.
 
-    With a FILE, identify one of them from a log of your own device.
+    With --simulated, identify all of them on the simulated arm of the paper (Figs. 4, 5, 6), which
+    takes a minute.
 
     Attributes:
         file: Log of time, input (for G the command, for S and Th the force of the hand on the
             handle) and output (position of the handle): text, Parquet, MATLAB, HDF5 and others.
-        out: Folder for identify.json, fig4.png, fig5.png, fig6.png and map.png; with a file for
-            identify.json and identify.png.
+        simulated: Identify the simulated arm of the paper, in place of a file.
+        out: Folder for identify.json and identify.png; of the simulated arm for fig4.png, fig5.png,
+            fig6.png and map.png too.
         axis: Axis to identify. With a file, the axis of the printed equation to compare with, by
             default x.
         noise: Add sensor noise: encoders with 65536 counts per turn, a force sensor with 0.02 N
@@ -62,6 +65,7 @@ class IdentifyCommand:
     """
 
     file: Loose[Path | None] = None
+    simulated: bool = False
     out: Path = Path("out/identify")
     axis: Literal["x", "y", "both"] = "both"
     noise: bool = False
@@ -83,11 +87,14 @@ class IdentifyCommand:
         Unused(("file",), "is the file: leave --csv out", ("csv",)),
         *(
             Unused(
-                ("noise", "map", "quick", "seed", "control"),
+                ("simulated", *OF_SIMULATED),
                 "is for the simulated arm: leave it out with a file",
                 (file,),
             )
             for file in ("file", "csv")
+        ),
+        Unused(
+            OF_SIMULATED, "is for the arm of the paper: give --simulated too", (), ("simulated",)
         ),
         Unused(
             (
@@ -110,6 +117,9 @@ class IdentifyCommand:
 
         if file := self.file or self.csv:
             return self._measured(file)
+        if not self.simulated:
+            bound = "must be given: the log of a device, or --simulated for the arm of the paper"
+            raise ParameterError("file", None, bound)
         writable(self.out)
         with console.fraction_bar("identify") as show:
             results = self._blocks(show)

@@ -34,7 +34,8 @@ class ZWidthCommand:
             spring [N/m, N/m], as in --box 0 1 0 5 0 300.
         force: Force of the push that tries a loop which is not linear [N].
         speed: Speed of that push [m/s].
-        still: Largest motion back and forth that counts as rest [m].
+        still: Largest motion back and forth that counts as rest [m]; by default 1 um, or a count of
+            the encoder where that is larger.
         arm: Axis of the arm with servo and compensator, in the place of a bare device: the plane is
             that of the clay's k and b.
         gain: Gain of the compensator [1/kg], with --arm; by default 1 on x and 0.5 on y.

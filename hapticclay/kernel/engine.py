@@ -25,7 +25,8 @@ def build(scenario: Scenario) -> mujoco.MjModel:
     """The model that simulate(scenario) steps.
 
     It holds joints, inertias and motors, and dampers where there is clay. It holds no geom, sensor,
-    contact, mesh, material, light or camera.
+    contact, mesh, material, light or camera. For an arm from a file it is that of the file, in
+    which nothing acts but inertia and weight: all else is the run's.
 
     Args:
         scenario: what to build for.
@@ -33,6 +34,10 @@ def build(scenario: Scenario) -> mujoco.MjModel:
     Raises:
         RuntimeError: the engine warned while compiling; the parts in mjcf/ do not fit together.
     """
+    if not scenario.is_closed_form:
+        model = scenario.file_arm.mechanism.runnable()
+        model.opt.timestep = scenario.dt
+        return model
     parts = scenario.clay is not None, mjcf_folder(), scenario.arm
     model = copy.copy(_compiled_model(*parts))
     model.opt.timestep = scenario.dt

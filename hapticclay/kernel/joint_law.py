@@ -49,6 +49,7 @@ def see_pose(m, s):
     if m.computed:
         for i in range(n):
             e.pose[i] = s.angles[i]
+        e.pose[2 * n] += 1.0
         e.at_scratch(e.pose)
         return
     for i in range(n):

@@ -42,6 +42,7 @@ class JointMover(Mover):
         self.places["scratch_q"] = self.scratch.qpos
         self.pivots = np.zeros(len(arm.names), dtype=np.int64)
         self.computed: Any = (None, None, None)
+        self.terms: Any = None
         if mechanism.is_computed:
             self.compute(scenario)
 
@@ -52,6 +53,7 @@ class JointMover(Mover):
         terms = ComputedTerms(scenario, self.places)
         self.places["handle"], self.places["scratch_handle"] = terms.handle, terms.scratch_handle
         self.computed = terms.at_pose, terms.at_rates, terms.at_scratch
+        self.terms, self.calls_python = terms, True
 
     def build(self, scenario: Scenario) -> Any:
         return scenario.file_arm.mechanism.runnable()
@@ -94,3 +96,14 @@ class JointMover(Mover):
         for data in (self.data, self.scratch):
             mujoco.mj_resetData(self.model, data)
             data.qpos[:] = self.home
+        self.forgive()
+
+    def failures(self) -> list[BaseException]:
+        if self.terms is None:
+            return []
+        self.terms.note_dropped()
+        return self.terms.failed
+
+    def forgive(self) -> None:
+        if self.terms is not None:
+            self.terms.forgive()

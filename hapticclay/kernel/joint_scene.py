@@ -72,7 +72,7 @@ def scratch(n: int, freedoms: int) -> dict[str, np.ndarray]:
         "M": freedoms * freedoms, "J": 3 * freedoms, "Jdot": 3 * freedoms,
         "scratch_forces": freedoms, "scratch_J": 3 * n, "scratch_bias": n, "joint_M": n * n,
         "joint_J": 3 * n, "joint_bias": n, "joint_D": n * n, "joint_F": n, "joint_c": 3,
-        "pose": 2 * n, "lower": n * n, "Y": 3 * n, "free": n, "moment": n,
+        "pose": 2 * n + 1, "lower": n * n, "Y": 3 * n, "free": n, "moment": n,
         "matrix": 2 * n * n + 2 * n,
     }  # fmt: skip
     return {name: np.zeros(size) for name, size in sizes.items()}

@@ -18,6 +18,7 @@ def sense(m, s):
     if m.computed:
         for i in range(n):
             e.pose[i] = s.q[i]
+        e.pose[2 * n] += 1.0  # calls, which Python counts as well: Ctrl-C may drop one
         e.at_pose(e.pose)
         return
     for i in range(n):
@@ -49,6 +50,7 @@ def turn(m, k, rates, g, h):
     if m.computed:
         for i in range(n):
             e.pose[n + i] = rates[i] + h * g[i]
+        e.pose[2 * n] += 1.0
         e.at_rates(e.pose)
         e.factored = -1.0  # its dampers may depend on the rates
         for i in range(m.axes):
@@ -114,6 +116,7 @@ def place_after(m, s, after):
     if m.computed:
         for i in range(m.joints):
             e.pose[i] = s.q[i] + after * s.k.w[i]
+        e.pose[2 * m.joints] += 1.0
         e.at_scratch(e.pose)
     else:
         for i in range(m.joints):

@@ -105,11 +105,16 @@ _checked: set[int] = set()
 
 
 class Mover:
-    """An arm of the engine: its model and data, and the records by which rows call it."""
+    """An arm of the engine: its model and data, and the records by which rows call it.
+
+    Attributes:
+        calls_python: whether steps call functions of Python.
+    """
 
     calls: ClassVar = CALLS
 
     def __init__(self, scenario: Scenario):
+        self.calls_python = False
         self.model = self.build(scenario)
         self.data = mujoco.MjData(self.model)
         self.out = np.zeros(2)
@@ -162,6 +167,13 @@ class Mover:
         made["model"], made["data"] = addresses_of(self.model, self.data)
         for name, array in self.places.items():
             made[name] = array.ctypes.data
+
+    def failures(self) -> list[BaseException]:
+        """Ctrl-C and its like that functions of Python have raised in steps."""
+        return []
+
+    def forgive(self) -> None:
+        """Begins anew after them."""
 
     def rest(self, scenario: Scenario) -> None:
         """Puts the engine to a scenario, at rest."""

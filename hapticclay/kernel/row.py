@@ -222,12 +222,15 @@ class Row:
         Between two lines of a step the state is none of the run. So Ctrl-C waits for its end, but
         where a function of the user is called.
         """
+        if self.is_called:
+            self._step_through(make, *arguments)
+        else:
+            uninterrupted(self._step_through, make, *arguments)
+
+    def _step_through(self, make: Any, *arguments: Any) -> None:
         self._is_amid = True
         try:
-            if self.is_called:
-                make(*arguments)
-            else:
-                uninterrupted(make, *arguments)
+            make(*arguments)
         except ArithmeticError:
             self.s.code = path.NOT_FINITE
         except ValueError:  # from the sine of an infinite angle
@@ -239,18 +242,19 @@ class Row:
     @property
     def is_torn(self) -> bool:
         """Whether a step was interrupted within, so that the state is none of the run."""
-        errors = [*self.failed[:1], *([] if self.caller is None else [self.caller.error])]
+        errors = [*self.failed, *self.mover.failures()]
+        errors += [] if self.caller is None else [self.caller.error]
         return self._is_amid or any(x and not isinstance(x, Exception) for x in errors)
 
     @property
     def is_called(self) -> bool:
-        """Whether steps call functions of the user, which may fail."""
-        return self.caller is not None or bool(self.laws)
+        """Whether steps call functions of Python, which may fail."""
+        return self.caller is not None or bool(self.laws) or self.mover.calls_python
 
     def check(self) -> None:
-        """Raises what functions of the user raised."""
-        if self.failed:
-            raise self.failed[0]
+        """Raises what functions of the user raised, and Ctrl-C that came within one of Python."""
+        for error in (*self.failed, *self.mover.failures()):
+            raise error
         if self.caller is not None:
             self.caller.check()
 
@@ -285,6 +289,7 @@ class Row:
         for x, before in zip(self.written, saved.arrays, strict=True):
             x[:] = before
         self.failed.clear()
+        self.mover.forgive()
         if self.caller is not None:
             self.caller.error = None
         self._is_amid = False

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arguments import checked
 from ..arms.joint_law import JointPD
-from ..errors import Bound
+from ..errors import Bound, Real
 from ..model.operator import Operator
 from ..scene.pair import Pair
 from ..simulation.pair_record import PairRecord
@@ -75,7 +75,7 @@ class PairSession:
     @checked
     def change(
         self,
-        delay: Annotated[float | None, Bound(0.0, 10.0, "s")] = None,
+        delay: Annotated[Real | None, Bound(0.0, 10.0, "s")] = None,
         gain: Annotated[float | None, Bound(0.0, 1e3, above=True)] = None,
     ) -> None:
         """Restarts with another one-way delay, both ways alike, or factor of all gains Kp.

@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..scene.scenario import Scenario
 from ..simulation import monitor
 from ..simulation.record import Record
@@ -140,7 +140,7 @@ class Session:
         self.point = None if point is None else self._within_reach(point)
 
     @checked
-    def push(self, force: Annotated[tuple[float, float], Bound(-1e3, 1e3, "N")]) -> None:
+    def push(self, force: Annotated[tuple[Real, Real], Bound(-1e3, 1e3, "N")]) -> None:
         """Makes the hand press with a constant force, in addition to any pull."""
         self.run.pull.force = force
 

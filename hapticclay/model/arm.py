@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import part
-from ..errors import Bound
+from ..errors import Bound, Real
 from .constants import L1, L2, S
 from .traits import NO, Refusal, Trait
 
@@ -35,10 +35,10 @@ class Arm:
         I2: inertia of link 2 about the elbow [kg.m^2], 1e-9 to 1e6; l2^2/0.131 as printed (Eq. 18).
     """
 
-    l1: Annotated[float, Bound(1e-3, 100.0, "m")] = L1
-    l2: Annotated[float, Bound(1e-3, 100.0, "m")] = L2
-    I1: Annotated[float, Bound(1e-9, 1e6, "kg.m^2")] = L1 * L1 / S[0].gain
-    I2: Annotated[float, Bound(1e-9, 1e6, "kg.m^2")] = L2 * L2 / S[1].gain
+    l1: Annotated[Real, Bound(1e-3, 100.0, "m")] = L1
+    l2: Annotated[Real, Bound(1e-3, 100.0, "m")] = L2
+    I1: Annotated[Real, Bound(1e-9, 1e6, "kg.m^2")] = L1 * L1 / S[0].gain
+    I2: Annotated[Real, Bound(1e-9, 1e6, "kg.m^2")] = L2 * L2 / S[1].gain
 
     @property
     def links(self) -> Links:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, part
-from ..errors import Bound, ParameterError, numbers_of
+from ..errors import Bound, ParameterError, Real, numbers_of
 from ..fields import Axis
 from ..formulas.constants import B_MAX
 from .constants import AXES
@@ -20,11 +20,11 @@ from .traits import (
 )
 
 OPTIONAL = ("growth", "Fy", "K", "n")  # further values of each region or cell
-Edges = Annotated[tuple[float, ...], Bound(unit="m")]
-Span = Annotated[tuple[float, float], Bound(unit="m")]
+Edges = Annotated[tuple[Real, ...], Bound(unit="m")]
+Span = Annotated[tuple[Real, Real], Bound(unit="m")]
 Image = Annotated[tuple[tuple[float, ...], ...], Bound(0.0, 1.0)]
-BlackWhite = Annotated[tuple[float, float], Bound(0.0, B_MAX, "N.s/m", names=("black", "white"))]
-Outside = Annotated[float, Bound(0.0, B_MAX, "N.s/m")]
+BlackWhite = Annotated[tuple[Real, Real], Bound(0.0, B_MAX, "N.s/m", names=("black", "white"))]
+Outside = Annotated[Real, Bound(0.0, B_MAX, "N.s/m")]
 
 
 class CellLaw:
@@ -139,12 +139,12 @@ class Profile(CellLaw):
         springs: spring of each region, along the axis of the law, as values; empty for none.
     """
 
-    edges: Annotated[tuple[float, ...], Bound(unit="m")]
-    values: Annotated[tuple[float, ...], Bound(0.0, B_MAX, "N.s/m")]
+    edges: Annotated[tuple[Real, ...], Bound(unit="m")]
+    values: Annotated[tuple[Real, ...], Bound(0.0, B_MAX, "N.s/m")]
     along: Axis = "x"
-    growth: Annotated[tuple[float, ...], Bound(0.0, B_MAX, "N.s/m per s")] = ()
-    Fy: Annotated[tuple[float, ...], YieldForce] = ()
-    K: Annotated[tuple[float, ...], Consistency] = ()
+    growth: Annotated[tuple[Real, ...], Bound(0.0, B_MAX, "N.s/m per s")] = ()
+    Fy: Annotated[tuple[Real, ...], YieldForce] = ()
+    K: Annotated[tuple[Real, ...], Consistency] = ()
     n: Annotated[tuple[float, ...], FlowIndex] = ()
     springs: tuple[Spring, ...] = ()
 
@@ -216,10 +216,10 @@ class Grid(CellLaw):
 
     x_edges: Edges
     y_edges: Edges
-    values: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m")]
-    growth: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m per s")] = ()
-    Fy: Annotated[tuple[tuple[float, ...], ...], YieldForce] = ()
-    K: Annotated[tuple[tuple[float, ...], ...], Consistency] = ()
+    values: Annotated[tuple[tuple[Real, ...], ...], Bound(0.0, B_MAX, "N.s/m")]
+    growth: Annotated[tuple[tuple[Real, ...], ...], Bound(0.0, B_MAX, "N.s/m per s")] = ()
+    Fy: Annotated[tuple[tuple[Real, ...], ...], YieldForce] = ()
+    K: Annotated[tuple[tuple[Real, ...], ...], Consistency] = ()
     n: Annotated[tuple[tuple[float, ...], ...], FlowIndex] = ()
 
     def __post_init__(self):

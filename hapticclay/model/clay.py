@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, part
-from ..errors import Bound, ParameterError, number
+from ..errors import Bound, ParameterError, Real, number
 from ..formulas.constants import B_MAX
 from ..units import is_quantity
 from . import flow, groove, spring
@@ -110,7 +110,7 @@ class Clay:
 
     x: Profile | Grid | Smooth
     y: Profile | Grid | Smooth
-    angle: Annotated[float, Bound(-math.pi, math.pi, "rad")] = 0.0
+    angle: Annotated[Real, Bound(-math.pi, math.pi, "rad")] = 0.0
     isotropic: bool = False
     groove: Groove | None = None
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from .. import matrices
 from ..arguments import part
 from ..errors import Bound, ParameterError
 from ..formulas.compensator import ORDER
@@ -113,12 +114,12 @@ class Compensator:
     @property
     def poles(self) -> np.ndarray:
         """Its poles [rad/s], shape (order,)."""
-        return np.roots(self.den)
+        return matrices.polynomial_roots(self.den)
 
     @property
     def zeros(self) -> np.ndarray:
         """Its zeros [rad/s], shape (at most order,)."""
-        return np.roots(self.num)
+        return matrices.polynomial_roots(self.num)
 
     @property
     def lag(self) -> tuple[float, float] | None:
@@ -213,7 +214,7 @@ def moving_states(compensator: Compensator, v: float) -> list[float]:
     m[n : 2 * n, 2 * n], m[2 * n, n : 2 * n] = B, C / size
     m[2 * n + 1, :n], m[2 * n + 1, 2 * n] = C / size, D / size
     right[2 * n] = 1.0  # the states scale with v itself; a tiny v must keep its digits
-    z = np.linalg.lstsq(m, right, rcond=None)[0]
+    z = matrices.least_squares(m, right)
     if not np.allclose(m @ z, right, rtol=0.0, atol=1e-9):
         bound = "must be 0 with a compensator without an integrator"
         raise ParameterError("velocity", v, bound)

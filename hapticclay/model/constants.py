@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from ..arguments import part
-from ..errors import Bound
+from ..errors import Bound, Real
 from ..fields import AXES as AXES
 
 
@@ -24,8 +24,8 @@ class SecondOrder:
     """
 
     gain: Annotated[float, Bound(0.0, 1e12, above=True)]
-    damping: Annotated[float, Bound(0.0, 1e6, "1/s", above=True)]
-    stiffness: Annotated[float, Bound(0.0, 1e12, "1/s^2", above=True)]
+    damping: Annotated[Real, Bound(0.0, 1e6, "1/s", above=True)]
+    stiffness: Annotated[Real, Bound(0.0, 1e12, "1/s^2", above=True)]
 
 
 CM = 1e-2  # the paper prints lengths in centimetres

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import part
-from ..errors import Bound
+from ..errors import Bound, Real
 from ..formulas.constants import B_MAX
 from .traits import LEAST, LEFT_OUT, Column, Hold, Law, Quantity, multiplied
 
@@ -34,10 +34,10 @@ class Flow:
         b: damping [N.s/m], 0 to 1e9.
     """
 
-    Fy: Annotated[float, YieldForce] = 0.0
-    K: Annotated[float, Consistency] = 0.0
+    Fy: Annotated[Real, YieldForce] = 0.0
+    K: Annotated[Real, Consistency] = 0.0
     n: Annotated[float, FlowIndex] = 1.0
-    b: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 0.0
+    b: Annotated[Real, Bound(0.0, B_MAX, "N.s/m")] = 0.0
 
     @property
     def kind(self) -> str:

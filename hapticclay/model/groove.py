@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, part
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..formulas.constants import B_MAX
 from .constants import AXES
 from .flow import FY_MAX
@@ -46,14 +46,14 @@ class Groove:
         left: remaining share of each cell, as heights, 0 to 1; empty for a whole block.
     """
 
-    x: Annotated[tuple[float, float], Bound(unit="m")]
-    y: Annotated[tuple[float, float], Bound(unit="m")]
-    pressure: Annotated[float, Bound(0.0, 1e8, "Pa")] = 0.0
-    gradient: Annotated[float, Bound(0.0, 1e10, "Pa/m")] = 0.0
-    damping: Annotated[float, Bound(0.0, 1e12, "N.s/m^3")] = 0.0
+    x: Annotated[tuple[Real, Real], Bound(unit="m")]
+    y: Annotated[tuple[Real, Real], Bound(unit="m")]
+    pressure: Annotated[Real, Bound(0.0, 1e8, "Pa")] = 0.0
+    gradient: Annotated[Real, Bound(0.0, 1e10, "Pa/m")] = 0.0
+    damping: Annotated[Real, Bound(0.0, 1e12, "N.s/m^3")] = 0.0
     tool: Tool = SMALL_TOOL
     cells: Annotated[tuple[float, float] | None, Bound(1.0, 1e5)] = None
-    heights: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, 0.1, "m")] = ()
+    heights: Annotated[tuple[tuple[Real, ...], ...], Bound(0.0, 0.1, "m")] = ()
     left: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, 1.0)] = ()
 
     def __post_init__(self):

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from ..arguments import part
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..fields import JOINTS, Seed
 from .traits import LEFT_OUT, YES, Quantity, Refusal, Trait, present
 
@@ -28,8 +28,8 @@ class Coupling:
         damper: damping [N.s/m], > 0, at most 1e12.
     """
 
-    spring: Annotated[float, Bound(0.0, STIFF, "N/m", above=True)]
-    damper: Annotated[float, Bound(0.0, STIFF, "N.s/m", above=True)]
+    spring: Annotated[Real, Bound(0.0, STIFF, "N/m", above=True)]
+    damper: Annotated[Real, Bound(0.0, STIFF, "N.s/m", above=True)]
 
 
 @part("hardware.")
@@ -65,27 +65,27 @@ class Hardware:
             up to 1e12, one number or one for each; 0 or None measures their positions exactly.
     """
 
-    jitter: Annotated[float, Bound(0.0, 1.0, "s")] = 0.0
+    jitter: Annotated[Real, Bound(0.0, 1.0, "s")] = 0.0
     dropout_probability: Annotated[float, Bound(0.0, 0.99)] = 0.0
     encoder: Annotated[int | tuple[int, ...] | None, Bound(4, 2**40)] = None
     velocity: Literal["exact", "difference"] = "exact"
     velocity_window: Annotated[int, Bound(1, 10_000)] = 1
-    velocity_filter: Annotated[float | None, Bound(0.0, 1e6, "Hz", above=True)] = None
+    velocity_filter: Annotated[Real | None, Bound(0.0, 1e6, "Hz", above=True)] = None
     adc_bits: Annotated[int | None, Bound(2, 32)] = None
-    adc_range: Annotated[float, Bound(0.0, 1e6, "N", above=True)] = 50.0
-    force_noise: Annotated[float, Bound(0.0, 1e3, "N")] = 0.0
-    force_filter: Annotated[float | None, Bound(0.0, 1e6, "Hz", above=True)] = None
+    adc_range: Annotated[Real, Bound(0.0, 1e6, "N", above=True)] = 50.0
+    force_noise: Annotated[Real, Bound(0.0, 1e3, "N")] = 0.0
+    force_filter: Annotated[Real | None, Bound(0.0, 1e6, "Hz", above=True)] = None
     filter_order: Annotated[int, Bound(1, 2)] = 2
     dac_bits: Annotated[int | None, Bound(2, 32)] = None
     dac_range: Annotated[
-        tuple[float, float] | None, Bound(0.0, 1e6, "N.m", above=True, names=JOINTS)
+        tuple[Real, Real] | None, Bound(0.0, 1e6, "N.m", above=True, names=JOINTS)
     ] = None
-    delay: Annotated[float, Bound(0.0, 1.0, "s")] = 0.0
-    friction: Annotated[tuple[float, float], Bound(0.0, 1e6, "N.m", names=JOINTS)] = (0.0, 0.0)
+    delay: Annotated[Real, Bound(0.0, 1.0, "s")] = 0.0
+    friction: Annotated[tuple[Real, Real], Bound(0.0, 1e6, "N.m", names=JOINTS)] = (0.0, 0.0)
     passivity: bool = False
     coupling: Coupling | None = None
     seed: Seed = 0
-    linear_encoder: Annotated[float | tuple[float, ...] | None, Bound(0.0, 1e12, "1/m")] = None
+    linear_encoder: Annotated[Real | tuple[Real, ...] | None, Bound(0.0, 1e12, "1/m")] = None
 
     def __post_init__(self):
         if isinstance(self.encoder, tuple):

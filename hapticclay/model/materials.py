@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Annotated
 
 from ..arguments import checked, part
-from ..errors import Bound, ParameterError, choice
+from ..errors import Bound, ParameterError, Real, choice
 from ..formulas.constants import B_MAX
 from .constants import B_CONSTANT
 from .flow import Flow, FlowIndex
@@ -80,13 +80,11 @@ class Material:
     """
 
     source: str
-    strength: Annotated[tuple[float, float], Bound(0.0, 1e7, "Pa", names=("low", "high"))] = (0, 0)
-    K: Annotated[float, Bound(0.0, 1e7, "Pa.s^n")] = 0.0
+    strength: Annotated[tuple[Real, Real], Bound(0.0, 1e7, "Pa", names=("low", "high"))] = (0, 0)
+    K: Annotated[Real, Bound(0.0, 1e7, "Pa.s^n")] = 0.0
     n: Annotated[float, FlowIndex] = 1.0
-    rates: Annotated[tuple[float, float] | None, Bound(0.0, unit="1/s", names=("low", "high"))] = (
-        None
-    )
-    b: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 0.0
+    rates: Annotated[tuple[Real, Real] | None, Bound(0.0, unit="1/s", names=("low", "high"))] = None
+    b: Annotated[Real, Bound(0.0, B_MAX, "N.s/m")] = 0.0
 
     def __post_init__(self):
         for name, span in (("strength", self.strength), ("rates", self.rates)):

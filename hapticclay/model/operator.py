@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from ..arguments import part
-from ..errors import Bound
+from ..errors import Bound, Real
 from ..formulas.constants import B_MAX
 from .traits import Trait
 
@@ -25,9 +25,9 @@ class Operator:
         spring: its stiffness, pulling towards p = 0 [N/m], 0 to 1e9.
     """
 
-    mass: Annotated[float, Bound(0.0, 1e3, "kg")] = 0.25
-    damper: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 2.0
-    spring: Annotated[float, Bound(0.0, 1e9, "N/m")] = 6.0
+    mass: Annotated[Real, Bound(0.0, 1e3, "kg")] = 0.25
+    damper: Annotated[Real, Bound(0.0, B_MAX, "N.s/m")] = 2.0
+    spring: Annotated[Real, Bound(0.0, 1e9, "N/m")] = 6.0
 
 
 NO_HAND = Operator(0.0, 0.0, 0.0)  # Th = 0

@@ -20,7 +20,6 @@ from .traits import NO, Refusal, Trait
 # measured, hand force [N], torques [N.m]; then the law's state now and after, and its parameters;
 # of the arm in closed form:
 BUFFER = 9
-TORQUE = 7  # place of the torques
 NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*(:[^\W\d]\w*(\.[^\W\d]\w*)*)?")
 
 Law = Callable[

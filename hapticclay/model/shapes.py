@@ -8,12 +8,12 @@ from typing import Annotated
 import numpy as np
 
 from ..arguments import part
-from ..errors import Bound, number
+from ..errors import Bound, Real, number
 from . import pieces
 from .signals import Signal
 
 Size = Annotated[tuple[float, float], Bound(-1e6, 1e6)]
-Moment = Annotated[float, Bound(0.0, 1e5, "s")]
+Moment = Annotated[Real, Bound(0.0, 1e5, "s")]
 BEFORE = 1.0  # [s] lead of the piece before the first break; any number works
 
 
@@ -63,7 +63,7 @@ class Ramp(Signal):
 
     rate: Size
     start: Moment
-    end: Annotated[float | None, Bound("start", 1e5, "s", above=True)] = None
+    end: Annotated[Real | None, Bound("start", 1e5, "s", above=True)] = None
 
     def pieces(self, begin: float, end: float, step: float) -> np.ndarray:
         start, none = [self.start - BEFORE, self.start], (0.0, 0.0)
@@ -88,8 +88,8 @@ class Pulse(Signal):
 
     value: Size
     start: Moment
-    width: Annotated[float, Bound(0.0, 1e5, "s", above=True)]
-    period: Annotated[float | None, Bound(1e-3, 1e5, "s")] = None
+    width: Annotated[Real, Bound(0.0, 1e5, "s", above=True)]
+    period: Annotated[Real | None, Bound(1e-3, 1e5, "s")] = None
 
     def __post_init__(self):
         if self.period is not None:
@@ -145,10 +145,10 @@ class Chirp(Signal):
     """
 
     amplitude: Size
-    low: Annotated[float, Bound(0.0, 1e6, "Hz", above=True)]
-    high: Annotated[float, Bound("low", 1e6, "Hz")]
-    duration: Annotated[float, Bound(0.0, 1e5, "s", above=True)]
-    phase: Annotated[float, Bound(-1e6, 1e6, "rad")] = 0.0
+    low: Annotated[Real, Bound(0.0, 1e6, "Hz", above=True)]
+    high: Annotated[Real, Bound("low", 1e6, "Hz")]
+    duration: Annotated[Real, Bound(0.0, 1e5, "s", above=True)]
+    phase: Annotated[Real, Bound(-1e6, 1e6, "rad")] = 0.0
     log: bool = False
     start: Moment = 0.0
 

@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import part
-from ..errors import Bound, ParameterError, integer
+from ..errors import Bound, ParameterError, Real, integer
 from ..fields import Seed
 from . import pieces
 from .traits import LEFT_OUT, Trait
@@ -200,9 +200,9 @@ class Multisine(Signal):
     """
 
     rms: Annotated[tuple[float, float], Bound(0.0, 1e6)] = (1.0, 0.0)
-    low: Annotated[float, Bound(0.0, unit="Hz", above=True)] = 0.1
-    high: Annotated[float, Bound("low", 1e6, "Hz")] = 2.0
-    period: Annotated[float, Bound(1e-3, 1e5, "s")] = 20.0
+    low: Annotated[Real, Bound(0.0, unit="Hz", above=True)] = 0.1
+    high: Annotated[Real, Bound("low", 1e6, "Hz")] = 2.0
+    period: Annotated[Real, Bound(1e-3, 1e5, "s")] = 20.0
     lines: Annotated[int | None, Bound(1, MOST_LINES)] = None
     seed: Seed = 0
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, part
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..formulas.constants import B_MAX
 from ..formulas.smooth import smooth_damping
 from .cells import BlackWhite, CellLaw, Image, Span, check_outline, pixels
@@ -33,7 +33,7 @@ class Smooth(CellLaw):
 
     x: Span
     y: Span
-    values: Annotated[tuple[tuple[float, ...], ...], Bound(0.0, B_MAX, "N.s/m")]
+    values: Annotated[tuple[tuple[Real, ...], ...], Bound(0.0, B_MAX, "N.s/m")]
 
     def __post_init__(self):
         check_outline(self.x, self.y, "clay.")

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import part
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from .traits import LEFT_OUT, Law, Quantity, Refusal
 
 STIFFNESS_MAX = 1e9  # [N/m]
@@ -33,10 +33,10 @@ class Spring:
             sticks in it and is pulled back as well.
     """
 
-    k: Annotated[float, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
-    limit: Annotated[float | None, Bound(0.0, 1e6, "N", above=True)] = None
-    k1: Annotated[float, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
-    tau: Annotated[float, Bound(0.0, 1e5, "s", above=True)] = 1.0
+    k: Annotated[Real, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
+    limit: Annotated[Real | None, Bound(0.0, 1e6, "N", above=True)] = None
+    k1: Annotated[Real, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
+    tau: Annotated[Real, Bound(0.0, 1e5, "s", above=True)] = 1.0
     unilateral: bool = False
 
     def __post_init__(self):

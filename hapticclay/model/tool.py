@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from ..arguments import part
-from ..errors import Bound
+from ..errors import Bound, Real
 
 WIDTH_MIN = 4e-3  # [m] two of the largest cells of a picture's map (studies/removal.py)
 
@@ -19,8 +19,8 @@ class Tool:
         depth: depth of the cut [m], 0.0001 to 0.025.
     """
 
-    width: Annotated[float, Bound(WIDTH_MIN, 0.1, "m")] = 0.02
-    depth: Annotated[float, Bound(1e-4, 0.025, "m")] = 0.01
+    width: Annotated[Real, Bound(WIDTH_MIN, 0.1, "m")] = 0.02
+    depth: Annotated[Real, Bound(1e-4, 0.025, "m")] = 0.01
 
 
 SMALL_TOOL = Tool(0.010, 0.005)

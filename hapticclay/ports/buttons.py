@@ -9,7 +9,7 @@ from typing import Annotated
 
 from ..arguments import checked, named
 from ..columns.log import columns_of
-from ..errors import Bound, ParameterError, number
+from ..errors import Bound, ParameterError, Real, number
 
 NAMES = ("a", "b", "c", "home")
 
@@ -24,7 +24,7 @@ class ButtonScript:
         pressed: names of the buttons that are pressed from each time on.
     """
 
-    t: Annotated[tuple[float, ...], Bound(unit="s")] = ()
+    t: Annotated[tuple[Real, ...], Bound(unit="s")] = ()
     pressed: tuple[frozenset[str], ...] = ()
 
     def __post_init__(self):

@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Annotated, NamedTuple
 
 from ..arguments import checked, part
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..model.operator import Operator
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
@@ -39,8 +39,8 @@ class Coupled:
         plane: "xy" or "xz", plane of the device in which the arm moves.
     """
 
-    K: Annotated[float, Bound(0.0, 1e5, "N/m", above=True)] = 300.0
-    B: Annotated[float, Bound(0.0, 1e3, "N.s/m", above=True)] = 5.0
+    K: Annotated[Real, Bound(0.0, 1e5, "N/m", above=True)] = 300.0
+    B: Annotated[Real, Bound(0.0, 1e3, "N.s/m", above=True)] = 5.0
     plane: Plane = "xy"
 
     def check(self, Ts: float) -> None:
@@ -185,7 +185,7 @@ class Rendered(NamedTuple):
 def render(
     scenario: Scenario,
     url: str,
-    duration: Annotated[float, Bound(0.0, LONGEST, "s", above=True)] = 10.0,
+    duration: Annotated[Real, Bound(0.0, LONGEST, "s", above=True)] = 10.0,
     *,
     coupling: Coupled = PLAIN_COUPLING,
     limits: Limits = PLAIN,

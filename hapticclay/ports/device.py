@@ -13,7 +13,7 @@ from ..arguments import checked, part
 from ..arms.joint_law import JointPD
 from ..arms.mjcf_arm import MjcfArm
 from ..columns.log import columns_of
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..model.constants import TS
 from ..model.operator import Operator
 from ..scene.scenario import Scenario
@@ -38,8 +38,8 @@ class Trajectory:
             of 100 m/s moves meanwhile, shape (n, 2), or (n, 3) for an arm that moves along z too.
     """
 
-    t: Annotated[tuple[float, ...], Bound(-1e9, 1e9, "s")]
-    points: Annotated[tuple[tuple[float, ...], ...], Bound(-10.0, 10.0, "m")]
+    t: Annotated[tuple[Real, ...], Bound(-1e9, 1e9, "s")]
+    points: Annotated[tuple[tuple[Real, ...], ...], Bound(-10.0, 10.0, "m")]
 
     def __post_init__(self):
         if not self.t or len(self.t) != len(self.points):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from ..arguments import part
-from ..errors import Bound
+from ..errors import Bound, Real
 from .commands import NOTHING, Vector, shortening
 
 PATIENCE = 0.05  # [s] after which a sample counts as lost
@@ -31,13 +31,13 @@ class Limits:
             the ramp restarts. None for no limit.
     """
 
-    largest_force: Annotated[float, Bound(0.0, 100.0, "N", above=True)] = 3.0
-    ramp: Annotated[float, Bound(0.0, 60.0, "s")] = 1.0
-    rate: Annotated[float, Bound(1.0, 1e4, "Hz")] = 1000.0
-    patience: Annotated[float, Bound(1e-3, 1.0, "s")] = PATIENCE
-    period: Annotated[float | None, Bound(1e-5, 1.0, "s")] = None
-    slew_rate: Annotated[float, Bound(0.0, 1e6, "N/s", above=True)] = 500.0
-    frozen: Annotated[float | None, Bound(1e-2, 60.0, "s")] = 0.5
+    largest_force: Annotated[Real, Bound(0.0, 100.0, "N", above=True)] = 3.0
+    ramp: Annotated[Real, Bound(0.0, 60.0, "s")] = 1.0
+    rate: Annotated[Real, Bound(1.0, 1e4, "Hz")] = 1000.0
+    patience: Annotated[Real, Bound(1e-3, 1.0, "s")] = PATIENCE
+    period: Annotated[Real | None, Bound(1e-5, 1.0, "s")] = None
+    slew_rate: Annotated[Real, Bound(0.0, 1e6, "N/s", above=True)] = 500.0
+    frozen: Annotated[Real | None, Bound(1e-2, 60.0, "s")] = 0.5
 
     @property
     def Ts(self) -> float:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from ..arguments import checked
-from ..errors import Bound, integer
+from ..errors import Bound, Real, integer
 from ..scene.link import ENDS
 from ..scene.pair import Pair
 from ..scene.scenario import Scenario
@@ -169,7 +169,7 @@ def serve_pair(
     host: str = "127.0.0.1",
     port: int = 0,
     clock: Clock = "tick",
-    period: Annotated[float | None, Bound(1e-5, 1.0, "s")] = None,
+    period: Annotated[Real | None, Bound(1e-5, 1.0, "s")] = None,
     every: Annotated[int, Bound(1, 1_000_000)] = 1,
     inverse3: Inverse3 = PLAIN,
 ) -> Iterator[PairServers]:

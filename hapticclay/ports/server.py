@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 from urllib.parse import urlsplit
 
 from ..arguments import checked
-from ..errors import Bound, needing
+from ..errors import Bound, Real, needing
 from ..files import versions
 from ..scene.scenario import Scenario
 from ..simulation.record import Record
@@ -222,7 +222,7 @@ def serve(
     host: str = "127.0.0.1",
     port: int = 0,
     clock: Clock = "tick",
-    period: Annotated[float | None, Bound(1e-5, 1.0, "s")] = None,
+    period: Annotated[Real | None, Bound(1e-5, 1.0, "s")] = None,
     hand: Trajectory | None = None,
     clay: bool = False,
     inverse3: Inverse3 = PLAIN,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, Protocol
 
 from ..arguments import part
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from .buttons import ButtonScript
 from .commands import IDLE, Command, Joints
 from .driven_arm import LARGEST_FORCE, Device
@@ -40,7 +40,7 @@ class Inverse3:
     grip_id: str = "F00D"
     plane: Literal["xy", "xz"] = "xy"
     buttons: ButtonScript = ButtonScript()
-    largest_force: Annotated[float, Bound(0.0, 1e3, "N", above=True)] = LARGEST_FORCE
+    largest_force: Annotated[Real, Bound(0.0, 1e3, "N", above=True)] = LARGEST_FORCE
     protocol: Literal["inverse", "rosbridge"] = "inverse"
     origins: Any = ()  # texts, checked below
 

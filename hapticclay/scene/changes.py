@@ -9,7 +9,16 @@ from typing import Any, TypeVar
 
 from ..arguments import checked
 from ..errors import ParameterError
-from ..fields import AXES, ENTIRE, join_names, laid_over, make_part, value_of_text, values_of
+from ..fields import (
+    AXES,
+    ENTIRE,
+    join_names,
+    laid_over,
+    make_part,
+    nodes_of,
+    value_of_text,
+    values_of,
+)
 
 T = TypeVar("T")
 HAND = ["mass", "damper", "spring"]  # fields that add a hand
@@ -33,11 +42,22 @@ def with_fields(part: T, changes: Mapping[str, Any]) -> T:
         ParameterError: part is not a part, there is no such field, a value was refused, or a hand
             is added incompletely.
     """
-    if not dataclasses.is_dataclass(part) or isinstance(part, type):
+    if not _is_part(part):
         raise ParameterError("part", part, "must be a part, as a Scenario")
     data, values = nested(changes), values_of(part)
     check_added_hand(values.get("operator"), data)
     return make_part(type(part), data, values)
+
+
+def _is_part(part: Any) -> bool:
+    """Whether a value has fields that are checked, as results have not."""
+    if not dataclasses.is_dataclass(part) or isinstance(part, type):
+        return False
+    try:
+        nodes_of(type(part))
+    except TypeError:
+        return False
+    return True
 
 
 def check_added_hand(old: Any, *changes: Mapping[Any, Any]) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 
 from ..arguments import part
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..formulas.constants import B_MAX
 from ..model.cells import Profile
 from ..model.clay import NOTHING, Clay
@@ -31,12 +31,12 @@ class Contact:
             fills what lies beyond: a handle that moves on meets it there, at 0 at once.
     """
 
-    K: Annotated[float, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
-    B: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 0.0
-    mass: Annotated[float, Bound(0.0, 1e6, "kg")] = 0.0
+    K: Annotated[Real, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
+    B: Annotated[Real, Bound(0.0, B_MAX, "N.s/m")] = 0.0
+    mass: Annotated[Real, Bound(0.0, 1e6, "kg")] = 0.0
     axis: Literal["x", "y", "z"] | None = None
     unilateral: bool = False
-    start: Annotated[float, Bound(-10.0, 10.0, "m")] = 0.0
+    start: Annotated[Real, Bound(-10.0, 10.0, "m")] = 0.0
 
     def __post_init__(self):
         if not self.unilateral and self.start:

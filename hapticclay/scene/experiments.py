@@ -17,7 +17,7 @@ from math import cos, radians
 from typing import Annotated, Any, ClassVar, Literal, ParamSpec
 
 from ..arguments import checked, function_of, named
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..fields import (
     ENTIRE,
     Axis,
@@ -69,8 +69,8 @@ UNIT_FORCE = constants.COUNTERWEIGHT[0] * cos(
     radians(constants.COUNTERWEIGHT[1])
 )  # on each axis [N]
 
-Gains = Annotated[tuple[float, float], Bound(0.0, 1e6, "1/kg", above=True)]
-Damping = Annotated[float, Bound(0.0, B_MAX, "N.s/m")]
+Gains = Annotated[tuple[Real, Real], Bound(0.0, 1e6, "1/kg", above=True)]
+Damping = Annotated[Real, Bound(0.0, B_MAX, "N.s/m")]
 
 
 @named
@@ -212,7 +212,7 @@ class ConstantCut(PathExperiment):
     gain: Gains = constants.GAIN
     force: Force = (1.0, 0.0)
     _: dataclasses.KW_ONLY
-    clay: Annotated[tuple[float, float], Bound(unit="m", names=("begin", "end"))] = constants.CLAY_X
+    clay: Annotated[tuple[Real, Real], Bound(unit="m", names=("begin", "end"))] = constants.CLAY_X
     material: str | None = None
 
     def scenario(self) -> Scenario:
@@ -252,14 +252,14 @@ class VariableCut(PathExperiment):
     """
 
     growth: Annotated[
-        float | Literal["30/s", "0.15/s", "0.15/sample", "none"], Bound(0.0, B_MAX, "N.s/m per s")
+        Real | Literal["30/s", "0.15/s", "0.15/sample", "none"], Bound(0.0, B_MAX, "N.s/m per s")
     ] = constants.GROWTH
     gain: Gains = constants.GAIN
     force: Force = (UNIT_FORCE, UNIT_FORCE)
     _: dataclasses.KW_ONLY
     as_printed: bool = False
-    b: Annotated[tuple[float, float], Bound(0.0, B_MAX, "N.s/m")] = constants.B_VARIABLE
-    border: Annotated[float, Bound(unit="m")] = constants.BORDER
+    b: Annotated[tuple[Real, Real], Bound(0.0, B_MAX, "N.s/m")] = constants.B_VARIABLE
+    border: Annotated[Real, Bound(unit="m")] = constants.BORDER
     length: Length = 0.10
     origin: Position = constants.ORIGIN_VARIABLE
 
@@ -293,10 +293,10 @@ class StabilityTest(Experiment):
         origin: as in Experiment [m]; the nominal pose by default.
     """
 
-    gain: Annotated[float, Bound(0.0, 1e6, "1/kg", above=True)] = constants.GAINS_FIG11[1]
+    gain: Annotated[Real, Bound(0.0, 1e6, "1/kg", above=True)] = constants.GAINS_FIG11[1]
     b: Damping = constants.B_STABILITY
     axis: Axis = "x"
-    rms: Annotated[float, Bound(0.0, 1e6, "N")] = 1.0
+    rms: Annotated[Real, Bound(0.0, 1e6, "N")] = 1.0
     seed: Seed = 0
     _: dataclasses.KW_ONLY
     operator: Operator | None = Operator()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from ..arguments import part
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 
 ENDS = ("leader", "follower")
 WAYS = ("there", "back")  # leader to follower, follower to leader
@@ -41,8 +41,8 @@ class Link:
     """
 
     kind: Literal["position-position", "position-force", "four-channel", "waves"] = KINDS[0]
-    delay: Annotated[float | tuple[float, float], Bound(0.0, 10.0, "s", names=WAYS)] = 0.0
-    jitter: Annotated[float, Bound(0.0, 10.0, "s")] = 0.0
+    delay: Annotated[Real | tuple[Real, Real], Bound(0.0, 10.0, "s", names=WAYS)] = 0.0
+    jitter: Annotated[Real, Bound(0.0, 10.0, "s")] = 0.0
     loss: Annotated[float, Bound(0.0, 0.9)] = 0.0
     scale: Annotated[
         tuple[float, float], Bound(0.0, 1e6, above=True, names=("motion", "force"))
@@ -53,10 +53,10 @@ class Link:
         0.0,
     )
     impedance: Annotated[
-        float | tuple[float, ...] | None, Bound(0.0, 1e9, "N.m.s/rad", above=True)
+        Real | tuple[Real, ...] | None, Bound(0.0, 1e9, "N.m.s/rad", above=True)
     ] = None
     passivity: bool = False
-    energy: Annotated[float | None, Bound(0.0, 1e6, "J")] = None
+    energy: Annotated[Real | None, Bound(0.0, 1e6, "J")] = None
     seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
 
     def __post_init__(self):

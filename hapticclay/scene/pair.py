@@ -12,7 +12,7 @@ from ..arguments import checked, part
 from ..arms.joint_law import JointPD, checked_law
 from ..arms.mechanism import STILL, Linear
 from ..arms.mjcf_arm import MjcfArm
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..model import arm as closed_form
 from ..model.arm import Arm
 from ..model.clay import Clay
@@ -69,13 +69,13 @@ class Pair:
     law: JointPD
     link: Link = Link()
     follower_law: JointPD | None = None
-    Ts: Annotated[float, Bound(1e-6, 1.0, "s")] = 1e-3
-    delay: Annotated[float, Bound(0.0, 10.0, "s")] = 0.0
+    Ts: Annotated[Real, Bound(1e-6, 1.0, "s")] = 1e-3
+    delay: Annotated[Real, Bound(0.0, 10.0, "s")] = 0.0
     leader_operator: Operator | None = None
     follower_clay: Contact | Clay | None = None
     axes: Annotated[tuple[int, ...] | None, Bound(-1000, 1000)] = None
     muscle: Signal | None = TOUCH
-    t_max: Annotated[float, Bound(0.0, 1e4, "s", above=True)] = 2.0
+    t_max: Annotated[Real, Bound(0.0, 1e4, "s", above=True)] = 2.0
     follower_operator: Operator | None = None
     leader_clay: Contact | Clay | None = None
     leader_hardware: Hardware | None = None

@@ -16,7 +16,7 @@ from ..arms.joint_law import JointPD, checked_law
 from ..arms.joint_ranges import outside
 from ..arms.mjcf_arm import MjcfArm
 from ..display import html_table, one_line
-from ..errors import Bound, ParameterError, choice, number, numbers_of, quantity
+from ..errors import Bound, ParameterError, Real, choice, number, numbers_of, quantity
 from ..fields import JOINTS, check_fields, dotted_names, merged_values, no_field, values_of
 from ..model import samples, shapes  # noqa: F401  # so that files and options know every Signal
 from ..model.arm import PAPER, Arm
@@ -41,15 +41,15 @@ REACH_MARGIN = 1e-3  # [m] short of the stretched and the folded arm, where no f
 FOLD_MARGIN = math.radians(1.001)  # of the elbow, likewise: a run ends at 1 degree (`monitor.FOLD`)
 
 # Types of the fields that experiments share with scenarios.
-Force = Annotated[tuple[float, float], Bound(-1e6, 1e6, "N")]
-SpaceForce = Annotated[tuple[float, float, float], Bound(-1e6, 1e6, "N", names=("x", "y", "z"))]
+Force = Annotated[tuple[Real, Real], Bound(-1e6, 1e6, "N")]
+SpaceForce = Annotated[tuple[Real, Real, Real], Bound(-1e6, 1e6, "N", names=("x", "y", "z"))]
 STEP_LEAST = 1e-6  # [s]
-StepLength = Annotated[float, Bound(STEP_LEAST, 0.02, "s")]
-Duration = Annotated[float, Bound(0.0, 1e5, "s", above=True)]
-Length = Annotated[float | None, Bound(-10.0, 10.0, "m")]
-Position = Annotated[tuple[float, float], Bound(unit="m")]
-TorqueLimit = Annotated[tuple[float, float], Bound(0.0, 1e6, "N.m", above=True, names=JOINTS)]
-SamplePeriod = Annotated[float | None, Bound("dt", 1.0, "s")]
+StepLength = Annotated[Real, Bound(STEP_LEAST, 0.02, "s")]
+Duration = Annotated[Real, Bound(0.0, 1e5, "s", above=True)]
+Length = Annotated[Real | None, Bound(-10.0, 10.0, "m")]
+Position = Annotated[tuple[Real, Real], Bound(unit="m")]
+TorqueLimit = Annotated[tuple[Real, Real], Bound(0.0, 1e6, "N.m", above=True, names=JOINTS)]
+SamplePeriod = Annotated[Real | None, Bound("dt", 1.0, "s")]
 Integrator = Literal["fast", "accurate"]
 Control = Literal["continuous", "sampled"]
 Render = Literal["held", "physical"]
@@ -111,15 +111,15 @@ class Scenario:
 
     name: str = "free"
     clay: Clay | None = None
-    gain: Annotated[tuple[float, float], Bound(0.0, 1e6, "1/kg")] = GAIN
-    force: Annotated[SpaceForce | tuple[float, float], Bound(-1e6, 1e6, "N")] = FORCE
+    gain: Annotated[tuple[Real, Real], Bound(0.0, 1e6, "1/kg")] = GAIN
+    force: Annotated[SpaceForce | tuple[Real, Real], Bound(-1e6, 1e6, "N")] = FORCE
     operator: Operator | None | tuple[Operator | None, Operator | None] = None
     inertia_shaping: bool = False
     dt: StepLength = TS
     t_max: Duration = 60.0
     length: Length = PATH_LENGTH
     start: Position = (0.0, 0.0)
-    velocity: Annotated[tuple[float, float], Bound(-10.0, 10.0, "m/s")] = (0.0, 0.0)
+    velocity: Annotated[tuple[Real, Real], Bound(-10.0, 10.0, "m/s")] = (0.0, 0.0)
     origin: Position = ORIGIN
     torque_limit: TorqueLimit = TORQUE_LIMIT
     integrator: Integrator = "fast"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from ..arguments import checked, part
-from ..errors import Bound, ParameterError, choice, number
+from ..errors import Bound, ParameterError, Real, choice, number
 from ..fields import make_part
 from ..formulas.constants import B_MAX
 from ..model.arm import Arm
@@ -40,10 +40,10 @@ class Device:
         quantum: of the position that the encoder reads, Delta [m], 0 (exact) to 1e-2.
     """
 
-    mass: Annotated[float, Bound(1e-4, 1e4, "kg")] = 0.1
-    damper: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 0.0
-    friction: Annotated[float, Bound(0.0, 1e6, "N")] = 0.0
-    quantum: Annotated[float, Bound(0.0, 1e-2, "m")] = 0.0
+    mass: Annotated[Real, Bound(1e-4, 1e4, "kg")] = 0.1
+    damper: Annotated[Real, Bound(0.0, B_MAX, "N.s/m")] = 0.0
+    friction: Annotated[Real, Bound(0.0, 1e6, "N")] = 0.0
+    quantum: Annotated[Real, Bound(0.0, 1e-2, "m")] = 0.0
 
 
 @part("wall.")
@@ -69,16 +69,16 @@ class VirtualWall:
             else it acts everywhere and the loop is linear.
     """
 
-    K: Annotated[float, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
-    B: Annotated[float, Bound(-B_MAX, B_MAX, "N.s/m")] = 0.0
-    M: Annotated[float, Bound(-MASS_MAX, MASS_MAX, "kg")] = 0.0
+    K: Annotated[Real, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
+    B: Annotated[Real, Bound(-B_MAX, B_MAX, "N.s/m")] = 0.0
+    M: Annotated[Real, Bound(-MASS_MAX, MASS_MAX, "kg")] = 0.0
     device: Device = Device()
     operator: Operator | None = None
-    Ts: Annotated[float, Bound(1e-6, 1.0, "s")] = 1e-3
-    delay: Annotated[float, Bound(0.0, 1.0, "s")] = 0.0
+    Ts: Annotated[Real, Bound(1e-6, 1.0, "s")] = 1e-3
+    delay: Annotated[Real, Bound(0.0, 1.0, "s")] = 0.0
     velocity: Literal["difference", "exact"] = "difference"
     velocity_window: Annotated[int, Bound(1, 10_000)] = 1
-    velocity_filter: Annotated[float | None, Bound(0.0, 1e6, "Hz", above=True)] = None
+    velocity_filter: Annotated[Real | None, Bound(0.0, 1e6, "Hz", above=True)] = None
     unilateral: bool = False
 
     def __post_init__(self):

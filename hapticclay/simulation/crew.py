@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -36,6 +37,7 @@ class Crew:
     def __init__(self, threads: int):
         self._threads = threads
         self._pool: ThreadPoolExecutor | None = None
+        self._process = 0  # to which its threads belong: a fork has none of them
         self._jobs: list[Job] = []
 
     @property
@@ -49,7 +51,8 @@ class Crew:
             calls[0]()
             return
         self._jobs = [Job(call) for call in calls[1:]]
-        self._pool = self._pool or ThreadPoolExecutor(self._threads)
+        if self._pool is None or self._process != os.getpid():
+            self._pool, self._process = ThreadPoolExecutor(self._threads), os.getpid()
         futures = [self._pool.submit(job) for job in self._jobs]
         calls[0]()
         for future in futures:
@@ -61,10 +64,11 @@ class Crew:
         outlast(self._end)
 
     def _end(self) -> None:
-        for job in self._jobs:
+        is_ours = self._process == os.getpid()
+        for job in self._jobs if is_ours else ():
             job.end()
         pool, self._pool = self._pool, None  # it may hold calls that are off
-        if pool is not None:
+        if pool is not None and is_ours:
             pool.shutdown(wait=False, cancel_futures=True)
         self._jobs = []
 

@@ -11,6 +11,7 @@ from ..kernel import native
 
 ENGINES = ("auto", "python", "native")
 LONG = 50_000  # steps that take Python more than a second
+STALE = "built from other sources"  # how a clone is after its sources have changed
 _notice_given = False
 
 
@@ -24,7 +25,7 @@ def engine_for(engine: str, steps: float = 0.0) -> str:
         return "native"
     if engine == "native":
         raise ParameterError("engine", engine, f"needs the compiled kernel ({why}): {remedy(why)}")
-    if steps > LONG:
+    if steps > LONG or (why.startswith(STALE) and _in_clone()):
         give_notice(why)
     return "python"
 
@@ -32,11 +33,16 @@ def engine_for(engine: str, steps: float = 0.0) -> str:
 def remedy(why: str) -> str:
     """What gets the compiled kernel."""
     root = native.PACKAGE.parent
-    again = f"pip install -e {root}" if (root / "setup.py").is_file() else "pip install . again"
+    again = f"pip install -e {root}" if _in_clone() else "pip install . again"
     if why == "not built" and _installed_elsewhere():
         return f"these are the sources: run outside {root}, where the installed one is, or {again}"
     lacks = "compiler" in why or "Python.h" in why
     return f"apt install gcc python3-dev, then {again}" if lacks else again
+
+
+def _in_clone() -> bool:
+    """Whether these are the sources, with what builds them beside them."""
+    return (native.PACKAGE.parent / "setup.py").is_file()
 
 
 def _installed_elsewhere() -> bool:

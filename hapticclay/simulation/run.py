@@ -726,7 +726,9 @@ class Run:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The samples kept, by the names of Record's arrays."""
-        indices, made, forces, extra = zip(*self.kept, strict=True)
+        more = joints.width(self.row.m) if self.row.m.general else 0
+        nothing = Kept(np.zeros(0, int), *(np.zeros((0, n)) for n in (rows.ROW, 3, more)))
+        indices, made, forces, extra = zip(*(self.kept or [nothing]), strict=True)
         t = np.concatenate(indices) * self.scenario.dt
         if self.end_time is not None and len(t):
             t[-1] = self.end_time
@@ -794,6 +796,13 @@ def check_same_run(run: Run, x: Snapshot) -> None:
     for name, now in run.kind.items():
         if x.kept[name] != now:
             raise ParameterError("snapshot", x, f"{OTHER}: {name} is {x.kept[name]!r}, not {now!r}")
+    sizes = _sizes(run.row.saved())
+    if any(_sizes(y) != sizes for y in (x.saved, x.before)) or len(x.rows) >= CHUNK:
+        raise ParameterError("snapshot", x, "must be as it was taken, by this release")
+
+
+def _sizes(saved: Saved) -> list[int]:
+    return [len(x) for x in (saved.state, *saved.arrays)]
 
 
 def _note_stop(stops: list[Stop], axis: str, begins: bool, t: float) -> None:

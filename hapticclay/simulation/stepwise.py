@@ -156,6 +156,8 @@ class Simulation:
             return
         with Alone(self, mends=False) as run:
             is_torn = run.row.is_torn
+            if not is_torn:
+                run.mend()
         if self._has_record and not is_torn:
             self.record()
         self._closed = True

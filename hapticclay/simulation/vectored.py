@@ -294,7 +294,7 @@ class VectoredRuns:
 
     def _end(self, k: int, run: Run) -> None:
         """Stores the last sample of a run that has ended."""
-        self.over[k], self.shown[k] = True, run.ending()
+        self.over[k], self.shown[k] = True, run.ending()[:SHOWN]
         self.times[k] = np.nan if run.last is None else run.sample_time()
 
     # ---- results
@@ -306,7 +306,7 @@ class VectoredRuns:
             self.pending = ("stop",)
             alone, together = self._split(stale)
             for k in alone.tolist():
-                self.shown[k] = self.runs[k].ahead()
+                self.shown[k] = self.runs[k].ahead()[:SHOWN]
             if len(together):
                 self._draw(together, 1)
                 self._call(self._peek, together)

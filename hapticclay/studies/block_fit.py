@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from .flow_models import student_quantile
 
 BLOCKS = 20  # of a record
@@ -65,7 +66,7 @@ class BlockFit:
             slopes: derivatives of the residuals by those numbers, (n, m).
             covariance: of those numbers, (m, m).
         """
-        moved, *_ = np.linalg.lstsq(self.slopes, -slopes, rcond=None)
+        moved = matrices.least_squares(self.slopes, -slopes)
         return replace(self, covariance=self.covariance + moved @ covariance @ moved.T)
 
 

@@ -10,8 +10,9 @@ from typing import Annotated, TypeVar
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError, number
+from ..errors import Bound, ParameterError, Real, number
 from ..formulas.constants import B_MAX
 from ..model.arm import Arm
 from ..model.cells import Profile
@@ -58,11 +59,11 @@ class PushedLoop(Loop):
         arm: the two-link arm.
     """
 
-    b: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 90.0
-    K: Annotated[float, Bound(0.0, 1e6, "1/kg", above=True)] = 1.0
+    b: Annotated[Real, Bound(0.0, B_MAX, "N.s/m")] = 90.0
+    K: Annotated[Real, Bound(0.0, 1e6, "1/kg", above=True)] = 1.0
     inertia_shaping: bool = True
     pose: Position = (0.0, 0.0)
-    push: Annotated[float, Bound(-10.0, 10.0, "m/s")] = SMALL_PUSH
+    push: Annotated[Real, Bound(-10.0, 10.0, "m/s")] = SMALL_PUSH
     torque_limit: TorqueLimit = TORQUE_LIMIT
     arm: Arm = Arm()
 
@@ -290,9 +291,9 @@ def pose_limit(loop: PushedLoop, most: float = 200.0) -> float:
 
     def stable(K: float) -> bool:
         if straight and not loop.Ts:
-            z = np.linalg.eigvals(pose_matrix(replace(loop, K=K)))
+            z = matrices.eigenvalues(pose_matrix(replace(loop, K=K)))
         else:
-            z = np.linalg.eigvals(first + (K - 1.0) * (second - first))
+            z = matrices.eigenvalues(first + (K - 1.0) * (second - first))
         if loop.Ts:
             return bool(np.all(np.abs(z[np.abs(z - 1.0) > 1e-4 * loop.Ts]) <= 1.0))
         return bool(np.all(z.real[np.abs(z) > 1e-4] <= 0.0))

@@ -16,6 +16,7 @@ from typing import Literal
 
 import numpy as np
 
+from .. import matrices
 from ..columns.stamps import EVEN, Stamps
 from ..errors import ParameterError
 from .outliers import robust_deviation, times
@@ -305,7 +306,7 @@ def _evidence(at: np.ndarray, k: np.ndarray, x: np.ndarray, side: int) -> float:
 def _off_cubic(t: np.ndarray, x: np.ndarray) -> float:
     """Sum of squares of what a cubic leaves of some rows."""
     powers = np.vander((t - t[0]) / (t[-1] - t[0]), 4)
-    return float(np.sum((x - powers @ np.linalg.lstsq(powers, x, rcond=None)[0]) ** 2))
+    return float(np.sum((x - powers @ matrices.least_squares(powers, x)) ** 2))
 
 
 def _stamped_late(rows: Columns) -> bool:

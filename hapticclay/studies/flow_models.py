@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import named
 from .outliers import robust_deviation
 from .sliding import Sliding
@@ -69,7 +70,7 @@ def first_guesses(law: str, v: np.ndarray, f: np.ndarray) -> np.ndarray:
         columns = {"Fy": np.ones(len(v)), "b": v, "K": v**n}
         linear = [x for x in names if x != "n"]
         X = np.stack([columns[x] for x in linear], axis=1)
-        found = np.linalg.lstsq(X, f, rcond=None)[0]
+        found = matrices.least_squares(X, f)
         a = dict(zip(linear, found.tolist(), strict=True), n=n)
         if a.get("K", 1.0) <= 0.0:  # the force falls with the speed: start almost flat
             a["K"] = 1e-3 * float(np.mean(np.abs(f))) / float(np.mean(v)) ** n

@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from .. import matrices
 from ..errors import choice
 from ..model.constants import AXES
 from ..scene.scenario import Scenario
@@ -71,11 +72,11 @@ def growth_of_run(record: Record, sample: float, slowest: float, axis: str = "x"
 def _least_damped(v: np.ndarray, dt: float, slowest: float) -> float:
     rows = min(len(v) // 2, 700)  # of a long run: all its modes, at a fraction of the cost
     hankel = np.lib.stride_tricks.sliding_window_view(v, rows).T
-    u, s, _ = np.linalg.svd(hankel, full_matrices=False)
+    u, s, _ = matrices.svd(hankel, full_matrices=False)
     r = max(1, min(int(np.sum(s > SINGULAR_SHARE * s[0])), rows // 3))
-    z = np.linalg.eigvals(np.linalg.lstsq(u[:-1, :r], u[1:, :r])[0])
+    z = matrices.eigenvalues(matrices.least_squares(u[:-1, :r], u[1:, :r]))
     z = z[np.abs(z) > 1e-6]
-    weight = np.abs(np.linalg.lstsq(_motions(z, len(v)), v.astype(complex))[0])
+    weight = np.abs(matrices.least_squares(_motions(z, len(v)), v.astype(complex)))
     rate, strong, swings = _mode_rates(z, weight, dt, slowest)
     return float(rate[swings].max()) if swings.any() else -math.inf
 
@@ -106,7 +107,7 @@ def short_growth(v: np.ndarray, dt: float) -> np.ndarray:
     v = v[good] / size[good, None]
     rows = v.shape[1] // 2
     hankel = np.lib.stride_tricks.sliding_window_view(v, rows, axis=1).transpose(0, 2, 1)
-    u, s, _ = np.linalg.svd(hankel, full_matrices=False)
+    u, s, _ = matrices.svd(hankel, full_matrices=False)
     (a, residual_a), (b, residual_b) = (
         _least_damped_of_many(v, dt, u, s, share) for share in RANKS
     )
@@ -136,7 +137,7 @@ def _least_damped_of_many(
             F += last[:, :, None] * (np.einsum("ij,ijk->ik", last, F) / rest[:, None])[:, None]
         sound = np.isfinite(F).all(axis=(1, 2)) & (rest > 1e-12)
         j, F = j[sound], F[sound]
-        z = np.linalg.eigvals(F).astype(complex)
+        z = matrices.eigenvalues(F).astype(complex)
         z[np.abs(z) < 1e-6] = 1e-6  # decayed within a sample
         powers = _motions(z, n)
         q, R = np.linalg.qr(powers)
@@ -158,10 +159,10 @@ def _least_damped_of_many(
 
 def growth_of_map(m: PeriodMap, slowest: float = SLOWEST_MODE) -> float:
     """Growth rate after a push [1/s], from the map of a period; NaN for defective modes."""
-    rate, swings = _rates(np.linalg.eigvals(m.matrix), m.period, slowest)
+    rate, swings = _rates(matrices.eigenvalues(m.matrix), m.period, slowest)
     if not (swings & (rate > -NEUTRAL / m.period)).any():
         return float(rate.max(where=swings, initial=-math.inf))
-    z, modes = np.linalg.eig(m.matrix)
+    z, modes = matrices.eigenvectors(m.matrix)
     try:
         share = np.abs((m.seen @ modes) * np.linalg.solve(modes, m.pushed))
     except np.linalg.LinAlgError:

@@ -15,9 +15,10 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import function_of, named, part
 from ..display import fields_of, table_of
-from ..errors import Bound, ParameterError, integer, numbers_of
+from ..errors import Bound, ParameterError, Real, integer, numbers_of
 from ..fields import Axis, Seed
 from ..formulas import arm as arm_law
 from ..model import arm
@@ -62,9 +63,7 @@ NOISE_ROUNDS = 3  # of a fit of the noise, each weighted by the one before; two 
 CONFIDENCE = 0.95
 
 
-Band = Annotated[
-    tuple[float, float] | None, Bound(0.0, unit="Hz", above=True, names=("low", "high"))
-]
+Band = Annotated[tuple[Real, Real] | None, Bound(0.0, unit="Hz", above=True, names=("low", "high"))]
 
 
 @part("noise.")
@@ -77,7 +76,7 @@ class Noise:
     """
 
     encoder_counts: Annotated[int, Bound(100, 2**40)] = 65_536
-    force: Annotated[float, Bound(0.0, 1e3, "N")] = 0.02
+    force: Annotated[Real, Bound(0.0, 1e3, "N")] = 0.02
 
 
 @named
@@ -298,11 +297,11 @@ class Identification:
     noise: Noise | None = None
     seed: Seed = 0
     band: Band = None
-    period: Annotated[float | None, Bound(0.1, 1000.0, "s")] = None
+    period: Annotated[Real | None, Bound(0.1, 1000.0, "s")] = None
     periods: Annotated[int, Bound(1, 1000)] = 2
     realisations: Annotated[int, Bound(1, 1000)] = REALISATIONS
     lines: Annotated[int, Bound(3, 100_000)] = MULTISINE_LINES
-    amplitude: Annotated[float | None, Bound(0.0, 1.0, "m", above=True)] = None
+    amplitude: Annotated[Real | None, Bound(0.0, 1.0, "m", above=True)] = None
     control: Control = "continuous"
     dt: float = TS
     progress: Callable[[int, int], None] | None = None
@@ -566,7 +565,7 @@ def _linear(what: str, frequency: np.ndarray, H: np.ndarray, dt: float | None) -
         A = np.stack((1.0 / H, -s, -np.ones_like(s)), axis=1) / size[:, None]
         b = s2 / size + 0j
     both = np.concatenate((A.real, A.imag)), np.concatenate((b.real, b.imag))
-    return np.linalg.lstsq(*both, rcond=None)[0]
+    return matrices.least_squares(*both)
 
 
 def unit_of(unit: str, rotary: bool) -> str:

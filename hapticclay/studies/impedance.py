@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..model.constants import AXES
 from ..model.signals import Multisine
 from ..results import Result, figure_of
@@ -135,8 +135,8 @@ def measure_impedance(
     *,
     band: tuple[float, float] = IMPEDANCE_BAND,
     lines: int = IMPEDANCE_LINES,
-    period: Annotated[float, Bound(0.1, 1000.0, "s")] = IMPEDANCE_PERIOD,
-    amplitude: Annotated[float, Bound(0.0, 0.1, "m", above=True)] = MOTION,
+    period: Annotated[Real, Bound(0.1, 1000.0, "s")] = IMPEDANCE_PERIOD,
+    amplitude: Annotated[Real, Bound(0.0, 0.1, "m", above=True)] = MOTION,
     seed: Annotated[int, Bound(0, 2**32 - 1)] = 0,
 ) -> MeasuredImpedance:
     """Measure the impedance of a loop or a wall by a run, and compute it.

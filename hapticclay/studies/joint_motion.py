@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
 from ..errors import ParameterError
 from ..results import Result, Tables
@@ -143,15 +144,15 @@ def modes_of_motion(q: np.ndarray, period: float, frequency: float) -> tuple[lis
     rows = min(len(x) // 2, max(ROWS // n, LEAST_ROWS))
     windows = np.lib.stride_tricks.sliding_window_view(x, rows, axis=0)
     hankel = windows.transpose(2, 1, 0).reshape(rows * n, -1)
-    u, size, _ = np.linalg.svd(hankel, full_matrices=False)
+    u, size, _ = matrices.svd(hankel, full_matrices=False)
     r = max(1, min(int(np.sum(size > RANKED * size[0])), len(size) // 2))
     u = u[:, :r]
-    z = np.linalg.eigvals(np.linalg.lstsq(u[:-n], u[n:])[0])
+    z = matrices.eigenvalues(matrices.least_squares(u[:-n], u[n:]))
     z = z[np.abs(z) > 1e-6].astype(complex)
     s = np.log(z) / (skip * period)
     late = np.where(np.abs(z) > 1.0, len(x) - 1, 0)  # one that grows fast would hide the others
     powers = np.exp((np.arange(len(x))[:, None] - late) * np.log(z))
-    weights = np.linalg.lstsq(powers, x.astype(complex))[0]
+    weights = matrices.least_squares(powers, x.astype(complex))
     rest = float(np.linalg.norm(powers @ weights - x) / np.linalg.norm(x))
     parts = zip(s, np.abs(weights), strict=True)
     return [Mode(complex(a.real, abs(a.imag)), row) for a, row in parts], rest

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
 from ..arms.joint_law import JointPD, compensated
 from ..arms.joint_ranges import without_ranges
@@ -227,7 +228,7 @@ def _beside(study: Study, factor: float) -> _Beside:
 
 def expected_mode(loop: JointLoop) -> Mode:
     """The motion of a map that grows fastest, or decays most slowly."""
-    values, vectors = np.linalg.eig(loop.map())
+    values, vectors = matrices.eigenvectors(loop.map())
     i = int(np.argmin(np.abs(np.abs(values) - loop.radius())))
     s = np.log(complex(values[i])) / loop.Ts
     return Mode(complex(s.real, abs(s.imag)), np.abs(vectors[: loop.n, i]))

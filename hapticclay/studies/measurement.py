@@ -21,9 +21,8 @@ from ..columns.stamps import times_of
 from ..display import brief
 from ..errors import ParameterError, array_of, choice
 from ..units import parse_unit
-from .even_columns import Between, Restarted, even_columns, unwrapped_where, wrap_note
-from .missing_cells import whole_rows
-from .restarts import episodes
+from .even_columns import Between, even_columns, unwrapped_where, wrap_note
+from .missing_cells import even_rows
 
 COLUMNS = {  # columns of a file and their contents
     "t": "time [s]",
@@ -174,24 +173,9 @@ def measured(log: Log, names: Mapping[str, str], between: Between = "spline") ->
     if len(at):
         cells["output"] = raw * log.size(log.place(names["output"]), UNITS["output"])[0]
         notes.append(wrap_note(turn, at, cells["t"]))
-    first = [name for name in names.values() if f"{name}#2" in log.names]
-    notes += [f"{name} is the first of the columns of this name" for name in first]
-    _check_filled(log, cells, names)
-    cells, more = whole_rows(cells, names, {"input": between})
-    try:
-        made = even_columns(cells, between)
-    except Restarted as error:
-        found = episodes(log, names["t"])
-        raise error.told_apart_by(found.where() if found else "") from None
-    given: dict[str, Any] = {**made.columns, "notes": (*notes, *more, *made.notes)}
+    made = even_rows(log, cells, names, between)
+    given: dict[str, Any] = {**made.columns, "notes": (*notes, *made.notes)}
     return Measurement(**given, name=log.path.name, rotary=_is_rotary(log, names))
-
-
-def _check_filled(log: Log, cells: Mapping[str, np.ndarray], names: Mapping[str, str]) -> None:
-    """Refuses a column without a number."""
-    for key, x in cells.items():
-        if len(x) and not np.isfinite(x).any():
-            raise log.table.bad_cell(0, log.place(names[key]))
 
 
 def _is_rotary(log: Log, names: Mapping[str, str]) -> bool:

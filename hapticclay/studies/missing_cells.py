@@ -11,10 +11,31 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..columns.log import Log
 from ..columns.stamps import Stamps
-from .even_columns import Between, Columns
+from .even_columns import Between, Columns, Even, Restarted, even_columns
+from .restarts import episodes
 
 SHARED = 0.5  # of a column's rows: those of topics side by side share fewer with the others
+
+
+def even_rows(log: Log, cells: Columns, names: Mapping[str, str], between: Between) -> Even:
+    """Columns of a log at even times, without missing cells, and what was done.
+
+    `names`: of the columns in the file; `between`: how the input is between the rows.
+    """
+    for key, x in cells.items():
+        if len(x) and not np.isfinite(x).any():
+            raise log.table.bad_cell(0, log.place(names[key]))
+    first = [name for name in names.values() if f"{name}#2" in log.names]
+    notes = [f"{name} is the first of the columns of this name" for name in first]
+    cells, more = whole_rows(cells, names, {"input": between})
+    try:
+        made = even_columns(cells, between)
+    except Restarted as error:
+        runs = episodes(log, names["t"])
+        raise error.told_apart_by(runs.where() if runs else "") from None
+    return Even(made.columns, (*notes, *more, *made.notes))
 
 
 def whole_rows(

@@ -13,9 +13,10 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
 from ..display import fields_of, table_of
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..results import Result
 from .block_fit import BlockFit, Unknown, block_fit
 from .coulomb_axis import Axis, follow
@@ -23,6 +24,7 @@ from .pair_laws import (
     Motion,
     PairLaw,
     delayed,
+    fit_following,
     fit_law,
     fit_reflection,
     fitted_rows,
@@ -49,6 +51,10 @@ PUSHED_TOLD = (
 ALIKE_TOLD = (
     "P, D and lag of the {} are not told apart: the error moves at one frequency, where many laws "
     "make the same torque; move at several"
+)
+UNTOLD = (
+    "no torque of the follower was logged: gains, friction, inertia and contact are left out; name "
+    "its column follower_torque=NAME"
 )
 MISFIT = 0.02  # of a torque that a law leaves, above which a warning is given
 
@@ -118,10 +124,20 @@ class IdentifiedPair(Result):
         known = ", ".join(x.name for x in self.numbers)
         raise ParameterError("name", name, f"must be one of {known}")
 
+    @property
+    def torque_known(self) -> bool:
+        """Whether the torque of the follower was logged."""
+        return any(x.name == "P" for x in self.numbers)
+
     def headline(self) -> str:
         """The architecture, the gains and the error in one line."""
-        P, D = self["P"], self["D"]
-        told = f"{self.architecture}: P {P.value:.4g} N.m/rad, D {D.value:.3g} N.m.s/rad"
+        if self.torque_known:
+            P, D = self["P"], self["D"]
+            told = f"{self.architecture}: P {P.value:.4g} N.m/rad, D {D.value:.3g} N.m.s/rad"
+        else:
+            late, lag, share = self["delay"], self["lag"], self["explained"]
+            told = f"the follower is {late.value:.3f} s late and lags by {lag.value:.3f} s, which "
+            told += f"explains {100.0 * share.value:.3g} % of its error"
         told += f"; leader less follower {1e3 * self.rms:.3f} mrad rms"
         if math.isnan(self.simulated_rms):
             return told
@@ -148,7 +164,7 @@ class IdentifiedPair(Result):
 def identify_pair(
     log: PairLog,
     *,
-    band: Annotated[float, Bound(0.1, 1e5, "Hz")] = BAND,
+    band: Annotated[Real, Bound(0.1, 1e5, "Hz")] = BAND,
     level: Annotated[float, Bound(0.5, 0.999)] = 0.95,
 ) -> IdentifiedPair:
     """Finds gains, delays, friction and inertia of a pair from its log, each with an interval.
@@ -156,7 +172,8 @@ def identify_pair(
     The follower's law is u = P x + D dx/dt, x the error behind a first-order filter or a delay,
     whichever fits better. The leader has the same law (position-position), or is pushed by the
     follower's force (position-force). A follower that touches nothing gives inertia and friction,
-    one that pushes a spring the stiffness.
+    one that pushes a spring the stiffness. Without the follower's torque it is taken as a delayed
+    and lagged leader: delay, lag, scale, and the share of the error that they explain.
 
     Args:
         log: the log.
@@ -166,16 +183,19 @@ def identify_pair(
     Raises:
         ParameterError: an argument is wrong, or the log is too short for the band.
     """
+    if log.follower_torque is None:
+        return _followed(log, level)
     band = min(band, OF_RATE / log.Ts)
     if len(log.t) * log.Ts * band < 40.0:
         bound = f"must last {40.0 / band:.3g} s or more for fits up to {band:.3g} Hz"
         raise ParameterError("log", f"{len(log.t) * log.Ts:.3g} s", bound)
-    law, fit = fit_law(Motion(log.t, log.follower, log.leader, log.follower_torque), band, level)
+    torque = log.torque
+    law, fit = fit_law(Motion(log.t, log.follower, log.leader, torque), band, level)
     numbers, warnings = _law_numbers("", law, fit), list(log.notes)
     if math.isnan(numbers[0].low):
         warnings.append(ALIKE_TOLD.format("follower"))
-    if fit.rms > MISFIT * float(np.std(log.follower_torque)):
-        share = fit.rms / float(np.std(log.follower_torque))
+    if fit.rms > MISFIT * float(np.std(torque)):
+        share = fit.rms / float(np.std(torque))
         warnings.append(f"the law leaves {100.0 * share:.2g} % of the follower's torque")
     architecture, more = _leader(log, band, level)
     numbers += more
@@ -203,6 +223,25 @@ def identify_pair(
         float(np.std(error[after])),
         float(np.std(simulated[after])) if len(simulated) else math.nan,
         tuple(axis) if axis else None, tuple(warnings),
+    )  # fmt: skip
+
+
+def _followed(log: PairLog, level: float) -> IdentifiedPair:
+    """Delay and lag of a follower behind its leader, where no torque was logged."""
+    model, fit = fit_following(log.t, log.leader, log.follower, level)
+    names = (("delay", "s"), ("lag", "s"), ("scale", "1"), ("offset", "rad"))
+    numbers = [_number(name, unit, fit, i) for i, (name, unit) in enumerate(names)]
+    error, simulated = log.leader - log.follower, log.leader - model
+    after = log.t >= log.t[0] + SETTLED
+    rms, off = float(np.std(error[after])), float(np.std((error - simulated)[after]))
+    share = 1.0 - (off / rms) ** 2 if rms > 0.0 else math.nan
+    numbers.append(PairNumber("explained", "1", share, math.nan, math.nan))
+    warnings = [*log.notes, UNTOLD]
+    if share < EXPLAINS:
+        warnings.append("delay and lag explain less than half of the error: is it this leader's?")
+    return IdentifiedPair(
+        log.name, "unknown", tuple(numbers), level, log.t, error, simulated, rms,
+        float(np.std(simulated[after])), None, tuple(warnings),
     )  # fmt: skip
 
 
@@ -245,7 +284,7 @@ def _leader(log: PairLog, band: float, level: float) -> tuple[str, list[PairNumb
 
 def _is_free(log: PairLog) -> bool:
     """Whether the follower touches nothing, as far as its force shows."""
-    return log.force is None or float(np.std(log.force)) < FREE * float(np.std(log.follower_torque))
+    return log.force is None or float(np.std(log.force)) < FREE * float(np.std(log.torque))
 
 
 def _mechanics(
@@ -282,7 +321,7 @@ def _weak_inertia(log: PairLog, axis: Axis) -> list[str]:
     T, band = log.Ts, min(0.5 * MECHANICS, OF_RATE / log.Ts)
     a = np.gradient(np.gradient(low_passed(log.follower, T, band), T), T)
     rows = fitted_rows(len(a), T, band)
-    share = axis.J * float(np.std(a[rows]) / np.std(log.follower_torque))
+    share = axis.J * float(np.std(a[rows]) / np.std(log.torque))
     if share >= INERTIAL:
         return []
     return [
@@ -294,12 +333,12 @@ def _weak_inertia(log: PairLog, axis: Axis) -> list[str]:
 def _axis_guess(log: PairLog) -> list[Unknown]:
     """Inertia, friction and offset by linear least squares on smooth columns."""
     T, band = log.Ts, min(MECHANICS, OF_RATE / log.Ts)
-    q, u = (low_passed(x, T, band) for x in (log.follower, log.follower_torque))
+    q, u = (low_passed(x, T, band) for x in (log.follower, log.torque))
     v = np.gradient(q, T)
     rows, fast = fitted_rows(len(q), T, band), 0.1 * float(np.std(v)) or 1.0
     columns = (np.gradient(v, T), v, np.tanh(v / fast), np.ones_like(v))
     A = np.column_stack([x[rows] for x in columns])
-    J, b, friction, offset = np.linalg.lstsq(A, u[rows], rcond=None)[0].tolist()
+    J, b, friction, offset = matrices.least_squares(A, u[rows]).tolist()
     torque = float(np.std(u)) or 1.0
     J = J if J > 0.0 else torque / (float(np.std(columns[0])) or 1.0)
     b_size = max(abs(b), 0.1 * torque / (float(np.std(v)) or 1.0))
@@ -326,7 +365,7 @@ def _contact(log: PairLog, law: PairLaw, band: float, level: float) -> list[Pair
     assert log.force is not None
     pairs = (
         ("contact stiffness", log.follower, log.force),
-        ("contact stiffness, motor", log.follower, log.follower_torque),
+        ("contact stiffness, motor", log.follower, log.torque),
         ("felt, measured", log.leader, log.leader_torque),
     )
     fits = {

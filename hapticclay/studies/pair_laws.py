@@ -9,10 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from .block_fit import BlockFit, Unknown, block_fit
 
 LATEST = 0.4  # [s] largest delay that is looked for
 TRIED = 24  # delays tried, evenly spaced up to a few samples, then in their logarithm
+LONGEST = 2.0  # [s] of delay and lag of a follower whose torque is unknown
+LINES = 8  # between rows: of a sine of a tenth of the rate they leave (2 pi/80)^2/12 = 5e-4
+SETTLES = 0.5  # [s] in which its start is forgotten
 LAGS = (0.0, 3.0)  # [samples] tried at the start
 EARLY = 2.0  # [samples] by which one column may be ahead of another
 ORDER = 4  # of the low-pass ahead of a fit, without phase
@@ -147,7 +151,7 @@ def apart(law: PairLaw, m: Motion, band: float) -> float:
     sizes = np.linalg.norm(columns, axis=0)
     if not np.all(sizes > 0.0):
         return 0.0
-    return float(np.linalg.svd(columns / sizes, compute_uv=False)[-1])
+    return float(matrices.singular_values(columns / sizes)[-1])
 
 
 def _fit(m: Motion, band: float, filters: bool, level: float) -> tuple[PairLaw, BlockFit]:
@@ -212,6 +216,71 @@ def fit_reflection(
     return block_fit(rest, unknowns, level, STEP)
 
 
+def followed(
+    t: np.ndarray, leader: np.ndarray, delay: float, lag: float, start: float, parts: int = 0
+) -> np.ndarray:
+    """A first-order lag behind a delayed leader, (n,); it begins at a position.
+
+    As a filter that is computed once a row, where the leader at t - delay acts for the row up to t;
+    or in continuous time, behind a leader that moves in that many lines from row to row.
+    """
+    from scipy.interpolate import CubicSpline
+    from scipy.signal import lfilter
+
+    n, fine = len(t), max(parts, 1)
+    times = np.interp(np.arange(fine * (n - 1) + 1) / fine, np.arange(n), t)
+    T, u = float(t[-1] - t[0]) / (n - 1) / fine, leader
+    if delay or fine > 1:
+        u = CubicSpline(t, leader)(np.clip(times - delay, t[0], t[-1]))
+    a = math.exp(-T / lag) if lag > 0.0 else 0.0
+    now = 1.0 - (lag / T * (1.0 - a) if parts else a)
+    return lfilter([now, 1.0 - a - now], [1.0, -a], u, zi=[start - now * u[0]])[0][::fine]
+
+
+def fit_following(
+    t: np.ndarray, leader: np.ndarray, follower: np.ndarray, level: float
+) -> tuple[np.ndarray, BlockFit]:
+    """A follower as a delayed, lagged and scaled leader: it, and delay, lag, scale and offset.
+
+    By row or in continuous time, whichever leaves less.
+    """
+    tries = [_following(t, leader, follower, level, parts) for parts in (0, LINES)]
+    return min(tries, key=lambda x: x[1].rms)
+
+
+def _following(
+    t: np.ndarray, leader: np.ndarray, follower: np.ndarray, level: float, parts: int
+) -> tuple[np.ndarray, BlockFit]:
+    T, begin = float(t[-1] - t[0]) / (len(t) - 1), float(follower[0])
+    delays, lags = [*_delays(t), *_later(t)], [0.0, *_delays(t)[1:]]
+    rows = slice(min(math.ceil(SETTLES / T), len(t) // 4), None)
+    y = follower[rows]
+
+    def model(delay: float, lag: float, scale: float, offset: float) -> np.ndarray:
+        start = (begin - offset) / scale if scale else begin
+        return offset + scale * followed(t, leader, delay, lag, start, parts)
+
+    def solved(delay: float, lag: float) -> tuple[np.ndarray, float]:
+        x = followed(t, leader, delay, lag, begin, min(parts, 1))[rows]
+        return _solved((x, np.ones_like(x)), y)
+
+    delay, lag = min(((d, k) for d in delays for k in lags), key=lambda x: solved(*x)[1])
+    scale, offset = solved(delay, lag)[0].tolist()
+    unknowns = (
+        Unknown(delay, 0.0, LONGEST, T),
+        Unknown(max(lag, 0.1 * T), 0.0, LONGEST, T),
+        Unknown(scale, -100.0, 100.0, 1.0),
+        Unknown(offset, -math.inf, math.inf, float(np.std(follower))),
+    )
+    found = block_fit(lambda v: model(*v.tolist())[rows] - y, unknowns, level, STEP)
+    return model(*found.values.tolist()), found
+
+
+def _later(t: np.ndarray) -> list[float]:
+    """Delays beyond those of a control loop, as those of networks and cameras [s]."""
+    return [x for x in (0.5, 0.65, 0.8, 1.0) if x < (t[-1] - t[0]) / 8.0]
+
+
 def _delays(t: np.ndarray) -> list[float]:
     """Delays to try at the start [s]."""
     T = float(t[-1] - t[0]) / (len(t) - 1)
@@ -222,5 +291,5 @@ def _delays(t: np.ndarray) -> list[float]:
 def _solved(columns: tuple[np.ndarray, ...], y: np.ndarray) -> tuple[np.ndarray, float]:
     """Linear least squares, and the sum of squares that is left."""
     A = np.column_stack(columns)
-    gains, *_ = np.linalg.lstsq(A, y, rcond=None)
+    gains = matrices.least_squares(A, y)
     return gains, float(np.sum((y - A @ gains) ** 2))

@@ -11,10 +11,12 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..columns.log import Log, Reading, open_log
+from ..columns.stamps import times_of
 from ..display import brief, one_line
 from ..errors import ParameterError, choice
-from .even_columns import even_columns, unwrapped, wrap_note
+from .even_columns import unwrapped_where, wrap_note
 from .measurement import check_sampling, column_of
+from .missing_cells import even_rows
 
 COLUMNS = {  # columns of a log and their contents
     "t": "time [s]",
@@ -28,7 +30,7 @@ UNITS = {"t": ("s",), "leader": ("rad",), "follower": ("rad",)} | {
     name: ("N.m",) for name in ("leader_torque", "follower_torque", "force")
 }
 SPELLINGS = {  # of a column's name in lower case without its sign
-    "t": ("t", "time"),
+    "t": ("t", "time", "timestamp"),
     "leader": ("leader", "master", "x_m", "q_m", "x_l", "q_l"),
     "follower": ("follower", "slave", "x_s", "q_s", "x_f", "q_f"),
     "leader_torque": ("leader_torque", "tau_rm", "tau_m", "tau_l"),
@@ -36,7 +38,8 @@ SPELLINGS = {  # of a column's name in lower case without its sign
     "force": ("force", "f_e", "fe", "tau_e"),
 }
 OUTPUT = {"follower": "output"}  # the motion by which it is judged whether stamps are late
-OPTIONAL = ("leader_torque", "force")
+OPTIONAL = ("follower_torque", "leader_torque", "force")
+SIDES = (("leader", "master"), ("follower", "slave"))  # names that are those of a pair alone
 
 
 @named
@@ -50,7 +53,7 @@ class PairLog:
         t: time [s], (n,), n >= 100; no step differs from the mean one by more than 5 %.
         leader: position of the leader [rad], (n,).
         follower: position of the follower [rad], (n,).
-        follower_torque: torque of the follower's motor [N.m], (n,).
+        follower_torque: torque of the follower's motor [N.m], (n,); None if it was not logged.
         leader_torque: torque of the leader's motor [N.m], (n,); None if it was not logged.
         force: torque of the follower on what it touches [N.m], (n,); None without a sensor.
         name: name in titles and files.
@@ -67,7 +70,7 @@ class PairLog:
     t: np.ndarray
     leader: np.ndarray
     follower: np.ndarray
-    follower_torque: np.ndarray
+    follower_torque: np.ndarray | None = None
     leader_torque: np.ndarray | None = None
     force: np.ndarray | None = None
     name: str = "pair"
@@ -81,13 +84,21 @@ class PairLog:
         check_sampling(self.t)
         for column in ("leader", "follower", "follower_torque"):
             value = getattr(self, column)
-            if np.ptp(value) == 0.0:
+            if value is not None and np.ptp(value) == 0.0:
                 raise ParameterError(column, float(value[0]), "must change; it is constant")
 
     @property
     def Ts(self) -> float:
         """Mean step [s]."""
         return float(self.t[-1] - self.t[0]) / (len(self.t) - 1)
+
+    @property
+    def torque(self) -> np.ndarray:
+        """Torque of the follower's motor [N.m], (n,)."""
+        if self.follower_torque is None:
+            bound = f"must have the {COLUMNS['follower_torque']}"
+            raise ParameterError("follower_torque", None, bound)
+        return self.follower_torque
 
     @classmethod
     @checked
@@ -129,26 +140,33 @@ def logged(log: Log, columns: Mapping[str, str]) -> PairLog:
     columns = {"t": log.clock, **columns} if log.clock else columns
     wanted = {_plain(w): key for key, words in SPELLINGS.items() for w in words}
     wanted |= {_plain(w): key for key, w in columns.items()}
-    found = {}
+    found: dict[str, np.ndarray] = {}
+    names: dict[str, str] = {}
+    notes: list[str] = []
     for i, head in enumerate(log.table.heads):
         if key := wanted.get(_plain(head.text), wanted.get(_plain(head.name))):
-            found[head.name] = log.size(i, UNITS[key])[0] * log.table.numbers(i)
-    cells, notes = _chosen(log.path, found, columns, log.names), []
+            found[head.name] = log.size(i, UNITS[key])[0] * log.table.numbers(i, holes=True)
+            names[key] = head.text
+    cells = _chosen(log.path, found, columns, log.names)
+    cells["t"], more = times_of(log, names["t"], holes=True)
     for side in ("leader", "follower"):
-        cells[side], turn, at = unwrapped(cells[side])
+        cells[side], turn, at = unwrapped_where(cells[side])
         notes += [wrap_note(turn, at, cells["t"])] if len(at) else []
-    made = even_columns({OUTPUT.get(key, key): x for key, x in cells.items()})
-    names = {new: key for key, new in OUTPUT.items()}
-    even: dict[str, Any] = {names.get(key, key): x for key, x in made.columns.items()}
-    return PairLog(**even, name=log.path.stem, notes=(*notes, *made.notes))
+    rows = {OUTPUT.get(key, key): x for key, x in cells.items()}
+    names = {OUTPUT.get(key, key): x for key, x in names.items()}
+    made = even_rows(log, rows, names, "spline")
+    own = {new: key for key, new in OUTPUT.items()}
+    even: dict[str, Any] = {own.get(key, key): x for key, x in made.columns.items()}
+    return PairLog(**even, name=log.path.stem, notes=(*more, *notes, *made.notes))
 
 
 def is_pair(log: Log, unfit: Collection[str] = ()) -> bool:
     """Whether columns of a log are those of a pair, by their names; not those that are unfit."""
     names = {_plain(head.name) for head in log.table.heads if head.text not in unfit}
     names |= {"t"} if log.clock else set()
-    wanted = (key for key in COLUMNS if key not in OPTIONAL)
-    return all(names.intersection(SPELLINGS[key]) for key in wanted)
+    wanted = [SPELLINGS[key] for key in COLUMNS if key not in OPTIONAL]
+    sure = names.intersection(SPELLINGS["follower_torque"]) or all(map(names.intersection, SIDES))
+    return bool(sure) and all(map(names.intersection, wanted))
 
 
 # ---- files ---------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named, part
-from ..errors import Bound, ParameterError, choice, number
+from ..errors import Bound, ParameterError, Real, choice, number
 from ..fields import Seed
 from ..model.operator import Operator
 from ..results import Result
@@ -46,9 +46,9 @@ class Hands:
             published.
     """
 
-    mass: Annotated[float | Distribution, Bound(0.0, unit="kg")]
-    damper: Annotated[float | Distribution, Bound(0.0, unit="N.s/m")]
-    spring: Annotated[float | Distribution, Bound(0.0, unit="N/m")]
+    mass: Annotated[Real | Distribution, Bound(0.0, unit="kg")]
+    damper: Annotated[Real | Distribution, Bound(0.0, unit="N.s/m")]
+    spring: Annotated[Real | Distribution, Bound(0.0, unit="N/m")]
     source: str = ""
     spread: str = ""
     subjects: Annotated[int, Bound(0, 1_000_000)] = 0

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, part
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..formulas import hardware
 from ..model.hardware import Hardware
 from ..model.samples import Samples
@@ -53,8 +53,8 @@ class Path:
             shape (n,); empty if it does not.
     """
 
-    places: Annotated[tuple[float, ...], Bound(-0.1, 0.1, "m")]
-    middles: Annotated[tuple[float, ...], Bound(-0.1, 0.1, "m")] = ()
+    places: Annotated[tuple[Real, ...], Bound(-0.1, 0.1, "m")]
+    middles: Annotated[tuple[Real, ...], Bound(-0.1, 0.1, "m")] = ()
 
     def __post_init__(self):
         if len(self.places) < 2:
@@ -64,14 +64,14 @@ class Path:
             raise ParameterError("path.middles", self.middles, bound)
 
 
-Amplitude = Annotated[float, Bound(0.0, 0.1, "m", above=True)]
+Amplitude = Annotated[Real, Bound(0.0, 0.1, "m", above=True)]
 Turn = Annotated[tuple[float, float], Bound(1.0, 1e6, names=("p", "q"))]
 Periods = Annotated[int, Bound(1, 10_000)]
 Steps = Annotated[int, Bound(2, 10_000)]
 
 
 @checked
-def zigzag(amplitude: Amplitude, about: Annotated[float, Bound(-0.1, 0.1, "m")] = 0.0) -> Path:
+def zigzag(amplitude: Amplitude, about: Annotated[Real, Bound(-0.1, 0.1, "m")] = 0.0) -> Path:
     """The path at half the sampling frequency, synchronous with the samples: a triangle.
 
     Per sample a wall K with damper B delivers 2 A^2 (K + 2 B/Ts) along it, and a damper b

@@ -8,8 +8,9 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked
-from ..errors import Bound, ParameterError, numbers_of
+from ..errors import Bound, ParameterError, Real, numbers_of
 from ..fields import Axis
 from .even_columns import held_rows
 from .identification import (
@@ -51,7 +52,7 @@ USUAL, FAR_BEYOND = 0.99, 2.0  # quantile of a column, and times that an impossi
 NEIGHBOURS = 20  # lines to each side over which noise is averaged, at most
 WEIGHT_ROUNDS = 4  # of fit and noise; the weights settle in two
 
-Delay = Annotated[float, Bound(-1.0, 1.0, "s")]
+Delay = Annotated[Real, Bound(-1.0, 1.0, "s")]
 HELD = "the input changes only every {} rows, as a computer holds it: state it by held (--held)"
 Timing = tuple[bool, float]  # whether the input is held, and the delay of the position [s]
 # frequency [Hz], response, its deviation, coherence
@@ -510,7 +511,7 @@ def _solve(columns: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
     A = real_and_imaginary(columns.T).T
     size = np.linalg.norm(A, axis=0)
     A = A / size
-    found = np.linalg.lstsq(A, real_and_imaginary(y), rcond=None)[0]
+    found = matrices.least_squares(A, real_and_imaginary(y))
     return found / size, float(np.sum((real_and_imaginary(y) - A @ found) ** 2))
 
 
@@ -543,7 +544,7 @@ def _orthogonal(
         J, Z = (real_and_imaginary(_slopes(what, x, u, theta).T / noise).T for u in (x.u, known))
         size = np.linalg.norm(Z, axis=0)
         left = real_and_imaginary(_misfit(what, x, theta) / noise)
-        step = np.linalg.lstsq((Z / size).T @ J / size, (Z / size).T @ left, rcond=None)[0] / size
+        step = matrices.least_squares((Z / size).T @ J / size, (Z / size).T @ left) / size
         theta = theta + step
         if np.all(np.abs(step[:3]) <= 1e-9 * np.abs(theta[:3])):
             break

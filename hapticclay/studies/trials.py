@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from ..arguments import part
-from ..errors import Bound, ParameterError, integer
+from ..errors import Bound, ParameterError, Real, integer
 from ..scene.changes import nested, with_fields
 from ..scene.scenario import Scenario
 from .distribution import Distribution
@@ -62,7 +62,7 @@ class Trials(Plan):
     hands: str | Hands | None = None
     grid: dict[str, Range] = field(default_factory=dict)
     runs: Annotated[int, Bound(1, MOST_RUNS)] = 1000
-    push: Annotated[float | None, Bound(1e-9, 1.0, "m/s")] = None
+    push: Annotated[Real | None, Bound(1e-9, 1.0, "m/s")] = None
     seed: Annotated[int, Bound(0, 2**32 - 1)] = 0
     chunk: Annotated[int, Bound(1, 100_000)] = 1000  # pyright: ignore[reportIncompatibleVariableOverride]
 

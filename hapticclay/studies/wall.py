@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from ..arguments import part
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..model.constants import AXES
 from ..model.operator import Operator
 from ..model.shapes import Constant
@@ -38,6 +38,7 @@ DEEPEST = 5e-3  # [m] depth to which the force presses into the wall, so that th
 REST_SAMPLES = 1000  # of the first run that is judged by its rest
 REST_SWINGS = 10.0  # its periods, at least
 REST_MOST = 20_000  # samples of that first run, at most
+STILL = 1e-6  # [m] of motion that counts as rest where no coarser encoder hides more
 TRIAL_PUSH = 1e-6  # [m/s] so small that the arm stays linear to 1e-6
 SAMPLE_PUSH = 1e-7  # [m] per sample, for a device: above rounding, and far below the arm's length
 
@@ -54,13 +55,23 @@ class Press:
             to the middle between two forces that the encoder can resolve, where rest is least
             likely.
         speed: impact speed of the device [m/s], 0 to 1.
-        still: largest peak-to-peak motion that counts as rest [m], 1e-9 to 1e-2. A gripping hand
-            feels less than 1 um at 150 to 200 Hz (Brisben, Hsiao, Johnson 1999).
+        still: largest peak-to-peak motion that counts as rest [m], 1e-9 to 1e-2; None for 1 um, or
+            a count of the encoder where that is larger. A gripping hand feels less than 1 um at 150
+            to 200 Hz (Brisben, Hsiao, Johnson 1999), but a loop cannot stop what its encoder does
+            not see.
     """
 
-    force: Annotated[float, Bound(0.0, 1e3, "N")] = 1.0
-    speed: Annotated[float, Bound(0.0, 1.0, "m/s")] = boundary.LARGE_PUSH
-    still: Annotated[float, Bound(1e-9, 1e-2, "m")] = 1e-6
+    force: Annotated[Real, Bound(0.0, 1e3, "N")] = 1.0
+    speed: Annotated[Real, Bound(0.0, 1.0, "m/s")] = boundary.LARGE_PUSH
+    still: Annotated[Real | None, Bound(1e-9, 1e-2, "m")] = None
+
+    def rest(self, quantum: float) -> float:
+        """Largest motion that counts as rest [m].
+
+        Args:
+            quantum: distance per count of the encoder [m]; 0 for no encoder.
+        """
+        return max(STILL, quantum) if self.still is None else self.still
 
 
 class GrowthRun(NamedTuple):
@@ -334,8 +345,8 @@ class DeviceWall(Wall):
         return w.scenario(n * w.Ts, push=press.speed, muscle=muscle, steps=steps)
 
     def trial(self, t_max: float, push: float | None) -> Scenario:
-        push = push or min(SAMPLE_PUSH / self.subject.Ts, 1.0)
-        return self.subject.scenario(t_max, push=push, steps=self.engine_steps(GROWTH_STEPS))
+        speed = push or min(SAMPLE_PUSH / self.subject.Ts, 1.0)
+        return self.subject.scenario(t_max, push=speed, steps=self.engine_steps(GROWTH_STEPS))
 
     def check_trial(self, made: Scenario) -> None:
         hardware = made.hardware

@@ -34,7 +34,8 @@ def unshown(share: float) -> None:
     """Ignores the progress."""
 
 
-PRESS = Press()
+BY_DEFAULT = Press()
+PRESS = Press(still=1e-6)  # what a hand feels, whatever the encoder sees: of labs and classics
 
 
 def stiffest(
@@ -136,7 +137,7 @@ def growth_rates(walls: Sequence[Wall | Subject], maps: PeriodMaps | None = None
 
 
 @checked
-def settles(wall: VirtualWall, press: Press = PRESS) -> bool:
+def settles(wall: VirtualWall, press: Press = BY_DEFAULT) -> bool:
     """Whether a wall is stable in a run, with the friction, encoder and surface of its device.
 
     This is the verdict of `zwidth` on one wall. A linear loop settles if its oscillation decays.
@@ -155,11 +156,11 @@ def settles(wall: VirtualWall, press: Press = PRESS) -> bool:
     return come_to_rest([wall], press)[0]
 
 
-def come_to_rest(subjects: Sequence[Wall | Subject], press: Press = PRESS) -> list[bool]:
+def come_to_rest(subjects: Sequence[Wall | Subject], press: Press = BY_DEFAULT) -> list[bool]:
     """Whether each wall comes to rest after a push, by one run each.
 
     A wall is at rest if its peak-to-peak motion in the last fifth of the run is at most
-    `press.still`. While a larger oscillation decays, the run is extended, up to 64 times. Without
+    `press.rest`. While a larger oscillation decays, the run is extended, up to 64 times. Without
     an encoder, an oscillation that still decays at the end is stable, too. With an encoder it may
     end in a limit cycle of about a quantum, so the wall must come to rest.
     """
@@ -176,7 +177,7 @@ def come_to_rest(subjects: Sequence[Wall | Subject], press: Press = PRESS) -> li
             keeps = late >= (ROUGH_KEPT if chatters else KEPT) * early
             if record.outcome.code in ("diverged", "out of reach", "singular"):
                 rests[i] = False
-            elif late <= press.still:
+            elif late <= press.rest(quantum):
                 rests[i] = True
             elif quantum and (last or (keeps and creep < late)):
                 rests[i] = False

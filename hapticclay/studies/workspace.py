@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..display import fields_of
-from ..errors import Bound
+from ..errors import Bound, Real
 from ..fields import Seed
 from ..model.constants import AXES, L1, L2
 from ..results import Result, figure_of
@@ -110,7 +110,7 @@ def poses(spacing: float) -> tuple[np.ndarray, np.ndarray]:
     return x[inside], y[inside]
 
 
-Spacing = Annotated[float, Bound(0.01, 0.3, "m")]
+Spacing = Annotated[Real, Bound(0.01, 0.3, "m")]
 
 
 @checked

@@ -21,7 +21,7 @@ from ..scene.changes import with_fields
 from ..scene.scenario import Scenario
 from ..theory.hand_boxes import Box
 from . import boundary
-from .wall import Subject, Wall, as_wall
+from .wall import STILL, Subject, Wall, as_wall
 from .wall_lines import (
     Limit,
     exact_limit,
@@ -30,7 +30,7 @@ from .wall_lines import (
     theory_limits,
     worst_hand,
 )
-from .wall_runs import PRESS, Press, Share, most_damping, stiffest, unshown
+from .wall_runs import BY_DEFAULT, Press, Share, most_damping, stiffest, unshown
 
 LETTERS = {
     "gain": "Kc",
@@ -240,11 +240,21 @@ class ZWidth(Result):
             lines.append(f"runs against the exact linear loop: within {100.0 * self.gap():.2g} %")
         if rough := [r for r in self.regions if not r.linear]:
             lines.append(
-                f"rest: back and forth by {1e6 * self.press.still:g} um at most, after a push of "
+                f"rest: back and forth by {self.rest_words()} at most, after a push of "
                 f"{self.press.force:g} N at {1e3 * self.press.speed:g} mm/s"
                 f" ({len(rough)} of {len(self.regions)} regions)"
             )
         return lines + (self.violations() or [NO_VIOLATION])
+
+    def rest_words(self) -> str:
+        """The motion that counts as rest, and what the encoder sees of it."""
+        quanta = [as_wall(r.wall).quantum for r in self.regions if not r.linear]
+        rests = sorted({1e6 * self.press.rest(q) for q in quanta})
+        words = f"{rests[0]:g} um" if len(rests) == 1 else f"{rests[0]:g} to {rests[-1]:g} um"
+        if self.press.still is None:
+            return f"{words} (a count of the encoder)" if max(quanta) > STILL else words
+        unseen = max(quanta) > self.press.still
+        return f"{words} (less than a count, {1e6 * max(quanta):g} um)" if unseen else words
 
     def contents(self) -> dict[str, Any]:
         """Push, tables, and the differences between theory and runs."""
@@ -260,7 +270,7 @@ def zwidth(
     *,
     B: Iterable[float] | None = None,
     box: Box | None = None,
-    press: Press = PRESS,
+    press: Press = BY_DEFAULT,
     quick: bool = False,
     progress: Share = unshown,
 ) -> ZWidth:

@@ -16,11 +16,12 @@ from typing import Annotated
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked
 from ..arms.joint_law import compensated
 from ..arms.mechanism import STILL, Linear
 from ..display import brief
-from ..errors import Bound, ParameterError, number
+from ..errors import Bound, ParameterError, Real, number
 from ..model.operator import NO_HAND, Operator
 from ..scene.scenario import Scenario
 from . import linear_loop, roots
@@ -58,7 +59,7 @@ class Handle:
     def of(
         cls,
         scenario: Scenario,
-        place: Annotated[tuple[float, float], Bound(-10.0, 10.0, "m")] = (0.0, 0.0),
+        place: Annotated[tuple[Real, Real], Bound(-10.0, 10.0, "m")] = (0.0, 0.0),
         normal: tuple[float, float] = (1.0, 0.0),
     ) -> Handle:
         """The handle of a scenario's arm and operator."""
@@ -174,13 +175,13 @@ def holds(handle: AnyHandle, K: float, B: float, Ts: float, delay: float) -> boo
 
 def _stable(loops: np.ndarray) -> np.ndarray:
     """Whether maps of shape (..., n, n) are stable."""
-    z = np.linalg.eigvals(loops)
+    z = matrices.eigenvalues(loops)
     moving = np.where(np.abs(z - 1.0) > AT_REST, np.abs(z), 0.0)
     return moving.max(axis=-1) < 1.0 + ROUNDING
 
 
-Sample = Annotated[float, Bound(1e-6, 1.0, "s")]
-Delay = Annotated[float, Bound(0.0, 10.0, "s")]
+Sample = Annotated[Real, Bound(1e-6, 1.0, "s")]
+Delay = Annotated[Real, Bound(0.0, 10.0, "s")]
 
 
 @checked

@@ -14,21 +14,21 @@ from typing import Annotated
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError, array_of, integer, number
-from ..formulas import arm as arm_law
+from ..errors import Bound, ParameterError, Real, array_of, integer, number
 from ..formulas.constants import B_MAX
 from ..model import support
 from ..model.controller import matrix_exponential
 from ..model.hardware import Hardware, butterworth
-from ..model.sampled_controller import BUFFER, TORQUE, Controller, LawCaller
+from ..model.sampled_controller import Controller, LawCaller
 from ..model.traits import LEFT_OUT, present
 from ..results import Result
 from ..scene.scenario import Scenario
 from .linear_loop import whole_samples
 from .loops import dampings_of
+from .resting_arms import resting_arm
 
-MEASURED = ("q[0]", "q[1]", "qd[0]", "qd[1]", "fh[0]", "fh[1]")
 COVERED = ("velocity by difference", "force filter")  # left out by the theory of the paper's loop
 GAINS = np.geomspace(1e-3, 1e3, 601)  # of the search, as shares of the controller's own, 1 included
 RUNGS = 10.0 ** np.arange(
@@ -41,7 +41,6 @@ AT_REST = 1e-9  # torque [N.m] and change of a state that count as rest
 LATER = 1000.0  # [s] time at which a law must answer as at first
 STRAIGHT = 1e-9  # of the largest entry: loops that differ by less from a straight line are on it
 FREE = 1e-11  # singular values below this share of the largest are those of free motion
-JOINTS = np.array([[1.0, 0.0], [-1.0, 1.0]])  # angles of the joints from those of the links
 
 
 @named
@@ -49,12 +48,14 @@ JOINTS = np.array([[1.0, 0.0], [-1.0, 1.0]])  # angles of the joints from those 
 class LinearLaw:
     """A sampled controller around rest: s(k+1) = A s(k) + B y(k), torques = C s(k) + D y(k).
 
+    Of j joints and a handle that moves along a axes; 2 and 2 for the two-link arm.
+
     Attributes:
         A: state matrix, of n states, shape (n, n).
-        B: input matrix, shape (n, 6). The inputs y are the measured angles of shoulder and elbow
-            [rad], their rates [rad/s], and the hand force x, y [N].
-        C: output matrix, shape (2, n). The outputs are the torques of shoulder and elbow [N.m].
-        D: feedthrough, shape (2, 6).
+        B: input matrix, shape (n, 2 j + a). The inputs y are the measured positions of the joints
+            [rad], their rates [rad/s], and the hand force along each axis [N].
+        C: output matrix, shape (j, n). The outputs are the torques of the joints [N.m].
+        D: feedthrough, shape (j, 2 j + a).
     """
 
     A: np.ndarray
@@ -65,7 +66,12 @@ class LinearLaw:
     def __post_init__(self):
         A = array_of("A", self.A)
         n = len(A) if A.ndim == 2 else 0
-        for name, shape in {"A": (n, n), "B": (n, 6), "C": (2, n), "D": (2, 6)}.items():
+        D = array_of("D", self.D)
+        j, y = D.shape if D.ndim == 2 else (2, 6)
+        if not 2 * j < y <= 2 * j + 3:
+            bound = "must be finite numbers of the shape (j, 2 j + a), of j joints and a axes"
+            raise ParameterError("D", self.D, bound)
+        for name, shape in {"A": (n, n), "B": (n, y), "C": (j, n), "D": (j, y)}.items():
             given = array_of(name, getattr(self, name))
             empty = not given.size and not math.prod(shape)  # [] for a controller without states
             if (given.shape != shape and not empty) or not np.isfinite(given).all():
@@ -98,7 +104,7 @@ class ControllerStability(Result):
         gains: gains of the search, shape (m,).
         rates: growth rate of the least damped mode at each [1/s], shape (m,).
         law: the controller around rest.
-        rest: joint angles at rest, shoulder and elbow [rad].
+        rest: joint positions at rest [rad], [m] of joints that slide.
         Ts: control sample [s].
         b: physical clay [N.s/m].
         left_out: parts of the scenario that the analysis neglects.
@@ -114,7 +120,7 @@ class ControllerStability(Result):
     gains: np.ndarray
     rates: np.ndarray
     law: LinearLaw
-    rest: tuple[float, float]
+    rest: tuple[float, ...]
     Ts: float
     b: float
     left_out: tuple[str, ...] = ()
@@ -160,14 +166,15 @@ def controller_stability(
     scenario: Scenario,
     *,
     gain: int | None = None,
-    b: Annotated[float | None, Bound(0.0, B_MAX, "N.s/m")] = None,
+    b: Annotated[Real | None, Bound(0.0, B_MAX, "N.s/m")] = None,
     matrices: LinearLaw | None = None,
     size: Annotated[float, Bound(1e-9, 1.0)] = 1e-2,
 ) -> ControllerStability:
     """Stability and largest stable gain of a loop with a sampled controller of one's own.
 
-    The law is linearised around rest; handle, hand and physical clay move exactly between samples,
-    under torques that are held and delayed. Velocity by difference, its filter and the force filter
+    The law is linearised around rest; arm, hand and physical clay move exactly between samples,
+    under torques that are held and delayed. An arm from a file may rest elsewhere than at its pose,
+    where weights and springs are balanced. Velocity by difference, its filter and the force filter
     count; friction, converters, torque limits and the muscle force do not (`left_out`). Gains from
     1/1000 to 1000 times the own one are searched, 2 % apart, so a narrower window may be
     missed; the ends of the band are exact to rounding.
@@ -200,6 +207,7 @@ def controller_stability(
     own = 1.0 if gain is None else _parameter(made, gain, matrices)
     rest = Rest(scenario, made if matrices is None else None)
     known = matrices or rest.linear_law(size)
+    _check_shape(known, rest)
 
     def loop(K: float, b: float) -> np.ndarray:
         here, law = rest, known.scaled(K)
@@ -241,10 +249,20 @@ def _parameter(made: Controller, gain: int, matrices: LinearLaw | None) -> float
     return number(f"controller.params.{i}", made.params[i], 0.0, above=True)
 
 
+def _check_shape(law: LinearLaw, rest: Rest) -> None:
+    """Refuses matrices of an arm with another number of joints or axes."""
+    n, y = len(rest.joints), rest.inputs
+    if law.D.shape != (n, y):
+        bound = f"must have D of the shape ({n}, {y}): {n} joints, {rest.arm.axes} axes"
+        raise ParameterError("matrices", law.D.shape, bound)
+
+
 def _neglected(s: Scenario) -> tuple[str, ...]:
     clay = [] if s.clay is None else present(s.clay, support.LAWS)
     parts = [*clay, *present(s, support.PARTS)]
-    return tuple(x.name for x in parts if x.theory == LEFT_OUT and x.name not in COVERED)
+    names = [x.name for x in parts if x.theory == LEFT_OUT and x.name not in COVERED]
+    rubs = not s.is_closed_form and any(s.file_arm.friction)  # type: ignore[arg-type]
+    return (*names, *(["joint friction"] if rubs else []))
 
 
 # ---- the law around rest -------------------------------------------------------------------------
@@ -259,61 +277,56 @@ class Rest:
         near: another rest, from which it is sought in place of the start.
 
     Attributes:
-        links: absolute angles of the links [rad].
+        arm: the arm around it.
+        joints: positions of the joints there.
         state: state of the controller.
-        force: hand force there (x, y) [N].
+        force: hand force there along each axis [N].
     """
 
     def __init__(self, scenario: Scenario, controller: Controller | None, near: Rest | None = None):
-        self.scenario, self.hands = scenario, scenario.hands
-        x, y = (a + c for a, c in zip(scenario.origin, scenario.start, strict=True))
-        q1, q2 = arm_law.inverse_kinematics(x, y, scenario.arm.links)
-        at = np.array([q1, q2])
+        self.hands, self.arm = scenario.hands, resting_arm(scenario)
+        n = len(self.arm.start)
+        at = self.arm.start
         self.state = np.array([] if controller is None else controller.state)
         if controller is not None:
             self.controller = controller
-            self.caller = LawCaller(controller)
+            self.caller = LawCaller(controller, n, self.arm.axes)
             self.buffer = self.caller.numbers
             begin = (at, self.state) if near is None else (near.joints, near.state)
             at = self._sought(np.concatenate(begin))
-            at, self.state = at[:2], at[2:]
-        self.joints = float(at[0]), float(at[1])
-        self.links, self.force = np.array([at[0], at[0] + at[1]]), self._force(at)
-
-    def _jacobian(self, q: np.ndarray) -> np.ndarray:
-        """Velocity of the handle from the rates of the links, one column a link."""
-        u = arm_law.jacobian(float(q[0]), float(q[1]), self.scenario.arm.links)
-        return np.array(u).reshape(2, 2).T
+            at, self.state = at[:n], at[n:]
+        self.joints = tuple(map(float, at))
+        self.force = self.arm.force(at)
 
     @property
-    def jacobian(self) -> np.ndarray:
-        """The same at rest."""
-        return self._jacobian(np.array(self.joints))
+    def q(self) -> np.ndarray:
+        """The joints at rest, shape (n,)."""
+        return np.array(self.joints)
 
-    def _force(self, q: np.ndarray) -> np.ndarray:
-        """Force of the hand's spring at rest (x, y) [N]."""
-        u = self._jacobian(q)
-        p = np.array([u[1].sum(), -u[0].sum()]) - self.scenario.origin
-        return -p * [hand.spring for hand in self.hands]
+    @property
+    def inputs(self) -> int:
+        """Numbers that the law measures."""
+        return 2 * len(self.arm.start) + self.arm.axes
 
     def answer(self, x: np.ndarray, t: float = 0.0) -> np.ndarray:
         """Torques and next state under measurements and a state."""
-        n = len(self.state)
-        self.buffer[0], self.buffer[1:TORQUE] = t, x[:6]
-        self.buffer[BUFFER : BUFFER + n] = x[6:]
+        n, first, y = len(self.state), self.caller.start, self.inputs
+        self.buffer[0], self.buffer[1 : 1 + y] = t, x[:y]
+        self.buffer[first : first + n] = x[y:]
         self.caller()
         self.caller.check()
-        after = self.buffer[BUFFER + n : BUFFER + 2 * n]
-        return np.concatenate((self.buffer[TORQUE:BUFFER], after))
+        after = self.buffer[first + n : first + 2 * n]
+        return np.concatenate((self.buffer[1 + y : first], after))
 
     def _measured(self, at: np.ndarray) -> np.ndarray:
-        return np.concatenate((at[:2], [0.0, 0.0], self._force(at[:2]), at[2:]))
+        q, state = np.split(at, [len(self.arm.start)])
+        return np.concatenate((q, np.zeros(len(q)), self.arm.force(q), state))
 
     def _unrest(self, at: np.ndarray) -> np.ndarray:
         """Torques that nothing balances, and change of the state."""
-        out = self.answer(self._measured(at))
-        out[:2] += np.linalg.solve(JOINTS.T, self._jacobian(at[:2]).T @ self._force(at[:2]))
-        out[2:] -= at[2:]
+        out, n = self.answer(self._measured(at)), len(self.arm.start)
+        out[:n] += self.arm.static(at[:n])
+        out[n:] -= at[n:]
         return out
 
     def _sought(self, at: np.ndarray) -> np.ndarray:
@@ -325,10 +338,11 @@ class Rest:
             at = least_squares(self._unrest, at, xtol=1e-15, ftol=1e-15, gtol=1e-15).x
             left = self._unrest(at)
         if np.abs(left).max(initial=0.0) > AT_REST:
+            torques, change = np.split(left, [len(self.arm.start)])
             bound = (
                 "must come to rest near the start; the nearest it comes leaves torques of "
-                f"({left[0]:.3g}, {left[1]:.3g}) N.m"
-            ) + (f" and moves its state by {np.abs(left[2:]).max():.3g}" if len(left) > 2 else "")
+                f"({', '.join(f'{x:.3g}' for x in torques)}) N.m"
+            ) + (f" and moves its state by {np.abs(change).max():.3g}" if len(change) else "")
             raise ParameterError("controller.law", self.controller.law, bound)
         return at
 
@@ -338,9 +352,11 @@ class Rest:
         if not np.array_equal(self.answer(x), self.answer(x, LATER)):
             bound = "must not depend on the time t: its answer at rest changes"
             raise ParameterError("controller.law", self.controller.law, bound)
-        names = (*MEASURED, *(f"state[{i}]" for i in range(len(self.state))))
+        n, y = len(self.joints), self.inputs
+        sizes = {"q": n, "qd": n, "fh": self.arm.axes, "state": len(self.state)}
+        names = [f"{name}[{i}]" for name, many in sizes.items() for i in range(many)]
         slopes = np.column_stack([self._slope(x, j, size, name) for j, name in enumerate(names)])
-        return LinearLaw(slopes[2:, 6:], slopes[2:, :6], slopes[:2, 6:], slopes[:2, :6])
+        return LinearLaw(slopes[n:, y:], slopes[n:, :y], slopes[:n, y:], slopes[:n, :y])
 
     def _slope(self, x: np.ndarray, j: int, size: float, name: str) -> np.ndarray:
         """Slope of each answer over one input, if differences converge to it.
@@ -360,7 +376,8 @@ class Rest:
         changes = np.abs(middle - middle[-1]) > BENT * room + rounding + rounding[-1]
         if wrong := np.argwhere(apart | changes).tolist():
             row, out = wrong[0]
-            what = f"torques[{out}]" if out < 2 else f"state[{out - 2}]"
+            n = len(self.joints)
+            what = f"torques[{out}]" if out < n else f"state[{out - n}]"
             bound = (
                 f"must be linear around rest: the slope of {what} over {name} is "
                 f"{ahead[row, out]:.4g} forwards and {behind[row, out]:.4g} backwards at "
@@ -386,64 +403,64 @@ class Plant:
 
     def __init__(self, scenario: Scenario, rest: Rest, b: float, states: int):
         self.Ts, self.parts = scenario.Ts or scenario.dt, scenario.hardware or Hardware()
-        u, inertia = rest.jacobian, np.diag(scenario.arm.links[2:4])
-        self.jacobian = u
-        mass, self.damper, self.spring = (
+        arm, q = rest.arm, rest.q
+        self.jacobian = u = arm.jacobian(q)
+        self.mass, self.damper, self.spring = (
             np.diag([getattr(hand, name) for hand in rest.hands])
             for name in ("mass", "damper", "spring")
         )
-        self.mass = mass
-        light = np.linalg.inv(inertia + u.T @ mass @ u)
-        turned = np.array([-u[1], u[0]])  # change of each column as its link turns
-        static = np.diag(rest.force @ turned)
-        self.place = -light @ (u.T @ self.spring @ u - static)
-        self.rate = -light @ (u.T @ (self.damper + b * np.eye(2)) @ u)
-        self.push = light @ JOINTS.T  # by torques of the joints
+        clay = b * np.diag([1.0, 1.0, 0.0][: arm.axes])  # along the axes of its plane
+        self.push = np.linalg.inv(arm.inertia(q) + u.T @ self.mass @ u)  # by torques
+        self.place = self.push @ arm.slope(q)
+        self.rate = -self.push @ (arm.damping(q) + u.T @ (self.damper + clay) @ u)
         self.open = self._open_loop(states)
 
     def _moved(self, t: float) -> tuple[np.ndarray, np.ndarray]:
-        """Transition of (angles, rates) of the links over t [s], and response to held torques."""
-        a = np.zeros((6, 6))
-        a[:2, 2:4] = np.eye(2)
-        a[2:4] = np.hstack((self.place, self.rate, self.push))
+        """Transition of positions and rates of the joints over t [s], response to held torques."""
+        n = len(self.push)
+        a = np.zeros((3 * n, 3 * n))
+        a[:n, n : 2 * n] = np.eye(n)
+        a[n : 2 * n] = np.hstack((self.place, self.rate, self.push))
         e = matrix_exponential(t * a)
-        return e[:4, :4], e[:4, 4:]
+        return e[: 2 * n, : 2 * n], e[: 2 * n, 2 * n :]
 
     def _open_loop(self, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The loop over a sample without the law of n states: x+ = F x + G (tau, s+), (s, y) = H x.
 
-        x holds angles and rates of the links, the controller's state, the angles of the joints in
-        the window, filtered rates, states of the force filter, then the torques of the last
+        x holds positions and rates of the joints, the controller's state, the positions in the
+        window, filtered rates, states of the force filter, then the torques of the last
         samples, newest first.
         """
-        parts = self.parts
+        parts, (axes, j) = self.parts, self.jacobian.shape
         whole, part = whole_samples(parts.delay, self.Ts)
         differs = parts.velocity == "difference"
-        window = 2 * parts.velocity_window * differs
+        window = j * parts.velocity_window * differs
         cutoff, sieve_cutoff = parts.velocity_filter if differs else None, parts.force_filter
-        smooth, filtered = 2 * (cutoff is not None), 4 * (sieve_cutoff is not None)
-        at = np.cumsum([0, 2, 2, n, window, smooth, filtered, 2 * (1 + whole)])
-        unit = np.eye(at[-1] + 2 + n)  # behind x, the torques and the state that the law returns
-        angle, rate, state, past, slow, sieve, queue = (
-            unit[i:j] for i, j in zip(at[:-1], at[1:], strict=True)
+        smooth, filtered = j * (cutoff is not None), 2 * axes * (sieve_cutoff is not None)
+        at = np.cumsum([0, j, j, n, window, smooth, filtered, j * (1 + whole)])
+        unit = np.eye(at[-1] + j + n)  # behind x, the torques and the state that the law returns
+        q, rate, state, past, slow, sieve, queue = (
+            unit[first:end] for first, end in zip(at[:-1], at[1:], strict=True)
         )
-        torques, after, oldest = unit[at[-1] : at[-1] + 2], unit[at[-1] + 2 :], queue[-2:]
-        q, w = JOINTS @ angle, JOINTS @ rate
+        torques, after, oldest = unit[at[-1] : at[-1] + j], unit[at[-1] + j :], queue[-j:]
+        w = rate
         if differs:
-            w = (q - past[-2:]) / (parts.velocity_window * self.Ts)
+            w = (q - past[-j:]) / (parts.velocity_window * self.Ts)
         if cutoff is not None:
             keep = math.exp(-math.tau * cutoff * self.Ts)
             w = keep * slow + (1.0 - keep) * w
-        turning = self.place @ angle + self.rate @ rate + self.push @ oldest
+        turning = self.place @ q + self.rate @ rate + self.push @ oldest
         u = self.jacobian
-        force = -(self.damper @ u @ rate + self.spring @ u @ angle + self.mass @ u @ turning)
+        force = -(self.damper @ u @ rate + self.spring @ u @ q + self.mass @ u @ turning)
         sieved = sieve
         if sieve_cutoff is not None:
             f = np.array(butterworth(sieve_cutoff, parts.filter_order, self.Ts))
-            sieved = np.kron(np.eye(2), f[:4].reshape(2, 2)) @ sieve + np.kron(force, f[4:, None])
+            sieved = np.kron(np.eye(axes), f[:4].reshape(2, 2)) @ sieve + np.kron(
+                force, f[4:, None]
+            )
             force = sieve[::2]
-        due = np.vstack((torques, queue))[2 * whole : 2 * whole + 2]
-        moved = np.vstack((angle, rate))
+        due = np.vstack((torques, queue))[j * whole : j * (whole + 1)]
+        moved = np.vstack((q, rate))
         for t, held in ((part, oldest), (1.0 - part, due)):
             change, push = self._moved(t * self.Ts)
             moved = change @ moved + push @ held
@@ -454,7 +471,7 @@ class Plant:
             w[:smooth],
             sieved,
             torques,
-            queue[:-2],
+            queue[:-j],
         )
         step, seen = np.vstack(ahead), np.vstack((state, q, w, force))
         return step[:, : at[-1]], step[:, at[-1] :], seen[:, : at[-1]]
@@ -474,12 +491,12 @@ def moving_modes(loop: np.ndarray) -> np.ndarray:
 
     loop = matrix_balance(loop, permute=False)[0]
     while len(loop):
-        _, size, vectors = np.linalg.svd(loop - np.eye(len(loop)))
+        _, size, vectors = matrices.svd(loop - np.eye(len(loop)))
         moving = vectors[: np.count_nonzero(size > FREE * size[0])]
         if len(moving) == len(loop):
             break
         loop = moving @ loop @ moving.T
-    return np.linalg.eigvals(loop)
+    return matrices.eigenvalues(loop)
 
 
 def growth(loop: np.ndarray, Ts: float) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import named
-from ..errors import Bound, ParameterError, pair
+from ..errors import Bound, ParameterError, Real, pair
 from ..model.compensator import Compensator
 from ..results import Result
 from . import gain_limits, margin_gains, stability_margins
@@ -26,9 +26,9 @@ def design_gain(
     loop: Loop,
     *,
     gain_margin: Annotated[float, Bound(1.0)] = 1.0,
-    phase_margin: Annotated[float, Bound(0.0, math.pi, "rad")] = 0.0,
+    phase_margin: Annotated[Real, Bound(0.0, math.pi, "rad")] = 0.0,
     disk_margin: Annotated[float, Bound(0.0, 2.0)] = 0.0,
-    delay_margin: Annotated[float, Bound(0.0, unit="s")] = 0.0,
+    delay_margin: Annotated[Real, Bound(0.0, unit="s")] = 0.0,
     at: stability_margins.Break = "compensator",
 ) -> float:
     """Largest K for which it and every lower K keep all requested margins.

@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from .. import matrices
+
 ROUNDING = 2.0**-46  # 64 last digits: products of order 8 of rounded factors
 BITS = 160  # of a real root
 NEAR = 1e-4  # of their size: closer real roots are separated by their common parabola
@@ -262,7 +264,7 @@ def _scaled_roots(p: Polynomial) -> tuple[np.ndarray, Fraction]:
     shifts = (bits * i if bits > 0 else -bits * (last - i) for i in range(last + 1))
     scaled = [x << shift for x, shift in zip(c, shifts, strict=True)]
     most = max(map(abs, scaled))
-    return np.roots([x / most for x in scaled[::-1]]), Fraction(2) ** bits
+    return matrices.polynomial_roots([x / most for x in scaled[::-1]]), Fraction(2) ** bits
 
 
 def _trimmed(p: Polynomial) -> list[int]:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import matrices
 from ..arms.servo_gains import without_gains
 from ..display import time_words
 from .joint_loop import is_stable
@@ -36,7 +37,7 @@ def radius(arm: Any, Kp: Sequence[float], Kd: Sequence[float], dt: float, integr
         for k in range(1, 5):
             term = term @ rates * (dt / k)
             step = step + term
-        return float(np.abs(np.linalg.eigvals(step)).max())
+        return float(np.abs(matrices.eigenvalues(step)).max())
     ahead = D if integrator in IMPLICIT else linear.damping  # at the end of the step
     late = np.zeros_like(S)
     if integrator == "discrete":
@@ -45,7 +46,7 @@ def radius(arm: Any, Kp: Sequence[float], Kd: Sequence[float], dt: float, integr
     push = -dt * np.linalg.solve(whole, np.hstack([S, D + dt * late]))
     w = np.hstack([np.zeros((n, n)), eye]) + push
     q = np.hstack([eye, np.zeros((n, n))]) + dt * w
-    return float(np.abs(np.linalg.eigvals(np.vstack([q, w]))).max())
+    return float(np.abs(matrices.eigenvalues(np.vstack([q, w]))).max())
 
 
 def words(arm: Any, law: Any, elsewhere: tuple[str, float]) -> Iterator[str]:

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from .. import matrices
 from ..errors import number
 from ..model.compensator import Compensator
 from . import exact_roots, late_roots, linear_loop, roots
@@ -445,12 +446,12 @@ def eigenvalues(a: np.ndarray) -> np.ndarray:
 
     Of a matrix that is singular in floats the smallest are 0, within its rounding.
     """
-    z = np.linalg.eigvals(a)
+    z = matrices.eigenvalues(a)
     z = z[np.argsort(np.abs(z))]
     small = int(np.sum(np.abs(z) < SMALL_ANGLE * np.abs(z[-1])))
     if small:
         try:
-            large = np.linalg.eigvals(np.linalg.inv(a))
+            large = matrices.eigenvalues(np.linalg.inv(a))
         except np.linalg.LinAlgError:
             return z
         z = z.astype(np.result_type(z, large))  # a pair that floats took for two real ones

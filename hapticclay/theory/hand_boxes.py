@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..arguments import named, part
-from ..errors import Bound, ParameterError, number
+from ..errors import Bound, ParameterError, Real, number
 from ..model.operator import Operator
 from . import exact_roots, gain_crossings, linear_loop, roots
 from .exact_roots import axis_parts, rational, value
@@ -38,9 +38,9 @@ class Box:
         rigid: True adds a rigid arm, Th = infinity.
     """
 
-    mass: Annotated[tuple[float, float], Bound(0.0, unit="kg", names=ENDS)] = (0.25, 0.25)
-    damper: Annotated[tuple[float, float], Bound(0.0, unit="N.s/m", names=ENDS)] = (2.0, 2.0)
-    spring: Annotated[tuple[float, float], Bound(0.0, unit="N/m", names=ENDS)] = (6.0, 6.0)
+    mass: Annotated[tuple[Real, Real], Bound(0.0, unit="kg", names=ENDS)] = (0.25, 0.25)
+    damper: Annotated[tuple[Real, Real], Bound(0.0, unit="N.s/m", names=ENDS)] = (2.0, 2.0)
+    spring: Annotated[tuple[Real, Real], Bound(0.0, unit="N/m", names=ENDS)] = (6.0, 6.0)
     rigid: bool = False
 
     def __post_init__(self):

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import matrices
 from ..arms.mechanism import Linear
 from .joint_loop import JointLoop
 
@@ -71,11 +72,13 @@ def _nudged(linear: Linear, name: str, j: int) -> Number:
 
 
 def slopes(edge: Edge, over: Sequence[Number]) -> np.ndarray:
-    """Change of the limit per number; NaN for a limit that is not on the circle."""
+    """Change of the limit per number; NaN without a limit."""
     theta, p = edge.theta, edge.p
-    if not (math.isfinite(p) and 0.0 < theta <= math.pi):
+    if not (math.isfinite(p) and 0.0 <= theta <= math.pi):
         return np.full(len(over), math.nan)
     h = STEP * max(abs(p), edge.size)
+    if not theta:
+        return _of_steady_motion(edge, h, over)
     by_p = (_open(edge.at(p + h), theta) - _open(edge.at(p - h), theta)) / (2.0 * h)
     turn = min(TURN * theta, 0.5 * (math.pi - theta))
     here = edge.at(p)
@@ -91,7 +94,24 @@ def slopes(edge: Edge, over: Sequence[Number]) -> np.ndarray:
     return np.array(out) / below if below else np.full(len(out), math.nan)
 
 
+def _of_steady_motion(edge: Edge, h: float, over: Sequence[Number]) -> np.ndarray:
+    """The same of a limit at which steady motion loses its resistance, or rest its stiffness."""
+    if not edge.at(edge.p + h).structural:
+        return np.full(len(over), math.nan)
+
+    def least(loop: JointLoop) -> float:
+        found = loop.resistance().real
+        return float(found[np.abs(found).argmin()])
+
+    by_p = (least(edge.at(edge.p + h)) - least(edge.at(edge.p - h))) / (2.0 * h)
+    by_a = [
+        sum(w * least(edge.at(edge.p, **c)) for w, c in zip(x.weights, x.changes, strict=True))
+        for x in over
+    ]
+    return -np.array(by_a) / by_p if by_p else np.full(len(over), math.nan)
+
+
 def _open(loop: JointLoop, theta: float) -> complex:
     """The eigenvalue of the open loop that is 1 at a limit."""
-    x = np.linalg.eigvals(loop.opened(np.array([theta])))[0]
+    x = matrices.eigenvalues(loop.opened(np.array([theta])))[0]
     return complex(x[np.argmin(np.abs(x - 1.0))])

@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import matrices
+
 ROUNDS = 60  # of the refinement
 EXACT = 1e-14  # imaginary part over size of an eigenvalue that counts as real
 REAL = 1e-7  # the same where refinement ended
@@ -32,7 +34,7 @@ class Crossing(NamedTuple):
 def crossings(response: Response, angles: np.ndarray) -> list[Crossing]:
     """All changes of a gain whose A T is the response, between the least angle and pi, sorted."""
     theta, x = zeros(response, angles, np.imag)
-    x_pi = np.linalg.eigvals(response(np.array([math.pi])))[0]
+    x_pi = matrices.eigenvalues(response(np.array([math.pi])))[0]
     theta, x = np.concatenate([theta, np.full(len(x_pi), math.pi)]), np.concatenate([x, x_pi])
     good = (np.abs(x.imag) <= REAL * np.abs(x)) & (x.real != 0.0)
     found = zip((-1.0 / x.real[good]).tolist(), theta[good].tolist(), strict=True)
@@ -41,11 +43,11 @@ def crossings(response: Response, angles: np.ndarray) -> list[Crossing]:
 
 def zeros(response: Response, angles: np.ndarray, sign: Sign) -> tuple[np.ndarray, np.ndarray]:
     """Angles at which a number of an eigenvalue of a response changes sign, and the eigenvalue."""
-    values = branches(np.linalg.eigvals(response(angles)))
+    values = branches(matrices.eigenvalues(response(angles)))
     below = sign(values) < 0.0  # a zero on the grid counts once
     i, branch = np.nonzero(below[:-1] != below[1:])
     ends = angles[i], angles[i + 1]
-    return _refined(response, sign, ends, (values[i, branch], values[i + 1, branch]))
+    return refined(response, sign, ends, (values[i, branch], values[i + 1, branch]))
 
 
 def log_size(values: np.ndarray) -> np.ndarray:
@@ -77,7 +79,7 @@ def branches(values: np.ndarray) -> np.ndarray:
     return np.take_along_axis(values, order, axis=1)
 
 
-def _refined(
+def refined(
     response: Response,
     sign: Sign,
     ends: tuple[np.ndarray, np.ndarray],
@@ -94,7 +96,7 @@ def _refined(
         fa, fb = weight_a[open_] * sign(a[open_]), weight_b[open_] * sign(b[open_])
         between = (low[open_] * fb - high[open_] * fa) / (fb - fa)
         theta[open_] = np.clip(between, low[open_], high[open_])
-        x[open_] = _nearest(np.linalg.eigvals(response(theta[open_])), a[open_], b[open_])
+        x[open_] = _nearest(matrices.eigenvalues(response(theta[open_])), a[open_], b[open_])
         found = sign(x[open_])
         same = np.sign(found) == np.sign(sign(a[open_]))
         left, right = open_[same], open_[~same]

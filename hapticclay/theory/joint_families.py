@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,13 +11,14 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from . import joint_crossings, roots
+from .. import matrices
+from . import joint_crossings, joint_scan
 from .joint_crossings import Crossing
 from .joint_loop import JointLoop, grid
 
 SIDE = 1e-3  # share of a crossing beyond the last one at which the loop is judged
-TOP = 1e9  # factor on the present gain, or on 1, up to which gains are tried
-TRIED = 60  # gains tried on each side, evenly in their logarithm
+TURNS = 2.0 * math.pi  # [rad] of the joints' own motion in a sample, up to which gains are tried
+DECADES = 6  # of gains that are tried on each side of the present one, or of 1
 NEAR = 1e-9  # relative distance of crossings that count as one
 
 
@@ -46,6 +48,11 @@ class Limit(NamedTuple):
     def lower(self) -> tuple[float, float]:
         """The lower end, which may lie below 0, and the angle there [rad]."""
         return self.free_low, self.low_theta
+
+    def moved(self, by: float) -> Limit:
+        """The same of a gain that counts from another value."""
+        low, high, free_low = (x + by for x in self[:3])
+        return self._replace(low=low, high=high, free_low=free_low)
 
     def frequency(self, Ts: float) -> float:
         """Frequency of that eigenvalue at a control sample [Hz]."""
@@ -77,9 +84,15 @@ class Circle:
         """Position and rate per torque, those of the grid from memory."""
         return self._found if angles is self.angles else self._computed(angles)
 
-    def at_rest(self) -> np.ndarray:
-        """Position per constant torque."""
-        return self.loop.at_rest()
+    def at_rest(self, of: str) -> np.ndarray:
+        """Position per constant torque, or measured rate in the steady motion that it keeps up."""
+        return self.loop.at_rest() if of == "position" else self.loop.drift()
+
+    @cached_property
+    def borders(self) -> dict[str, bool]:
+        """Whether rest loses its stiffness, and steady motion its resistance, at this loop."""
+        loop = self.loop
+        return {"position": bool(loop.structural), "rate": bool(loop.structural and loop.rest.free)}
 
     @cached_property
     def stable(self) -> bool:
@@ -98,7 +111,9 @@ class Family:
         right: shape (n, k).
         present: the gain at u = 0.
         changed: the loop at u; its changes of other things are keywords.
+        size: of such a gain, for a step beyond a limit.
         held: whether the host holds that torque; else it acts between samples.
+        least: the least value of the gain.
     """
 
     circle: Circle
@@ -107,7 +122,9 @@ class Family:
     right: np.ndarray
     present: float
     changed: Callable[..., JointLoop]
+    size: float = 1.0
     held: bool = True
+    least: float = 0.0
 
     def response(self, angles: np.ndarray) -> np.ndarray:
         """right' x per torque along left, shape (m, k, k)."""
@@ -120,51 +137,65 @@ class Family:
 
     def limit(self) -> Limit:
         """The stable interval of the gain."""
-        found = self._crossings() if self.held else self._tried()
-        return _interval(_distinct(found, self.present), self)
+        found = self._crossings() if self.held else self._scanned()
+        return _interval(_distinct(found, self.size), self)
 
     def _crossings(self) -> list[Crossing]:
-        """Changes on the circle, and at rest where the stiffness of a motion vanishes."""
+        """Changes on the circle, and at rest."""
         found = joint_crossings.crossings(self.response, self.circle.angles)
-        if self.of == "position":
-            at_rest = self.right.T @ self.circle.at_rest() @ self.left
-            values = np.linalg.eigvals(at_rest)
-            real = values[(np.abs(values.imag) <= NEAR * np.abs(values)) & (values.real != 0.0)]
-            found += [Crossing(-1.0 / x, 0.0) for x in real.real.tolist()]
-        return sorted(found)
+        return sorted(found + self._at_rest())
 
-    def _tried(self) -> list[Crossing]:
-        """Changes at which stability changes, by trial."""
-        factors = np.geomspace(1.0 / TOP, TOP, 2 * TRIED + 1)
-        changes = [-self.present, *((factors - 1.0) * (self.present or 1.0)).tolist()]
-        held, out = [self.stable(u) for u in changes], []
-        for a, b, left, right in zip(changes[:-1], changes[1:], held[:-1], held[1:], strict=True):
-            if left is not right:
-                edge = roots.bisect(lambda u, as_left=left: self.stable(u) is as_left, a, b, 1e-9)
-                out.append(Crossing(edge[0], math.nan))
-        return out
+    def _at_rest(self) -> list[Crossing]:
+        """Changes at which the stiffness of a motion, or the resistance to it, vanishes."""
+        at_rest = self.right.T @ self.circle.at_rest(self.of) @ self.left
+        values = matrices.eigenvalues(at_rest)
+        real = values[(np.abs(values.imag) <= NEAR * np.abs(values)) & (values.real != 0.0)]
+        here = [Crossing(0.0, 0.0)] if self.circle.borders[self.of] else []
+        return [Crossing(-1.0 / x, 0.0) for x in real.real.tolist()] + here
+
+    def _scanned(self) -> list[Crossing]:
+        """Changes at which stability changes, by following the eigenvalues."""
+        unit = self.size
+
+        def path(x: float) -> JointLoop:
+            return self.changed(unit * 10.0**x - self.present)
+
+        points = [float(x) for x in range(-DECADES, DECADES + 1)]
+        points = [x for x in points if x <= 0.0 or path(x).turn < TURNS]
+        found = joint_scan.changes(path, points, drives=True)
+        return [x._replace(change=unit * 10.0**x.change - self.present) for x in found]
 
 
-def _distinct(found: Sequence[Crossing], present: float) -> list[Crossing]:
+def _distinct(found: Sequence[Crossing], size: float) -> list[Crossing]:
     out: list[Crossing] = []
     for x in found:
-        if not out or x.change - out[-1].change > NEAR * (abs(x.change) + present):
+        if abs(x.change) <= NEAR * size:
+            x = x._replace(change=0.0)
+        if not out or x.change - out[-1].change > NEAR * (abs(x.change) + size):
             out.append(x)
     return out
 
 
 def _interval(found: Sequence[Crossing], family: Family) -> Limit:
-    """The stable interval of a gain around its present value, or the nearest of values above 0."""
+    """The stable interval of a gain around its present value, or the nearest allowed one.
+
+    A present value on a border is a piece of its own.
+    """
     present = family.present
-    edges = [Crossing(-math.inf, math.nan), *found, Crossing(math.inf, math.nan)]
+    here = [x for x in found if not x.change]
+    ends = Crossing(-math.inf, math.nan), Crossing(math.inf, math.nan)
+    edges = [ends[0], *sorted([*found, *here]), ends[1]]
     pieces = list(zip(edges[:-1], edges[1:], strict=True))
 
+    @functools.cache
     def stable(i: int) -> bool:
-        return family.stable(_inside(*pieces[i], present))
+        low, high = pieces[i]
+        return family.stable(_inside(low, high, family.size))
 
-    home = next(i for i, (a, b) in enumerate(pieces) if a.change <= 0.0 <= b.change)
+    around = [i for i, (a, b) in enumerate(pieces) if a.change <= 0.0 <= b.change]
+    home = around[len(around) // 2]
     for i in sorted(range(len(pieces)), key=lambda i: (abs(i - home), i > home)):
-        if pieces[i][1].change <= -present or not stable(i):
+        if pieces[i][1].change <= family.least - present and i != home or not stable(i):
             continue
         low = high = i
         while low and stable(low - 1):
@@ -173,17 +204,18 @@ def _interval(found: Sequence[Crossing], family: Family) -> Limit:
             high += 1
         (bottom, low_theta), (top, theta) = pieces[low][0], pieces[high][1]
         bottom, top = present + bottom, present + top
-        return Limit(max(0.0, bottom), top, bottom, theta, low_theta)
+        bottom, top = (x if abs(x) > NEAR * family.size else 0.0 for x in (bottom, top))
+        return Limit(max(family.least, bottom), top, bottom, theta, low_theta)
     return NONE
 
 
-def _inside(a: Crossing, b: Crossing, present: float) -> float:
+def _inside(a: Crossing, b: Crossing, size: float) -> float:
     """A change between two crossings; 0 if it lies between them."""
     low, high = a.change, b.change
     if low < 0.0 < high:
         return 0.0
     if math.isinf(low):
-        return high - SIDE * (abs(high) + present)
+        return high - SIDE * (abs(high) + size)
     if math.isinf(high):
-        return low + SIDE * (abs(low) + present)
+        return low + SIDE * (abs(low) + size)
     return 0.5 * (low + high)

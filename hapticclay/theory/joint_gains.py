@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import cmath
+import copy
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,23 +14,24 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..arms.joint_law import JointPD, checked_law, compensated
-from ..arms.joint_units import Joints, of_joint, table_of
+from ..arms.joint_units import Joints, table_of
 from ..arms.mechanism import Linear
 from ..arms.mjcf_arm import MjcfArm
 from ..display import time_words
 from ..results import Result, Tables
-from . import file_servo, joint_changes, joint_crossings, roots
+from . import file_servo, joint_changes, joint_scan
 from .client_loop import Delay, Sample
+from .joint_advice import Room, advise, factor_words
 from .joint_changes import Edge, Number, slopes
 from .joint_crossings import Crossing
+from .joint_delays import LATEST, delay_left
 from .joint_families import Circle, Family, Limit
-from .joint_loop import Drive, JointLoop, grid, is_stable, timing_words
+from .joint_loop import Drive, JointLoop, timing_words
 
-LATEST = 2.0  # [s] largest added delay that is looked for
 SLOWEST = 1.0  # [s] largest control sample that is looked for
 PERIODS = 120  # control samples tried, evenly in their logarithm
+SLOW = 0.1  # [rad] that a joint of typical gains moves by while its torque is late
 BEYOND = 1e-6  # share beyond a limit at which its motion is looked at
-ROUNDS = 30  # of the search for a delay
 SMALL = "small motions about the pose"
 IGNORED = "joint friction, counts, converters, torque limits, backlash, elastic links: left out"
 
@@ -51,6 +54,7 @@ class JointLimits(Joints, Result):
         radius: largest eigenvalue of the map over a sample: below 1 the loop is stable.
         frequency: of that motion [Hz].
         joint: joint that moves most in it.
+        least_scale: least factor of all Kp, mostly 0; NaN if no factor is stable.
         scale: largest factor of all Kp; NaN if no factor is stable.
         buzz: frequency at that factor [Hz].
         Kp: least and largest Kp of each joint [N.m/rad], shape (n, 2).
@@ -78,6 +82,8 @@ class JointLimits(Joints, Result):
             shape (n, 2).
         rate_per_delay: change of the lowest rate with the delay [Hz/s].
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
+        advised: what to change first, in words, tried by the exact map.
+        change: fields of the law, Ts or delay with that change; empty for no change.
         slides: whether each joint slides; then its units are those of forces and lengths.
     """
 
@@ -103,6 +109,7 @@ class JointLimits(Joints, Result):
     radius: float
     frequency: float
     joint: str
+    least_scale: float
     scale: float
     buzz: float
     Kp: np.ndarray
@@ -125,26 +132,33 @@ class JointLimits(Joints, Result):
     rate_per_delay: float
     assumed: tuple[str, ...] = ()
     slides: tuple[bool, ...] = ()
+    advised: str = ""
+    change: dict[str, Any] = field(default_factory=dict)
 
     @property
     def stable(self) -> bool:
         """Whether the present gains are stable, to rounding."""
-        return bool(is_stable(self.radius))
+        return self.radius <= 1.0
 
     def headline(self) -> str:
         """The verdict in one line."""
         at = timing_words(self.Ts, self.delay)
         if not self.stable:
-            told = (
-                f"unstable at {at}: radius {self.radius:.4g}, {self.frequency:.4g} Hz, {self.joint}"
-            )
-            return told + f"; {self._way_back()}"
-        more = (
-            "any factor"
-            if math.isinf(self.scale)
-            else f"{self.scale:.4g} times ({self.buzz:.3g} Hz)"
-        )
-        return f"stable at {at}: all Kp up to {more}, delay left {self._left}, {self.joint} first"
+            size = f"{self.radius:.4g}" if self.radius > 1.0005 else f"1 + {self.radius - 1.0:.2g}"
+            motion = f"radius {size}, {self.frequency:.4g} Hz, {self.joint}"
+            return f"unstable at {at}: {motion}; {self._way_back()}"
+        return f"stable at {at}: {self._room()}, delay left {self._left}, {self.joint} first"
+
+    def _room(self) -> str:
+        """By how much the gains may rise, in words."""
+        if self.stiffness.any():
+            kind, high, at = "Kp", self.scale, f" ({self.buzz:.3g} Hz)"
+        else:
+            kind, high, at = "Kd", self.Kd_scale[1], ""
+            if not self.damping.any():
+                return "no gains"
+        more = "any factor" if math.isinf(high) else f"{high:.4g} times{at}"
+        return f"{'no Kp, ' if kind == 'Kd' else ''}all {kind} up to {more}"
 
     @property
     def _left(self) -> str:
@@ -152,9 +166,13 @@ class JointLimits(Joints, Result):
         return time_words(self.delay_left, LATEST)
 
     def _way_back(self) -> str:
-        if math.isnan(self.scale):
-            return "no common factor of Kp is stable"
-        return f"all Kp times {self.scale:.4g} or less would be stable"
+        for kind, gains, (low, high) in (
+            ("Kp", self.stiffness, (self.least_scale, self.scale)),
+            ("Kd", self.damping, self.Kd_scale),
+        ):
+            if gains.any() and low <= high:
+                return factor_words(kind, low, high)
+        return "no common factor of Kp or of Kd is stable"
 
     def remarks(self) -> Sequence[str]:
         """What to change first, and what the verdict rests on."""
@@ -162,26 +180,7 @@ class JointLimits(Joints, Result):
 
     def advice(self) -> str:
         """The change that gains most, or that brings an unstable loop back."""
-        j = self.names.index(self.joint)
-        if not self.stable:
-            slope, most = self.slope[j], self.friction_slope[j]
-            if slope > 0.0 and not slope < most:
-                limit = "" if math.isnan(most) else f", at most {most:.4g}"
-                unit = of_joint("N.m.s/rad", self.turning[j])
-                return f"friction fed forward at {self.joint}: slope {slope:.4g} {unit}{limit}"
-            low, high = self.Kp[j]
-            if high > low and high < self.stiffness[j]:
-                unit = of_joint("N.m/rad", self.turning[j])
-                return f"Kp of {self.joint}, {self.stiffness[j]:.4g} to {high:.4g} {unit} or less"
-            return "delay and rate: no Kp of one joint is stable" if math.isnan(high) else "Kp"
-        if math.isinf(self.scale):
-            return "nothing: no factor of Kp buzzes"
-        if self.delay:
-            shorter = min(self.delay, 1e-3)
-            gain = -shorter * self.scale_per_delay
-            less = f"{1e3 * shorter:.3g} ms less raises the factor of all Kp by {gain:.3g}"
-            return f"delay ({self._left} left): {less}"
-        return f"rate ({1.0 / self.Ts:.4g} Hz, at least {self.slowest_rate:.4g} Hz needed)"
+        return self.advised
 
     def tables(self) -> Tables:
         """Gains and limits of each joint; how the limits move; the whole arm."""
@@ -216,6 +215,7 @@ class JointLimits(Joints, Result):
             "radius": self.radius,
             "frequency [Hz]": self.frequency,
             "joint": self.joint,
+            "least factor of all Kp": self.least_scale,
             "largest factor of all Kp": self.scale,
             "buzz [Hz]": self.buzz,
             "least factor of all Kd": self.Kd_scale[0],
@@ -289,11 +289,16 @@ def joint_limits(arm: MjcfArm, law: JointPD, Ts: Sample, delay: Delay = 0.0) -> 
     study = Study(arm, law, Ts, delay)
     loop, joints = study.loop, range(len(law))
     all_Kp = study.family("Kp")
-    of_Kp, scale = [study.family("Kp", j).limit() for j in joints], all_Kp.limit()
-    of_Kd, of_all_Kd = [study.family("Kd", j).limit() for j in joints], study.family("Kd").limit()
+    of_Kp, of_Kd = ([study.family(kind, j).limit() for j in joints] for kind in ("Kp", "Kd"))
+    scale, of_all_Kd = all_Kp.limit(), study.family("Kd").limit()
+    of_friction = study.friction_limits(of_Kd)
     radius, frequency, _ = worst_motion(loop)
     slope = np.array(law.slopes)
-    left, rate = delay_crossing(loop), slowest_rate(study)
+    slopes = slope - np.array([x.free_low for x in of_friction])
+    left, longest = delay_left(loop), slowest_rate(study)
+    slowest = 1.0 / min(longest.change, SLOWEST)
+    room = Room(of_Kp, of_Kd, scale, of_all_Kd, slopes, left.change, slowest)
+    advice = advise(study, room)
     return JointLimits(
         names=arm.names,
         stiffness=np.array(law.Kp),
@@ -303,6 +308,7 @@ def joint_limits(arm: MjcfArm, law: JointPD, Ts: Sample, delay: Delay = 0.0) -> 
         radius=radius,
         frequency=frequency,
         joint=arm.names[first_joint(all_Kp, scale)],
+        least_scale=scale.low,
         scale=scale.high,
         buzz=scale.frequency(loop.Ts),
         Kp=_ends(of_Kp),
@@ -310,12 +316,14 @@ def joint_limits(arm: MjcfArm, law: JointPD, Ts: Sample, delay: Delay = 0.0) -> 
         Kd=_ends(of_Kd),
         Kd_scale=(of_all_Kd.low, of_all_Kd.high),
         delay_left=left.change,
-        slowest_rate=rate,
+        slowest_rate=slowest,
         slope=slope,
-        friction_slope=slope + np.array(law.Kd) - np.array([x.free_low for x in of_Kd]),
-        **study.changes(of_Kp, of_Kd, (scale, of_all_Kd)),
-        **study.timing_changes(left, rate),
+        friction_slope=slopes,
+        **study.changes(of_Kp, of_Kd, of_friction, (scale, of_all_Kd)),
+        **study.timing_changes(left, longest),
         assumed=study.assumed(),
+        advised=advice.words,
+        change=advice.change,
         slides=tuple(not turns for turns in arm.mechanism.turning),
     )
 
@@ -346,8 +354,21 @@ class Study:
         law.drive_samples(Ts)  # refuses a rate that is no multiple
         self.compensated = compensated(arm, law)
         self.linear = arm.linear(q)
+        self._begin()
+
+    def _begin(self) -> None:
         self.loop = self.remade()
         self.circle = Circle(self.loop)
+
+    def at(self, **changes: Any) -> Study:
+        """The same arm under another law, at another Ts or delay."""
+        out = copy.copy(self)
+        for name, value in changes.items():
+            setattr(out, name, value)
+        out._known = {}
+        out.__dict__.pop("_numbers", None)
+        out._begin()
+        return out
 
     def remade(self, **changes: Any) -> JointLoop:
         """The loop with another linear arm, law, gains, Ts or delay."""
@@ -382,7 +403,36 @@ class Study:
         present = 1.0 if joint is None else float((self.law.Kp, self.law.Kd)[i][joint])
         of, held = ("position", "rate")[i], self.law.runs == "host"
         changed = self.changed(kind, joint)
-        return Family(self.circle, of, left, right, present, changed, held)  # type: ignore[arg-type]
+        size = present or self._size(kind, joint or 0)
+        return Family(self.circle, of, left, right, present, changed, size, held)  # type: ignore[arg-type]
+
+    def _size(self, kind: str, joint: int) -> float:
+        """A typical gain of a joint that has none."""
+        mass = float(self.linear.inertia[joint, joint])
+        return mass * (SLOW / (self.Ts + self.delay)) ** (2 if kind == "Kp" else 1)
+
+    def friction_limits(self, of_Kd: Sequence[Limit]) -> list[Limit]:
+        """Stable damping that the host may add to each joint; less is friction fed forward."""
+        if self.law.runs == "host":
+            Kd = self.law.Kd
+            return [x.moved(-own) for x, own in zip(of_Kd, Kd, strict=True)]
+        out = []
+        for j, e in enumerate(np.eye(len(self.law))):
+            along, size = e[:, None], self._size("Kd", j)
+            held = Family(
+                self.circle, "rate", along, along, 0.0, self.fed(e), size, least=-math.inf
+            )
+            out.append(held.limit())
+        return out
+
+    def fed(self, along: np.ndarray) -> Callable[..., JointLoop]:
+        """The loop at a damping u that the host adds along a joint, and other changes."""
+        square = np.outer(along, along)
+
+        def changed(u: float, **changes: Any) -> JointLoop:
+            return self.remade(**changes).feeding(0.0 * square, u * square)
+
+        return changed
 
     # ---- how limits move
 
@@ -396,6 +446,7 @@ class Study:
         """Change of a limit and of its angle, of a gain or a common factor, per number."""
         gains, changed = (self.law.Kp, self.law.Kd)["Kp" != kind], self.changed(kind, joint)
         present, size = (1.0, 1.0) if joint is None else (gains[joint], max(gains))
+        size = size or self._size(kind, joint or 0)
 
         def at(x: float, **changes: Any) -> JointLoop:
             return changed(x - present, **changes)
@@ -403,14 +454,23 @@ class Study:
         return slopes(Edge(at, *end, size), over)
 
     def changes(
-        self, of_Kp: Sequence[Limit], of_Kd: Sequence[Limit], common: tuple[Limit, Limit]
+        self,
+        of_Kp: Sequence[Limit],
+        of_Kd: Sequence[Limit],
+        of_friction: Sequence[Limit],
+        common: tuple[Limit, Limit],
     ) -> dict[str, Any]:
         """How limits of gains change with rotor inertia, damping and delay, by name."""
         (rotors, dampings, late), n = self._numbers, len(self.law)
 
+        over = [[rotors[j], dampings[j], *late] for j in range(n)]
+
         def own(kind: str, ends: Sequence[tuple[float, float]]) -> np.ndarray:
-            over = [[rotors[j], dampings[j], *late] for j in range(n)]
             return np.array([self._slopes(kind, j, ends[j], over[j]) for j in range(n)])
+
+        def of_slope(j: int) -> np.ndarray:
+            edge = Edge(self.fed(np.eye(n)[j]), *of_friction[j].lower, self._size("Kd", j))
+            return -slopes(edge, over[j])
 
         def whole(kind: str, end: tuple[float, float]) -> tuple[np.ndarray, float]:
             *by_arm, by_delay = self._slopes(kind, None, end, [*rotors, *dampings, *late]).tolist()
@@ -424,14 +484,14 @@ class Study:
         return {
             "Kp_change": own("Kp", [x.upper for x in of_Kp]),
             "Kd_change": own("Kd", [x.upper for x in of_Kd]),
-            "friction_slope_change": -own("Kd", [x.lower for x in of_Kd]),
+            "friction_slope_change": np.array([of_slope(j) for j in range(n)]),
             "scale_change": scale[0],
             "scale_per_delay": scale[1],
             "Kd_scale_change": np.array([least[0], largest[0]]),
             "Kd_scale_per_delay": (least[1], largest[1]),
         }
 
-    def timing_changes(self, left: Crossing, rate: float) -> dict[str, Any]:
+    def timing_changes(self, left: Crossing, longest: Crossing) -> dict[str, Any]:
         """How the delay left and the lowest rate change, by name."""
         (rotors, dampings, late), n = self._numbers, len(self.law)
         most = Edge(
@@ -441,10 +501,9 @@ class Study:
             self.Ts,
         )
         by_delay = slopes(most, [*rotors, *dampings]).reshape(2, n).T
-        Ts = 1.0 / rate
-        theta = _angle(self.remade(Ts=Ts)) if SLOWEST > Ts > self.Ts else math.nan
-        longest = Edge(lambda T, **changes: self.remade(Ts=T, **changes), Ts, theta, Ts)
-        by_rate = -(rate**2) * slopes(longest, [*rotors, *dampings, *late])
+        Ts = longest.change
+        most_Ts = Edge(lambda T, **changes: self.remade(Ts=T, **changes), Ts, longest.theta, Ts)
+        by_rate = -slopes(most_Ts, [*rotors, *dampings, *late]) / Ts**2
         return {
             "delay_change": by_delay,
             "rate_change": by_rate[:-1].reshape(2, n).T,
@@ -472,12 +531,9 @@ class Study:
 
 def worst_motion(loop: JointLoop) -> tuple[float, float, int]:
     """Size of the largest eigenvalue, its frequency [Hz], and the joint that moves most in it."""
-    values, vectors = np.linalg.eig(loop.map())
-    size = loop.radius()
-    i = int(np.argmin(np.abs(np.abs(values) - size)))
-    frequency = abs(np.angle(values[i])) / (2.0 * math.pi * loop.Ts)
-    energy = np.abs(vectors[: loop.n, i]) * np.sqrt(np.diag(loop.inertia))
-    return size, float(frequency), int(energy.argmax())
+    z = complex(loop.eigenvalues[0])
+    energy = np.abs(loop.shape(z)) * np.sqrt(np.diag(loop.inertia))
+    return loop.radius(), abs(cmath.phase(z)) / (2.0 * math.pi * loop.Ts), int(energy.argmax())
 
 
 def first_joint(family: Family, limit: Limit) -> int:
@@ -487,59 +543,13 @@ def first_joint(family: Family, limit: Limit) -> int:
     return worst_motion(family.changed(change))[2]
 
 
-def delay_crossing(loop: JointLoop) -> Crossing:
-    """Delay that may be added to a stable loop [s], and the angle of the eigenvalue there.
+def slowest_rate(study: Study) -> Crossing:
+    """Longest sample up to which a stable loop stays so, and the angle of the eigenvalue there.
 
-    0 for an unstable loop, inf for more than 2 s. With whole samples more of delay, a crossing is
-    where an eigenvalue of the open loop has size 1 and turns into 1. The share of a sample moves it
-    little, so a few rounds find it.
+    At the same delay, [s]; NaN if the loop is unstable, inf for more than 1 s.
     """
-    if not loop.stable():
-        return Crossing(0.0, math.nan)
-    total, theta = loop.delay, math.nan
-    for turn in range(ROUNDS):
-        samples, theta = samples_left(loop.with_delay(total), 0.5 if turn else 0.0)
-        more = samples * loop.Ts
-        if math.isinf(more) or total + more - loop.delay > LATEST:
-            return Crossing(math.inf, math.nan)
-        total += more
-        if abs(more) <= 1e-12 * (total + loop.Ts):
-            break
-    return Crossing(max(0.0, total - loop.delay), theta)
-
-
-def samples_left(loop: JointLoop, before: float = 0.0) -> Crossing:
-    """Whole samples of delay, as a real number, until the first crossing; inf for none.
-
-    Args:
-        loop: the loop.
-        before: how far a crossing may lie before the present delay [samples].
-    """
-    theta, x = joint_crossings.zeros(loop.opened, grid(loop), joint_crossings.log_size)
-    late = np.angle(x)[:, None] / theta[:, None] + np.arange(-1, 3) * 2.0 * math.pi / theta[:, None]
-    late = np.where(late >= -before, late, math.inf)
-    if not len(theta):
-        return Crossing(math.inf, math.nan)
-    i = int(late.min(axis=1).argmin())
-    return Crossing(float(late[i].min()), float(theta[i]))
-
-
-def _angle(loop: JointLoop) -> float:
-    """Angle of the largest eigenvalue of the map [rad]."""
-    return abs(float(np.angle(loop.eigenvalues[0])))
-
-
-def slowest_rate(study: Study) -> float:
-    """Lowest rate down to which a stable loop stays so, at the same delay [Hz]; NaN if unstable."""
     if not study.loop.stable():
-        return math.nan
-
-    def stable(Ts: float) -> bool:
-        return study.remade(Ts=Ts).stable()
-
-    low = study.Ts
-    for high in np.geomspace(study.Ts, SLOWEST, PERIODS)[1:].tolist():
-        if not stable(high):
-            return 1.0 / roots.bisect(stable, low, high, 1e-9)[0]
-        low = high
-    return 1.0 / SLOWEST
+        return Crossing(math.nan, math.nan)
+    points = np.geomspace(study.Ts, SLOWEST, PERIODS).tolist()
+    found = joint_scan.changes(lambda Ts: study.remade(Ts=Ts), points)
+    return next(found, Crossing(math.inf, math.nan))

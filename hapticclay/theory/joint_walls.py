@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, Literal
@@ -12,9 +12,9 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..arms.joint_law import JointPD, compensated
-from ..arms.mechanism import STILL
+from ..arms.mechanism import STILL, Linear
 from ..arms.mjcf_arm import MjcfArm
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..model.operator import NO_HAND, Operator
 from ..results import Result, Tables
 from . import joint_changes
@@ -26,6 +26,7 @@ from .joint_gains import IGNORED, SMALL, gravity_words, joint_loop
 from .joint_loop import JointLoop, even_grid, resonant_grid, timing_words
 
 AXES = ("x", "y", "z")
+DAMPINGS = (0.01, 0.1, 1.0, 10.0)  # [N.m.s/rad] of joints that are tried
 LINE = 40  # dampings of the line of limits
 MOST_B = 2.2  # of mass/(Ts + delay): no wall is stable at more damping
 Axis = Literal["x", "y", "z"]
@@ -53,6 +54,7 @@ class WallLimit(Result):
         line_B: dampings from 0 to that at which no wall is stable [N.s/m].
         line_K: largest stable stiffness at them [N/m]: the Z-width of the arm along the axis.
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
+        cause: why no wall is stable, and with what one would be; empty if one is.
     """
 
     drawn_by = "hapticclay.views.joint_plots:wall_plot"
@@ -77,15 +79,21 @@ class WallLimit(Result):
     line_B: np.ndarray
     line_K: np.ndarray
     assumed: tuple[str, ...] = ()
+    cause: str = ""
 
     def headline(self) -> str:
         """The limit in one line."""
-        at = timing_words(self.Ts, self.delay)
-        least = f"{self.low:.4g} to " if self.low > 0.0 else "up to "
-        return (
-            f"wall along {self.axis} at {at}, B = {self.B:g} N.s/m: {least}{self.K:.4g} N/m "
-            f"({self.frequency:.3g} Hz, {self.mass:.3g} kg at the handle)"
-        )
+        at = f"wall along {self.axis} at {timing_words(self.Ts, self.delay)}, B = {self.B:g} N.s/m"
+        return f"{at}: {self.cause or self._room()}"
+
+    def _room(self) -> str:
+        """Stable stiffness in words."""
+        mass = f"{self.mass:.3g} kg at the handle"
+        if math.isinf(self.K):
+            least = f"of {self.low:.4g} N/m or more" if self.low > 0.0 else "of any stiffness"
+            return f"stable {least} ({mass})"
+        least = f"{self.low:.4g} to" if self.low > 0.0 else "up to"
+        return f"{least} {self.K:.4g} N/m ({self.frequency:.3g} Hz, {mass})"
 
     def tables(self) -> Tables:
         """The limit, and what is felt along the axis."""
@@ -114,7 +122,7 @@ class WallLimit(Result):
 def wall_limit(
     arm: MjcfArm,
     axis: Axis,
-    B: Annotated[float, Bound(0.0, 1e6, "N.s/m")],
+    B: Annotated[Real, Bound(0.0, 1e6, "N.s/m")],
     operator: Operator | None,
     Ts: Sample,
     delay: Delay = 0.0,
@@ -181,7 +189,45 @@ def wall_limit(
             f"the motors render the wall alone, from {RATES[velocity]}: no gains of the joints act",
             IGNORED,
         ),
+        "" if limit.high > 0.0 else _cause(rendered, linear, walls, B),
     )
+
+
+def _cause(rendered: Callable[..., JointLoop], linear: Linear, walls: Line, B: float) -> str:
+    """Why no wall is stable, and with which damping of wall or joints one would be."""
+    loop = walls.loop
+    if loop.stable():
+        why = "nothing damps it" if not B else f"B = {B:g} N.s/m is too much"
+    else:
+        bare = "" if linear.damping.any() else "without damping in its joints "
+        held = ", under gravity that is fed forward and held" if loop.position.any() else ""
+        with_B = loop.feeding(0.0 * walls.square, B * walls.square)
+        growth = min(loop.growth, with_B.growth) / loop.Ts
+        why = f"{bare}the arm grows by itself, by {growth:.3g} 1/s{held}"
+    return f"no wall is stable: {why}{_damped_words(rendered, linear, walls, B)}"
+
+
+def _damped_words(rendered: Callable[..., JointLoop], linear: Linear, walls: Line, B: float) -> str:
+    """The first wall among lower dampings of the wall, then higher ones of the joints, in words."""
+    for lower in (0.5 * B, 0.25 * B, 0.1 * B) if B else ():
+        K = walls.limit(lower).high
+        if K > 0.0:
+            return f"; with B = {lower:g} N.s/m {_up_to(K)}"
+    none = 0.0 * linear.damping
+    for more in DAMPINGS:
+        damped = linear._replace(damping=linear.damping + more * np.eye(len(none)))
+        K = (
+            Line(rendered(0.0, linear=damped).feeding(none, -B * walls.square), walls.along)
+            .limit(B)
+            .high
+        )
+        if K > 0.0:
+            return f"; with {more:g} N.m.s/rad of damping more in each joint {_up_to(K)}"
+    return ""
+
+
+def _up_to(K: float) -> str:
+    return "any stiffness" if math.isinf(K) else f"up to {K:.4g} N/m"
 
 
 class Line:
@@ -190,11 +236,12 @@ class Line:
     Attributes:
         loop: the arm without a wall.
         along: the Jacobian's row along the line, shape (n,).
+        square: torques of the joints per joint motion, of a unit stiffness along it, shape (n, n).
     """
 
     def __init__(self, loop: JointLoop, along: np.ndarray):
         self.loop, self.along = loop, along
-        self._square, self._even = np.outer(along, along), even_grid(loop)
+        self.square, self._even = np.outer(along, along), even_grid(loop)
         self._at_even = self.felt(self._even)
 
     def felt(self, angles: np.ndarray) -> np.ndarray:
@@ -208,11 +255,11 @@ class Line:
 
     def limit(self, B: float) -> Limit:
         """Stable stiffness of a wall with damping B [N/m]."""
-        nothing = 0.0 * self._square
-        damped = self.loop.feeding(nothing, B * self._square)
+        nothing = 0.0 * self.square
+        damped = self.loop.feeding(nothing, B * self.square)
 
         def stiffer(K: float) -> JointLoop:
-            return damped.feeding(K * self._square, nothing)
+            return damped.feeding(K * self.square, nothing)
 
         one = np.ones((1, 1))
         return Family(_Damped(self, damped, B), "position", one, one, 0.0, stiffer).limit()
@@ -241,6 +288,6 @@ class _Damped(Circle):
         closed = 1.0 / (1.0 + self._B * v)
         return (q * closed)[:, None, None], (v * closed)[:, None, None]
 
-    def at_rest(self) -> np.ndarray:
+    def at_rest(self, of: str) -> np.ndarray:
         along = self._line.along
-        return np.array([[along @ self.loop.at_rest() @ along]])
+        return np.array([[along @ super().at_rest(of) @ along]])

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..arguments import named
-from ..errors import Bound, ParameterError, choice, number
+from ..errors import Bound, ParameterError, Real, choice, number
 from ..fields import check_fields
 from ..formulas import arm as arm_law
 from ..formulas.constants import B_MAX
@@ -60,16 +60,16 @@ class LinearLoop:
     """
 
     axis: Literal["x", "y"] = "x"
-    b: Annotated[float, Bound(0.0, B_MAX, "N.s/m")] = 0.0
+    b: Annotated[Real, Bound(0.0, B_MAX, "N.s/m")] = 0.0
     operator: Operator | None = None
     servo: Servo = None  # type: ignore[assignment]  # __post_init__ puts the axis's own there
     compensator: Compensator = PRINTED
     K: Annotated[float | None, Bound(0.0)] = None
-    Ts: Annotated[float | None, Bound(1e-6, 1.0, "s")] = None
-    delay: Annotated[float, Bound(0.0, 1.0, "s")] = 0.0
+    Ts: Annotated[Real | None, Bound(1e-6, 1.0, "s")] = None
+    delay: Annotated[Real, Bound(0.0, 1.0, "s")] = 0.0
     render: Render = "held"
-    mobility: Annotated[float | None, Bound(0.0, 1e12, "1/kg", above=True)] = None
-    k: Annotated[float, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
+    mobility: Annotated[Real | None, Bound(0.0, 1e12, "1/kg", above=True)] = None
+    k: Annotated[Real, Bound(0.0, STIFFNESS_MAX, "N/m")] = 0.0
 
     def __post_init__(self):
         axis = AXES.index(choice("axis", self.axis, AXES))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..arguments import checked
-from ..errors import Bound
+from ..errors import Bound, Real
 from ..scene.virtual_wall import Device, VirtualWall
 from . import linear_loop, roots
 from .loops import Loop, of_loop
@@ -59,8 +59,8 @@ def passivity(loop: Loop) -> Verdict:
 @checked
 def colgate_schenkel(
     H: Callable[[np.ndarray], np.ndarray],
-    Ts: Annotated[float, Bound(0.0, unit="s", above=True)],
-    damping: Annotated[float, Bound(0.0, unit="N.s/m")],
+    Ts: Annotated[Real, Bound(0.0, unit="s", above=True)],
+    damping: Annotated[Real, Bound(0.0, unit="N.s/m")],
     n: int = FREQUENCIES,
 ) -> Verdict:
     """Passivity of a sampled virtual object behind a physical damper.
@@ -96,11 +96,11 @@ def _sampled_verdict(need: np.ndarray, damping: float, omega: np.ndarray) -> Ver
 
 @checked
 def clay_passivity(
-    b: Annotated[float, Bound(0.0, unit="N.s/m")],
-    Ts: Annotated[float, Bound(0.0, unit="s", above=True)],
-    damping: Annotated[float, Bound(0.0, unit="N.s/m")] = 0.0,
-    stiffness: Annotated[float, Bound(0.0, unit="N/m")] = 0.0,
-    delay: Annotated[float, Bound(0.0, unit="s")] = 0.0,
+    b: Annotated[Real, Bound(0.0, unit="N.s/m")],
+    Ts: Annotated[Real, Bound(0.0, unit="s", above=True)],
+    damping: Annotated[Real, Bound(0.0, unit="N.s/m")] = 0.0,
+    stiffness: Annotated[Real, Bound(0.0, unit="N/m")] = 0.0,
+    delay: Annotated[Real, Bound(0.0, unit="s")] = 0.0,
 ) -> Verdict:
     """Passivity of held clay alone, its velocity a backward difference.
 

@@ -16,9 +16,10 @@ from typing import Annotated, Literal
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
 from ..display import brief
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..model.compensator import Compensator
 from ..scene.virtual_wall import VirtualWall
 from . import gain_limits, hand_boxes
@@ -120,7 +121,7 @@ def _stability(
         fixed, turned = fixed[1:, 1:], turned[1:, 1:]
 
     def stable(x: np.ndarray) -> np.ndarray:
-        z1 = np.linalg.eigvals(fixed + (x / unit)[:, None, None] * turned)
+        z1 = matrices.eigenvalues(fixed + (x / unit)[:, None, None] * turned)
         return np.all(2.0 * z1.real + np.abs(z1) ** 2 < 0.0, axis=1)
 
     return grid, stable
@@ -174,7 +175,7 @@ def renderable(
 @checked
 def least_mass(
     loop: Loop,
-    decay: Annotated[float, Bound(0.0, 1e6, "1/s")],
+    decay: Annotated[Real, Bound(0.0, 1e6, "1/s")],
     box: Box | None = None,
     samples: int = 24,
 ) -> tuple[float, float]:

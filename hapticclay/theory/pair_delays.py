@@ -10,19 +10,21 @@ eigenvalue of H is larger than 1 at z = -1, more and more eigenvalues of the pai
 
 from __future__ import annotations
 
-import itertools
 import math
+from collections.abc import Iterator
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from . import joint_crossings
+from .. import matrices
+from . import joint_crossings, pair_branches
 from .joint_loop import MOST_STATES, ROUNDING, near_resonances
 from .pair_loop import PairLoop
 from .rest import FREE, NO_DRAG
 
-SLOWEST = 1e-4  # [rad] least angle of the search
+SLOWEST = 1e-6  # [rad] least angle of the search
+NOISE = 1e-16  # of the logarithm of a size, times the square of the angle
 TURN = 1e-6  # of an angle: of differences
 EVEN, BY_FACTORS = 300, 300  # angles of the search
 REAL = 1e-9  # imaginary part over size of an eigenvalue that counts as real
@@ -64,26 +66,41 @@ class Delays:
 
     @cached_property
     def angles(self) -> np.ndarray:
-        """Angles of the search."""
+        """Angles of the search to begin with."""
         even = np.linspace(0.0, math.pi, EVEN + 1)[1:]
-        found = [even, np.geomspace(SLOWEST, 1.0, BY_FACTORS)]
+        found = [
+            even,
+            np.geomspace(SLOWEST, 1.0, BY_FACTORS),
+            near_resonances(self.loop.open_poles()),
+        ]
         if self.loop.states <= MOST_STATES // 3:
             found.append(near_resonances(self.loop.eigenvalues))
-            found.append(near_resonances(self.loop.open_poles()))
         every = np.concatenate(found)
         return np.unique(every[(every >= SLOWEST) & (every <= math.pi)])
 
     @cached_property
     def _crossings(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles at which an eigenvalue of H has size 1, its argument, and how its size moves."""
-        theta, x = joint_crossings.zeros(self.loop.around, self.angles, joint_crossings.log_size)
+        theta, values = pair_branches.followed(self._values, self.angles, noise=NOISE)
+        size = joint_crossings.log_size(values)
+        # near rest H is 1 but for the square of the angle, and rounding, which grows as its inverse
+        unclear = np.abs(size) * theta[:, None] ** 2 < NOISE
+        side = np.where(unclear, 0.0, np.sign(size))
+        for i in range(len(side) - 2, -1, -1):
+            side[i] = np.where(side[i] == 0.0, side[i + 1], side[i])
+        i, branch = np.nonzero(side[:-1] * side[1:] < 0.0)
+        ends = (theta[i], theta[i + 1]), (values[i, branch], values[i + 1, branch])
+        theta, x = joint_crossings.refined(self.loop.around, joint_crossings.log_size, *ends)
         slope = np.array([self._slope(*each) for each in zip(theta, x, strict=True)])
         return theta, np.angle(x), slope
+
+    def _values(self, theta: np.ndarray) -> np.ndarray:
+        return matrices.eigenvalues(self.loop.around(theta))
 
     def _slope(self, theta: float, x: complex) -> float:
         sides = []
         for turn in (1.0 - TURN, 1.0 + TURN):
-            values = np.linalg.eigvals(self.loop.around(np.array([turn * theta])))[0]
+            values = matrices.eigenvalues(self.loop.around(np.array([turn * theta])))[0]
             sides.append(abs(values[np.argmin(np.abs(values - x))]))
         return sides[1] - sides[0]
 
@@ -102,7 +119,7 @@ class Delays:
 
     def _at_nyquist(self, most: float) -> list[Edge]:
         """Where eigenvalues come up at z = -1, outside the circle: on the axis, then as pairs."""
-        values = np.linalg.eigvals(self.loop.around(np.array([math.pi])))[0]
+        values = matrices.eigenvalues(self.loop.around(np.array([math.pi])))[0]
         out = []
         for x in values[np.abs(values) > 1.0]:
             argument = float(np.angle(x)) / math.pi
@@ -127,7 +144,7 @@ class Delays:
         none = max(FREE, NO_DRAG / max(float(np.linalg.norm(here, 2)), joint_crossings.NO_SIZE))
         if none >= 1.0:
             return []
-        values = np.linalg.eigvals(np.linalg.pinv(here, rcond=none) @ (here - later))
+        values = matrices.eigenvalues(matrices.pseudo_inverse(here, none) @ (here - later))
         real = values[(np.abs(values.imag) <= REAL * np.abs(values)) & (values.real > REAL)]
         return [self._steady_edge(1.0 / x) for x in real.real.tolist()]
 
@@ -144,21 +161,27 @@ class Delays:
         """The edge at which the pair, stable at the least delay, turns unstable; None for none."""
         return next((edge for edge in self.edges(most) if edge.change > 0), None)
 
+    def windows(self, most: float) -> Iterator[tuple[float, float, Edge | None]]:
+        """Where the pair is unstable: from and up to which samples, and the edge it begins at."""
+        count, start, first = self.unstable, float(self.least), None
+        for edge in self.edges(most):
+            before, count = count, count + edge.change
+            if before <= 0 < count:
+                start, first = edge.samples, edge
+            elif count <= 0 < before:
+                yield start, edge.samples, first
+        if count > 0:
+            yield start, math.inf, first
+
     def first_alike(self, most: float) -> tuple[int, Edge | None] | None:
         """The least whole delay, both ways alike, at which the pair is unstable; None for none.
 
-        With it, the last edge up to there at which eigenvalues leave the circle.
+        With it, the edge behind which it is.
         """
-        count, last = self.unstable, None
-        if count:
-            return math.ceil(0.5 * self.least), None
-        each_way = itertools.groupby(self.edges(most), lambda x: math.ceil(0.5 * x.samples))
-        for whole, edges in each_way:
-            for edge in edges:
-                count += edge.change
-                last = edge if edge.change > 0 else last
-            if count > 0:
-                return whole, last
+        for start, end, edge in self.windows(most):
+            whole = math.ceil(0.5 * start)
+            if start <= 2.0 * whole < end and 2.0 * whole <= most:
+                return whole, edge
         return None
 
     def near(self, edge: Edge) -> Edge:

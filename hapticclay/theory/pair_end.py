@@ -184,11 +184,47 @@ class End:
 
     def responses(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Positions, measured rates and message per (e, r), each of shape (m, ..., n + m)."""
-        found = np.linalg.solve(self.equations(z), self.inputs.astype(complex)[None])
-        sent, echo = self.message
-        message = sent @ found
-        message[:, :, self.n :] += echo
-        return found[:, self.columns["q"]], found[:, self.columns["v"]], message
+        n, m, control = self.n, self.messages, self.control
+        z = np.asarray(z)[:, None, None]
+        own, other = self._motion(z)
+        torque, state, sent = (
+            np.split(x, [3 * n, 3 * n + m], axis=1)
+            for x in (control.torque, control.state, control.message)
+        )
+        law = torque[0] - np.hstack([self.loop.position, self.loop.rate, np.zeros((n, n))])
+        arrived, rows = other @ torque[1], np.vstack([law, state[0]])
+        left = np.zeros((len(z), n + control.states, n + control.states), complex)
+        left[:, :n, :n], left[:, :n, n:] = np.eye(n), -torque[2]
+        left[:, n:, n:] = z * np.eye(control.states) - state[2]
+        left[:, :, :n] -= rows @ own
+        right = np.zeros((len(z), n + control.states, n + m), complex)
+        right[:, :n, :n], right[:, n:, n:] = np.eye(n), state[1]
+        right[:, :, n:] += rows @ arrived
+        found = np.linalg.solve(left, right)
+        moved = own @ found[:, :n]
+        moved[:, :, n:] += arrived
+        message = sent[0] @ moved + sent[2] @ found[:, n:]
+        message[:, :, n:] += sent[1]
+        return moved[:, :n], moved[:, n : 2 * n], message
+
+    def _motion(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(q, v, F) per torque of the host's own and from what arrives, shape (m, 3n, n) each."""
+        n, loop, load = self.n, self.loop, self.load
+        streams = loop, self.received
+        pushed = np.concatenate(
+            [np.broadcast_to(_given(x, z), (len(z), 2 * n, n)) for x in streams], axis=2
+        )
+        moved = np.linalg.solve(z * np.eye(2 * n) - loop.hold[0], pushed)
+        q, w = moved[:, :n], moved[:, n:]
+        v = w
+        if loop.velocity != "exact":
+            keep, gain = loop.rate_filter
+            v = gain * (1.0 - 1.0 / z) / (1.0 - keep / z) * q
+        F = (load.stiffness - self._on_load @ loop.stiffness) @ q
+        F = F + (load.damping - self._on_load @ loop.damping) @ w
+        F += np.concatenate([_before(x, z) * self._on_load for x in streams], axis=2)
+        signals = np.concatenate([q, v, F], axis=1)
+        return signals[:, :, :n], signals[:, :, n:]
 
 
 def _split(control: Control, name: str) -> dict[str, np.ndarray]:

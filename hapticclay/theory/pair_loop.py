@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .. import matrices
 from ..errors import ParameterError
 from .joint_loop import MOST_STATES, is_stable
 from .pair_end import End
@@ -107,13 +108,13 @@ class PairLoop:
         found = []
         for end in self.ends:
             side = _Side(end, np.eye(end.states))
-            found.append(np.linalg.eigvals(side.next(np.zeros((end.messages, end.states)))))
+            found.append(matrices.eigenvalues(side.next(np.zeros((end.messages, end.states)))))
         return np.concatenate(found)
 
     @cached_property
     def eigenvalues(self) -> np.ndarray:
         """Eigenvalues of the map, largest first, without those of rest anywhere (z = 1)."""
-        z = np.linalg.eigvals(self.map())
+        z = matrices.eigenvalues(self.map())
         nearest = np.argsort(np.abs(z - 1.0), kind="stable")
         z = np.delete(z, nearest[: self.structural + self.free])
         return z[np.argsort(-np.abs(z), kind="stable")]
@@ -131,7 +132,7 @@ class PairLoop:
     @cached_property
     def structural(self) -> int:
         """Directions in which the pair rests anywhere: eigenvalues at 1 that are no verdict."""
-        size = np.linalg.svd(balanced(self._at_rest)[0], compute_uv=False)
+        size = matrices.singular_values(balanced(self._at_rest)[0])
         return int(np.sum(size <= FREE * size[0]))
 
     @cached_property
@@ -148,12 +149,20 @@ class PairLoop:
             )
         return out
 
-    def equations(self, z: complex) -> np.ndarray:
-        """T(z) of both ends and of what arrives at leader and follower."""
+    def equations(self, z: complex, ahead: bool = False) -> np.ndarray:
+        """T(z) of both ends and of what arrives at leader and follower.
+
+        Args:
+            z: a number.
+            ahead: whether what arrives is counted at its sample, times z^N, which stays finite for
+                small z, or at that of its sending.
+        """
         sizes, m = [end.size for end in self.ends], self.leader.messages
         out = np.zeros((sum(sizes) + 2 * m,) * 2, complex)
         starts = (0, sizes[0])
-        late = z**-self.back, z**-self.there
+        samples = self.back, self.there
+        late = [1.0 if ahead else z**-n for n in samples]
+        arrived = [z**n if ahead else 1.0 for n in samples]
         for i, end in enumerate(self.ends):
             own = slice(starts[i], starts[i] + sizes[i])
             mine = slice(sum(sizes) + i * m, sum(sizes) + (i + 1) * m)
@@ -161,7 +170,7 @@ class PairLoop:
             out[own, own] = end.equations(np.array([z]))[0]
             out[own, mine] = -end.inputs[:, end.n :]
             sent, echo = end.message
-            out[mine, mine] += np.eye(m)
+            out[mine, mine] += arrived[i] * np.eye(m)
             out[other, own] -= late[1 - i] * sent
             out[other, mine] -= late[1 - i] * echo
         return out
@@ -181,15 +190,15 @@ class PairLoop:
 
     def shape(self, z: complex) -> tuple[np.ndarray, np.ndarray]:
         """Motion of leader and follower at an eigenvalue, shape (n,) each."""
-        whole, _, columns = balanced(self.equations(z))
-        X = columns * np.linalg.svd(whole)[2][-1].conj()
+        whole, _, columns = balanced(self.equations(z, abs(z) < 1.0))
+        X = columns * matrices.svd(whole)[2][-1].conj()
         start = self.leader.size
         return X[: self.leader.n], X[start : start + self.follower.n]
 
     def singular(self, z: complex) -> bool:
         """Whether z is an eigenvalue, rather than a little beside one."""
-        beside = [balanced(self.equations(x))[0] for x in (z, z * (1.0 + BESIDE))]
-        sizes = np.linalg.svd(np.array(beside), compute_uv=False)[:, -1]
+        beside = [balanced(self.equations(x, abs(z) < 1.0))[0] for x in (z, z * (1.0 + BESIDE))]
+        sizes = matrices.singular_values(np.array(beside))[:, -1]
         return bool(sizes[0] < SINGULAR * sizes[1])
 
     @property
@@ -213,9 +222,16 @@ class PairLoop:
         """
         if not self.structural:
             return np.zeros((self.n, self.n))
-        Y = self._rest.drift(self._inputs)[1]
+        return self._rates(self._rest.drift(self._inputs)[1])
+
+    def unresisted(self) -> np.ndarray:
+        """Measured rates of steady motions that nothing resists, shape (n, free)."""
+        return self._rates(self._rest.unresisted()) if self.free else np.zeros((self.n, 0))
+
+    def _rates(self, X: np.ndarray) -> np.ndarray:
+        """Measured rates of leader and follower in unknowns of the equations."""
         v = self.leader.columns["v"], self.follower.columns["v"]
-        return np.vstack([Y[v[0]], Y[self.leader.size :][v[1]]])
+        return np.vstack([X[v[0]], X[self.leader.size :][v[1]]])
 
     # ---- on the unit circle
 

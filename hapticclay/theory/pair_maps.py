@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..arguments import checked, named
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..results import Result, Tables
 from ..scene.link import KINDS, Link
 from ..scene.pair import Pair
@@ -84,7 +84,7 @@ def pair_map(
     pair: Pair,
     gains: Annotated[int, Bound(2, 200)] = 20,
     delays: Annotated[int, Bound(2, 200)] = 20,
-    longest: Annotated[float | None, Bound(0.0, LATEST, "s", above=True)] = None,
+    longest: Annotated[Real | None, Bound(0.0, LATEST, "s", above=True)] = None,
 ) -> PairMap:
     """Where a pair is stable over gain and delay: eigenvalues counted on the unit circle.
 

@@ -72,6 +72,7 @@ class _Search:
             return found and self._at(found._replace(delay=found.delay - 1.0))
         if not any(end.control.feels for end in without.loop.ends):
             found = self._first(0.0)
+            found = self._between(found.delay - 1.0 if found else math.inf) or found
             return found and self._at(self._crossed(found.delay - 1.0, found))
         return self._among_switches()
 
@@ -98,6 +99,17 @@ class _Search:
         found = self._delays(share)
         first = found.first_alike(2.0 * LATEST / self.Ts)
         return first and _Unstable(first[0] + share, first[1])
+
+    def _between(self, before: float) -> _Unstable | None:
+        """A delay at which the pair is unstable, in a window between whole samples, before one.
+
+        Samples that are counted as real numbers say where it may be, the map whether it is.
+        """
+        for start, end, edge in self._delays(0.0).windows(2.0 * min(before, LATEST / self.Ts)):
+            middle = 0.25 * (start + min(end, 2.0 * before))
+            if middle < before and self._unstable(middle):
+                return _Unstable(middle, edge)
+        return None
 
     def _crossed(self, low: float, high: _Unstable) -> _Unstable:
         """Where instability begins between a stable delay and an unstable one, without a jump."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arguments import checked, named
 from ..arms.mechanism import STILL
-from ..errors import Bound, ParameterError
+from ..errors import Bound, ParameterError, Real
 from ..results import Result, Tables
 from ..scene import pair as pairs
 from ..scene.link import ENDS
@@ -128,7 +128,7 @@ class PairTransparency(Result):
 def pair_transparency(
     pair: Pair,
     axis: Literal["x", "y", "z"] = "x",
-    frequency: Annotated[tuple[float, ...] | None, Bound(0.0, 1e6, "Hz", above=True)] = None,
+    frequency: Annotated[tuple[Real, ...] | None, Bound(0.0, 1e6, "Hz", above=True)] = None,
 ) -> PairTransparency:
     """Impedance felt through a pair, its tracking, and Llewellyn's criterion, along one axis.
 

@@ -15,17 +15,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .joint_crossings import NO_SIZE, branches
+from .. import matrices
+from .joint_crossings import NO_SIZE
 from .joint_loop import near_resonances
+from .pair_branches import followed, log_size
 from .pair_loop import PairLoop
 
 BESIDE = 1e-9  # of a radius: by so much the circle of a count is larger than an eigenvalue
+RIM = 1e-6  # the same of the circle around rest, near which rounding grows as 1/distance^2
 BESIDE_POLE = 2.0**-50  # of it
 EVEN, BY_FACTORS = 300, 150  # angles to begin with
 LEAST = 1e-10  # [rad] smallest of them
-WIDE = 0.7  # change of the logarithm of an eigenvalue of H between two angles
-FAINT = -1.5  # logarithm of what is too small to reach the real axis beyond 1
-ROUNDS, FINEST = 40, 1e-13  # of halving intervals of angles; their least width
 LONGEST = 0.1  # step of Newton's method, of the logarithm
 NEAR = 0.3  # logarithm of sizes that are computed where the phases match, not interpolated
 TOPS = 24  # starts of Newton's method
@@ -41,7 +41,7 @@ INWARD = 0.8  # where between a radius and 1 the next circle of a stable pair li
 def largest(loop: PairLoop, samples: float) -> complex:
     """The largest eigenvalue at a number of samples there and back, but for those of rest."""
     pair = _Pair(loop, samples)
-    low, high, best = 0.0, 1.0 + BESIDE, 0j
+    low, high, best = 0.0, 1.0 + pair.rim, 0j
     matches, count = pair.matches(high)
     best = pair.roots(high, matches)
     while count > 0 and high < LARGEST:
@@ -66,9 +66,10 @@ def largest(loop: PairLoop, samples: float) -> complex:
     return best
 
 
-def beyond(loop: PairLoop, samples: float, r: float = 1.0 + BESIDE) -> int:
-    """Number of eigenvalues beyond a circle of radius r, which passes through none."""
-    return _Pair(loop, samples).matches(r)[1]
+def beyond(loop: PairLoop, samples: float, r: float | None = None) -> int:
+    """Number of eigenvalues beyond a circle that passes through none: of radius r, or around 1."""
+    pair = _Pair(loop, samples)
+    return pair.matches(r or 1.0 + pair.rim)[1]
 
 
 class _Match(NamedTuple):
@@ -95,12 +96,17 @@ class _Pair:
         self.poles = loop.open_poles()
         self._singular: dict[complex, bool] = {}
 
+    @property
+    def rim(self) -> float:
+        """Distance from 1 at which rounding does not hide eigenvalues of rest, where there are."""
+        return RIM if self.loop.structural else BESIDE
+
     def values(self, log: np.ndarray) -> np.ndarray:
         """Eigenvalues of H at z = exp(log), shape (m, k)."""
         try:
-            return np.linalg.eigvals(self.loop.around(-1j * log))
+            return matrices.eigenvalues(self.loop.around(-1j * log))
         except np.linalg.LinAlgError:  # on a pole: beside it, by less than its rounding
-            return np.linalg.eigvals(self.loop.around(-1j * (log + BESIDE_POLE)))
+            return matrices.eigenvalues(self.loop.around(-1j * (log + BESIDE_POLE)))
 
     def at_rest(self, r: float) -> int:
         """Eigenvalues of rest beyond a circle."""
@@ -118,22 +124,7 @@ class _Pair:
         near = near_resonances(self.poles / r) if r > GONE else np.empty(0)
         start.append(near[(near > 0.0) & (near < math.pi)])
         theta = np.unique(np.concatenate(start))
-        values = self._on_circle(r, theta)
-        for _ in range(ROUNDS):
-            values = branches(values)
-            log = np.log(np.maximum(np.abs(values), NO_SIZE)) - self.N * math.log(r)
-            turn = np.abs(np.angle(values[1:] * values[:-1].conj()))
-            wide = (np.maximum(turn, np.abs(np.diff(log, axis=0))) > WIDE) & (
-                np.maximum(log[1:], log[:-1]) > FAINT
-            )
-            gap = np.diff(theta)
-            i = np.flatnonzero(wide.any(axis=1) & (gap > FINEST))
-            if not len(i):
-                break
-            middle = theta[i] + 0.5 * gap[i]
-            values = np.insert(values, i + 1, self._on_circle(r, middle), axis=0)
-            theta = np.insert(theta, i + 1, middle)
-        return theta, values
+        return followed(lambda x: self._on_circle(r, x), theta, self.N * math.log(r))
 
     def _on_circle(self, r: float, theta: np.ndarray) -> np.ndarray:
         values = self.values(math.log(r) + 1j * theta)
@@ -144,7 +135,7 @@ class _Pair:
     def matches(self, r: float) -> tuple[_Match, int]:
         """Where phases match on a circle, and how many eigenvalues lie beyond it."""
         theta, values = self.followed(r)
-        size = np.log(np.maximum(np.abs(values), NO_SIZE)) - self.N * math.log(r)
+        size = log_size(values) - self.N * math.log(r)
         log = size + 1j * np.unwrap(np.angle(values), axis=0)
         turns = (self.N * theta[:, None] - log.imag) / (2.0 * math.pi)
         ends, axis = turns[[0, -1]], np.round(turns[[0, -1]])
@@ -162,11 +153,12 @@ class _Pair:
         i, shift = np.flatnonzero(np.abs(log.real) < NEAR), self.N * math.log(r)
         for _ in range(STEPS if len(i) else 0):
             every = self.values(math.log(r) + 1j * theta[i])
-            value = _nearest(every, np.exp(log[i] + shift))
+            with np.errstate(over="ignore", invalid="ignore"):  # far beyond: no root is near
+                value = _nearest(every, np.exp(log[i] + shift))
             turned = log[i].imag + np.angle(value * np.exp(-1j * log[i].imag))
-            new = np.log(np.maximum(np.abs(value), NO_SIZE)) - shift + 1j * turned
+            new = log_size(value) - shift + 1j * turned
             miss = self.N * theta[i] - turned - 2.0 * math.pi * turn[i]
-            move = -miss / (self.N - slope[i].real)
+            move = _bounded(-miss / (self.N - slope[i].real), LONGEST)
             theta[i] += move
             log[i] = new + 1j * slope[i] * move
             if np.abs(move).max() <= SOLVED:
@@ -188,7 +180,7 @@ class _Pair:
         """Whether a root is none of rest: near 1, by a count on both sides of it."""
         if abs(z - 1.0) > CLOSE:
             return True
-        if abs(abs(z) - 1.0) <= 2.0 * BESIDE:
+        if abs(abs(z) - 1.0) <= 2.0 * self.rim:
             return False
         sides = [self.matches((1.0 + x) * abs(z))[1] for x in (-BESIDE, BESIDE)]
         return sides[0] > sides[1]

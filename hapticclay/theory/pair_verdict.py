@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,25 +12,28 @@ from typing import Any
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import checked, named
 from ..arms.joint_units import Joints, table_of
 from ..display import time_words
 from ..results import Result, Tables
 from ..scene.pair import Pair
 from ..scene.pair_hardware import slides_of
-from . import joint_crossings, pair_roots, roots
+from . import joint_crossings, pair_advice, pair_branches, pair_roots, roots
 from .held_words import pair_words
 from .joint_families import NEAR
-from .joint_loop import grid, is_stable
+from .joint_loop import ROUNDING, grid, is_stable
 from .pair_build import Build
-from .pair_delays import SLOWEST
 from .pair_loop import PairLoop
 from .pair_onset import LATEST, Onset, onset
+from .rest import FREE
 
 LARGE = 200  # states of a map whose eigenvalues are not worth their time
-HIGHEST = 64.0  # factor of all Kp up to which gains are tried
+HIGHEST = 64.0  # factor of all Kp up to which gains are tried ...
+OCTAVE = 5  # ... so many from one to its double
 EXACT = 1e-4  # relative width within which that factor is found
 COARSE = 1e-2  # the same for a map that is LARGE
+SLOW = 1e-4  # [rad] of an angle below which rounding may hide the imaginary part of a response
 STEADY = 1e-6  # [Hz] of a motion that does not oscillate
 OPPOSED, COMMON, NONE = "arms opposed", "common motion", "rest alone"
 GONE = 1e-3  # size of an eigenvalue whose motion is over at the next sample
@@ -55,8 +59,8 @@ class PairLimits(Joints, Result):
             one if no delay that was looked at is unstable [Hz].
         joint: joint that moves most in it.
         mode: that motion in words.
-        gain: largest factor of all Kp of both arms, from the present ones on, found by doubling;
-            inf for more than 64; 0 if the pair is unstable.
+        gain: largest factor of all Kp of both arms, from the present ones on: with each less the
+            pair is stable; inf for more than 64; 0 if the pair is unstable.
         slope: largest slope of a friction fed forward at one joint of both arms, Fc k + Fv, with
             none at the others [N.m.s/rad], shape (n,).
         law_slope: slopes of the leader's law [N.m.s/rad], shape (n,).
@@ -66,6 +70,7 @@ class PairLimits(Joints, Result):
         Ts: control sample [s].
         assumed: what the verdict rests on, and what it leaves out, a sentence each.
         slides: whether each joint slides; then its units are those of forces and lengths.
+        remedy: changes of an unstable pair, each of which alone makes it stable by the exact map.
     """
 
     drawn_by = "hapticclay.views.pair_plots:limits_plot"
@@ -91,6 +96,7 @@ class PairLimits(Joints, Result):
     Ts: float
     assumed: tuple[str, ...] = ()
     slides: tuple[bool, ...] = ()
+    remedy: str = ""
 
     @property
     def delay_left(self) -> float:
@@ -113,8 +119,9 @@ class PairLimits(Joints, Result):
         if math.isinf(self.delay):
             return f"any delay of the link up to {LATEST:g} s"
         if self.delay == 0.0:
-            return "no delay of the link is stable"
-        return f"one-way delay up to {time_words(self.delay)}"
+            return "unstable without any delay of the link"
+        again = ", and again here" if self.stable and self.delay < self.present else ""
+        return f"one-way delay up to {time_words(self.delay)}{again}"
 
     def remarks(self) -> Sequence[str]:
         """What to change first, and what the verdict rests on."""
@@ -122,21 +129,15 @@ class PairLimits(Joints, Result):
 
     def advice(self) -> str:
         """The change that gains most, or that brings an unstable pair back."""
-        if 0.0 < self.friction_fraction < 1.0:
-            over = self.names[int(np.argmax(self.law_slope - self.slope))]
-            return (
-                f"friction feed-forward ({over} most), to {self.friction_fraction:.0%} of it or "
-                "less: an undamped common motion, which Kp and Kd cannot touch"
-            )
+        if not self.stable:
+            return self.remedy
+        if math.isinf(self.delay):
+            return f"nothing: no delay of the link up to {LATEST:g} s is too long"
         cause, late = max(self.budget.items(), key=lambda x: x[1])
         lateness = f"{cause} ({time_words(late)} each way"
-        if self.stable and math.isinf(self.delay):
-            return f"nothing: no delay of the link up to {LATEST:g} s is too long"
-        if self.stable:
-            return f"{lateness}; {time_words(self.delay_left)} are left)"
-        if self.delay > 0.0:
-            return f"{lateness}; the link may have {time_words(self.delay)})"
-        return f"gains and rate: unstable without any delay of the link; {lateness})"
+        if self.delay < self.present:
+            return f"{lateness}, and no less: some shorter delays are unstable)"
+        return f"{lateness}; {time_words(self.delay_left)} are left)"
 
     def tables(self) -> Tables:
         """Friction of each joint, lateness by cause, and the whole pair."""
@@ -204,6 +205,7 @@ def pair_limits(pair: Pair) -> PairLimits:
         pair.Ts,
         (pair_words(pair), *study.build.assumed()),
         slides_of(pair.leader),
+        "" if study.stable else pair_advice.remedy(study, fraction),
     )
 
 
@@ -234,21 +236,39 @@ class Study:
         """Whether the pair is stable."""
         return is_stable(self.radius)
 
-    def holds(self, gain: float) -> bool:
-        """Whether it is stable with a factor of all Kp."""
-        return _holds(self.build.loop(gain=gain))
+    def holds(self, gain: float, friction: tuple[np.ndarray, np.ndarray] | None = None) -> bool:
+        """Whether it is stable with a factor of all Kp, and slopes of the friction."""
+        return _holds(self.build.loop(gain=gain, friction=friction))
+
+    def at(self, late: float) -> bool:
+        """Whether it is stable with a one-way delay of the link [s]."""
+        return _holds(self.build.loop((late, late)))
 
     def gain(self) -> float:
-        """Largest factor of all Kp."""
+        """Largest factor of all Kp: up to it, no eigenvalue reaches the circle between factors."""
         if not self.stable:
             return 0.0
         low = 1.0
-        while self.holds(2.0 * low):
+        while low < HIGHEST:
+            factors = self._followed(np.geomspace(low, 2.0 * low, OCTAVE))
+            held = [self.holds(x) for x in factors]
+            if not all(held):
+                i = held.index(False)
+                exact = EXACT if self.loop.states <= LARGE else COARSE
+                return roots.bisect(self.holds, factors[i - 1], factors[i], exact)[0]
             low *= 2.0
-            if low >= HIGHEST:
-                return math.inf
-        exact = EXACT if self.loop.states <= LARGE else COARSE
-        return roots.bisect(self.holds, low, 2.0 * low, exact)[0]
+        return math.inf
+
+    def _followed(self, factors: np.ndarray) -> list[float]:
+        """Factors of all Kp, with more where an eigenvalue may pass the circle between two."""
+        if self.loop.states > LARGE:
+            return factors.tolist()
+
+        def values(log: np.ndarray) -> np.ndarray:
+            loops = (self.build.loop(gain=x) for x in np.exp(log).tolist())
+            return np.array([loop.eigenvalues for loop in loops])
+
+        return np.exp(pair_branches.followed(values, np.log(factors), ROUNDING)[0]).tolist()
 
     # ---- delay
 
@@ -291,8 +311,9 @@ class Study:
         if not _holds(loop):
             return none, 0.0
         angles = grid(loop)
-        angles = angles[angles >= SLOWEST]  # below, rounding hides the imaginary part
         rates, steady = loop.responses(angles)[1], loop.drift()
+        free = np.abs(loop.unresisted()).max(1, initial=0.0)
+        runs_away = free > FREE * free.max()  # under any friction that is fed forward there
         partner = np.abs(self.pair.mapping).argmax(0)
 
         def largest(weights: np.ndarray) -> float:
@@ -300,15 +321,26 @@ class Study:
             used = np.flatnonzero(weights)
             if not len(used):
                 return math.inf
+            if runs_away[used].any():
+                return 0.0
             at, gains = np.ix_(used, used), weights[used][:, None]
 
             def response(theta: np.ndarray) -> np.ndarray:
                 found = rates if theta is angles else loop.responses(theta)[1]
                 return gains * found[:, at[0], at[1]]
 
-            crossed = [-x.change for x in joint_crossings.crossings(response, angles)]
-            every = crossed + _steady(gains * steady[at])
-            return min([x for x in every if x > 0.0], default=math.inf)
+            crossed = joint_crossings.crossings(response, angles)
+            every = [(-x.change, x.theta) for x in crossed]
+            every += [(x, 0.0) for x in _steady(gains * steady[at])]
+            ahead = sorted(x for x in every if x[0] > 0.0)
+            for (factor, theta), after in itertools.zip_longest(ahead, ahead[1:]):
+                beyond = min(0.5 * (factor + after[0]) if after else math.inf, 2.0 * factor)
+                slopes = beyond * weights
+                if not 0.0 < theta < SLOW or not _holds(
+                    self.build.loop(friction=(slopes[:n], slopes[n:]))
+                ):
+                    return factor
+            return math.inf
 
         unit = np.eye(2 * n)
         slope = np.array([largest(unit[j] + unit[n + partner[j]]) for j in range(n)])
@@ -340,6 +372,6 @@ def _holds(loop: PairLoop) -> bool:
 
 def _steady(matrix: np.ndarray) -> list[float]:
     """Factors at which steady motion has no resistance."""
-    values = np.linalg.eigvals(matrix)
+    values = matrices.eigenvalues(matrix)
     real = values[(np.abs(values.imag) <= NEAR * np.abs(values)) & (values.real > 0.0)]
     return (1.0 / real.real).tolist()

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import matrices
 from ..arguments import named
 from ..errors import ParameterError
 from ..model.compensator import moving_states
@@ -164,7 +165,7 @@ class _Pieces:
         if stuck:
             S = matrix_exponential(stuck * self.stuck)
             change = _onto(self.stuck @ S @ end, self.held) @ S @ change
-        z = np.linalg.eigvals(change)
+        z = matrices.eigenvalues(change)
         z = z[np.argsort(np.abs(z - 1.0))][self.neutral :]
         return float(np.max(np.abs(z)))
 
@@ -258,7 +259,7 @@ def _moving_state(loop: Loop) -> np.ndarray:
     gain, damping, stiffness = loop.servo.numbers[:3]
     A, _, C, _ = shape.state_space()
     ahead = damping / stiffness / gain  # the compensator leads by the lag of G
-    rest, *_ = np.linalg.lstsq(np.vstack((A, C)), np.append(np.zeros(n), 1.0))
+    rest = matrices.least_squares(np.vstack((A, C)), np.append(np.zeros(n), 1.0))
     inner = np.array(moving_states(shape, 1.0 / gain)[:n]) + ahead * rest
     return np.concatenate(((0.0, 1.0), inner, (0.0, 1.0)))
 

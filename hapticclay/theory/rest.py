@@ -13,6 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
+from .. import matrices
+
 FREE = 1e-9  # of the largest stiffness or drag: smaller ones are none
 NO_DRAG = 1e-12  # of balanced equations
 TURN = 1e-5  # of z: of differences of derivatives
@@ -34,7 +36,7 @@ class Rest:
     def _vectors(self) -> tuple[np.ndarray, np.ndarray]:
         """L and R: T(1) R = 0 and L' T(1) = 0, as many columns as directions of rest."""
         whole, rows, columns = balanced(self.equations(1.0).real)
-        left, _, right = np.linalg.svd(whole)
+        left, _, right = matrices.svd(whole)
         kept = len(whole) - self.directions
         return rows[:, None] * left[:, kept:], columns[:, None] * right[kept:].T
 
@@ -48,13 +50,38 @@ class Rest:
         L, R = self._vectors
         return L.T @ self._slope() @ R
 
+    def resistance(self, pushed: slice, moved: slice) -> np.ndarray:
+        """Push per sample's step of steady motion, whatever the basis of L and R.
+
+        Args:
+            pushed: equations in which the push stands.
+            moved: unknowns that move.
+        """
+        L, R = self._vectors
+        return np.linalg.solve(L[pushed].T @ R[moved], self.drag)
+
     @cached_property
     def free(self) -> int:
         """Directions of rest in which nothing resists steady motion: eigenvalues 1 once more."""
         if not self.directions:
             return 0
-        size = np.linalg.svd(self.drag, compute_uv=False)
+        size = matrices.singular_values(self.drag)
         return int(np.sum(size <= max(FREE * size[0], NO_DRAG)))
+
+    def unresisted(self) -> np.ndarray:
+        """Y of the steady motions X = R u/(z - 1) + Y that nothing resists, shape (k, free).
+
+        T Y = -T' R u, where drag u = 0.
+        """
+        R = self._vectors[1]
+        null = matrices.svd(self.drag)[2][self.directions - self.free :].T
+        return self._beside(-self._slope() @ R @ null)
+
+    def _beside(self, pushed: np.ndarray) -> np.ndarray:
+        """The least Y of T(1) Y = pushed."""
+        whole, rows, columns = balanced(self.equations(1.0).real)
+        Y = matrices.least_squares(whole, rows[:, None] * pushed, FREE)
+        return columns[:, None] * Y
 
     def trend(self, later: Rest) -> int:
         """What a change does where drag is singular: 1 if the real eigenvalue 1 leaves, else -1.
@@ -66,11 +93,11 @@ class Rest:
             later: the loop after a change.
         """
         L, R = self._vectors
-        left, _, right = np.linalg.svd(self.drag)
+        left, _, right = matrices.svd(self.drag)
         w, u = L @ left[:, -1], R @ right[-1]
         first = self._slope()
         second = (self._slope(1.0 + TURN) - self._slope(1.0 - TURN)) / (2.0 * TURN)
-        X = np.linalg.lstsq(self.equations(1.0).real, -first @ u, rcond=FREE)[0]
+        X = matrices.least_squares(self.equations(1.0).real, -first @ u, FREE)
         change = later._slope() - first
         return 1 if (w @ (0.5 * second @ u + first @ X)) * (w @ change @ u) < 0.0 else -1
 
@@ -80,10 +107,8 @@ class Rest:
         T Y = B - T' R c. Shapes (k, m) each, of inputs (k, m).
         """
         L, R = self._vectors
-        moved = R @ np.linalg.lstsq(self.drag, L.T @ inputs, rcond=NO_DRAG)[0]
-        whole, rows, columns = balanced(self.equations(1.0).real)
-        pushed = rows[:, None] * (inputs - self._slope() @ moved)
-        return moved, columns[:, None] * np.linalg.lstsq(whole, pushed, rcond=FREE)[0]
+        moved = R @ matrices.least_squares(self.drag, L.T @ inputs, NO_DRAG)
+        return moved, self._beside(inputs - self._slope() @ moved)
 
 
 def balanced(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

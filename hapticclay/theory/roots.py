@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from .. import matrices
 from . import exact_roots
 from .exact_roots import axis_parts, exact, rational, square_root, value, within_rounding
 
@@ -31,12 +32,12 @@ SAME = 1e-12  # of their size: roots that cross at such K leave no room between 
 
 def roots(p: Polynomial) -> np.ndarray:
     """Roots of p, with roots at zero exactly zero (`polyroots` returns rounding errors)."""
-    return np.roots(p.coef[::-1])
+    return matrices.polynomial_roots(p.coef[::-1])
 
 
 def nonzero_roots(p: Polynomial) -> np.ndarray:
     """Roots of p other than zero."""
-    return np.roots(np.trim_zeros(p.coef)[::-1])
+    return matrices.polynomial_roots(np.trim_zeros(p.coef)[::-1])
 
 
 def positive_roots(p: Polynomial) -> np.ndarray:

@@ -15,6 +15,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from .. import matrices
 from ..arguments import checked
 from ..errors import Bound, ParameterError, array_of, number
 from ..model.operator import Operator
@@ -192,7 +193,7 @@ def _every_stiffness(wall: VirtualWall) -> gain_crossings.LoopFamily:
         arm, (by_place, by_speed) = _held(wall, omega * Ts), wall_law(wall, omega * Ts)
         return -arm.held_place / (1.0 + by_place * arm.held_place + by_speed * arm.held_speed)
 
-    z1 = np.linalg.eigvals(free).astype(complex)
+    z1 = matrices.eigenvalues(free).astype(complex)
     poles = np.log1p(z1[(np.abs(1.0 + z1) > 1e-6) & (z1 != 0.0)]) / Ts
     size = np.abs(poles[poles != 0.0])
     low = max(1e-3 * min(size.min(initial=math.inf), 1e-3 * top), 1e-12 * top)

@@ -16,6 +16,7 @@ FIELD = 40.0  # [deg] of view
 LEAST_ASPECT = 1.2  # of a picture, for which the cameras are placed
 MARGIN = 0.92  # of a picture that `fit` fills
 VIEWS = {"room": (-50.0, 24.0, 1.0), "top": (-90.0, 89.0, 1.0), "close": (-50.0, 24.0, 0.45)}
+SMALLEST = 0.01  # [m] size of a room, and distance of a camera, of an arm that is one point
 """Azimuth and elevation of each camera [deg], and its distance as a share of the first one's."""
 
 
@@ -81,7 +82,7 @@ def _added(
 def room(places: np.ndarray, handles: np.ndarray) -> mujoco.MjModel:
     """A table below all places, a light, and cameras that see them."""
     low, high = places.min(axis=0), places.max(axis=0)
-    middle, size = 0.5 * (low + high), float((high - low).max())
+    middle, size = 0.5 * (low + high), max(SMALLEST, float((high - low).max()))
     spec = mujoco.MjSpec()
     spec.visual.headlight.ambient[:] = 0.35
     spec.visual.headlight.diffuse[:] = 0.3
@@ -124,7 +125,7 @@ def fit(model: mujoco.MjModel, camera: str, places: np.ndarray) -> None:
     across, high, near = (seen - middle).T
     half = MARGIN * math.tan(math.radians(0.5 * FIELD))
     away = np.maximum(np.abs(across) / (LEAST_ASPECT * half), np.abs(high) / half) + near
-    model.cam_pos[model.camera(camera).id] = target + away.max() * back
+    model.cam_pos[model.camera(camera).id] = target + max(SMALLEST, float(away.max())) * back
 
 
 def look(azimuth: float, elevation: float) -> tuple[np.ndarray, np.ndarray]:

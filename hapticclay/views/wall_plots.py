@@ -194,5 +194,5 @@ def _device_parts(chart: ZWidth) -> list[str]:
     wall = as_wall(chart.regions[0].wall)
     parts = [text for name, text in wall.phrases().items() if name != chart.vary]
     rest = any(r.verdict != BY_GROWTH for r in chart.regions)
-    still = f"rest within {1e6 * chart.press.still:g} um" if rest else ""
+    still = f"rest within {chart.rest_words()}" if rest else ""
     return [*parts, hand_name(wall.subject.operator), still]

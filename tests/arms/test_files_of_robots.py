@@ -2,6 +2,7 @@
 
 import os
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -57,7 +58,9 @@ def saved(tmp_path):
 # ---- URDF ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["package://r/m/{}.stl", "m/{}.dae", "file:///none/{}.obj", "{}"])
+@pytest.mark.parametrize(
+    "name", ["package://r/m/{}.stl", "m/{}.dae", "file:///none/{}.obj", "a\\{}.STL"]
+)
 def test_meshes_are_left_out_where_links_state_inertia(saved, name):
     """By hand: two links, m r^2 + I about their joints."""
     looks = [MESH.format(kind, name.format(kind)) for kind in ("visual", "collision")]
@@ -66,8 +69,10 @@ def test_meshes_are_left_out_where_links_state_inertia(saved, name):
     assert arm.names == ("j1", "j2") and arm.torque_limit == (40.0, 40.0)
     np.testing.assert_allclose(arm.mass_matrix(), M_OF_TWO, rtol=1e-14)
     assert any(x.startswith("not there, and take no part: ") for x in arm.notes)
-    plain = hc.MjcfArm(saved(robot(*TWO)), site="lb")
-    assert not any("not there" in x for x in plain.notes)
+    empty = MESH.format("visual", ""), "<visual/>", "<collision><geometry/></collision>"
+    for more in ("", *empty):
+        plain = hc.MjcfArm(saved(robot(link("la", more=more), *TWO[1:])), site="lb")
+        assert not any("not there" in x for x in plain.notes)
 
 
 def test_continuous_fixed_and_mimic_joints_limits_and_dynamics(saved):
@@ -105,6 +110,16 @@ def test_a_link_whose_inertia_is_in_a_missing_mesh_is_named(saved):
     hanging = link("lc", None, MESH.format("collision", "lc.dae")), joint("j3", "base", "lc")
     arm = hc.MjcfArm(saved(robot(*TWO, *hanging)), site="lb")  # it does not move lb
     np.testing.assert_allclose(arm.mass_matrix(), M_OF_TWO, rtol=1e-14)
+
+
+def test_links_that_turn_nothing_leave_no_log(saved, capfd, tmp_path, monkeypatch):
+    """Eyes of humanoids: MuJoCo warns of their inertia, in a file where one stands."""
+    monkeypatch.chdir(tmp_path)
+    eye = link("eye", (0.0, 1e-6, 0.0)), joint("j3", "lb", "eye")
+    arm = hc.MjcfArm(saved(robot(*TWO, *eye)), site="lb")
+    # a milligram at 0.4 m behind lb, of which M has 0.05 and more
+    np.testing.assert_allclose(arm.linear().inertia, M_OF_TWO, rtol=1e-4)
+    assert not os.path.exists("MUJOCO_LOG.TXT") and not "".join(capfd.readouterr())
 
 
 @pytest.mark.parametrize("kind", ["fixed", "prismatic"])
@@ -147,17 +162,33 @@ def test_a_joint_that_turns_nothing_is_told_what_to_state(saved):
     assert arm.armature == (0.0, 0.0, 0.01)
 
 
-@pytest.mark.parametrize("folder", ["r/urdf", "other/urdf"])
-def test_a_mesh_that_gives_inertia_is_found_in_its_package(saved, folder):
-    """A cube of 0.2 m at 1000 kg/m^3: 8 kg, m a^2/6."""
+def cube():
+    """A cube of 0.2 m, as an OBJ file."""
     corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
     sides = [(0, 2, 6, 4), (1, 5, 7, 3), (0, 4, 5, 1), (2, 3, 7, 6), (0, 1, 3, 2), (4, 6, 7, 5)]
     lines = [f"v {0.2 * x - 0.1} {0.2 * y - 0.1} {0.2 * z - 0.1}" for x, y, z in corners]
     lines += [f"f {a + 1} {b + 1} {c + 1}\nf {a + 1} {c + 1} {d + 1}" for a, b, c, d in sides]
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("key", ["cube.obj", "looks/cube.obj"])
+def test_meshes_in_memory(key):
+    """A spec may hold its files; 1e-6: MuJoCo keeps vertices in single precision."""
+    text = (
+        '<mujoco><compiler meshdir="looks"/><asset><mesh file="cube.obj"/></asset><worldbody><body>'
+        '<joint axis="0 1 0"/><geom type="mesh" mesh="cube"/></body></worldbody></mujoco>'
+    )
+    spec = mujoco.MjSpec.from_string(text, assets={key: cube().encode()})
+    np.testing.assert_allclose(hc.MjcfArm(spec).mass_matrix(), [[8.0 * 0.04 / 6.0]], rtol=1e-6)
+
+
+@pytest.mark.parametrize("folder", ["r/urdf", "other/urdf"])
+def test_a_mesh_that_gives_inertia_is_found_in_its_package(saved, folder):
+    """A cube of 0.2 m at 1000 kg/m^3: 8 kg, m a^2/6."""
     root = folder.split("/")[0]
-    saved("\n".join(lines), "cube.obj", f"{root}/meshes")
-    cube = MESH.format("collision", "package://r/meshes/cube.obj")
-    file = saved(robot(link("la", None, cube), joint("j1", "base", "la", 0.0)), folder=folder)
+    saved(cube(), "cube.obj", f"{root}/meshes")
+    look = MESH.format("collision", "package://r/meshes/cube.obj")
+    file = saved(robot(link("la", None, look), joint("j1", "base", "la", 0.0)), folder=folder)
     arm = hc.MjcfArm(file, site="la")
     # 1e-6: MuJoCo keeps vertices in single precision
     np.testing.assert_allclose(arm.mass_matrix(), [[8.0 * 0.04 / 6.0]], rtol=1e-6)
@@ -299,6 +330,10 @@ REFUSED = {
     ),
     "value.urdf": (robot(*TWO).replace('"40"', '"${e}"'), r"not expanded \(\$\{e\}\)"),
     "no_joints.urdf": (robot(), "must have joints"),
+    "still.urdf": (
+        robot(link("la"), joint("j", "base", "la", kind="fixed", more="")),
+        "must be some that move: the file has none",
+    ),
     "part.xml": ("<mujocoinclude/>", "give the file that includes it"),
     "model.sdf": ('<sdf version="1.6"/>', "is SDF"),
     "scene.usda": ("#usda 1.0", "is USD"),
@@ -318,7 +353,21 @@ def test_what_is_no_model_is_refused_in_one_line(saved, name):
     text, words = REFUSED[name]
     with pytest.raises(hc.ParameterError, match=words) as error:
         hc.MjcfArm(saved(text, name))
-    assert "\n" not in str(error.value) and name in str(error.value)
+    assert "\n" not in str(error.value)
+    assert name in str(error.value) or error.value.field == "joints"
+
+
+@pytest.mark.parametrize("folder", [".", "parts"])
+def test_the_model_of_a_part_is_named(saved, folder):
+    body = f'<body><joint name="j1"/>{STATED}</body>'
+    part = saved(f"<mujocoinclude>{body}</mujocoinclude>", "arm (1).xml", folder)
+    saved(f'<half><include file="{part.name}"/>', "broken.xml")
+    saved("<mujoco><worldbody/></mujoco>", "other.xml")
+    include = f'<include file="{folder}/arm (1).xml"/>'.replace("./", "")
+    whole = saved(f"<mujoco><worldbody>{include}</worldbody></mujoco>", "scene.xml")
+    with pytest.raises(hc.ParameterError, match=r"that includes it, such as .*scene\.xml"):
+        hc.MjcfArm(part)
+    assert hc.MjcfArm(whole).names == ("j1",)
 
 
 def test_a_long_path_is_shown_to_its_end(saved):

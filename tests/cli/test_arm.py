@@ -121,7 +121,7 @@ def test_the_file_s_own_gains(tmp_path, capsys):
     file.write_text(SERVOS)
     assert main(["arm", str(file), "--out", str(out)]) == 0
     text = capsys.readouterr().out
-    assert "gains: of the file, position servos at a, b" in text
+    assert "gains: of the file, position servos at all joints" in text
     assert "each step of 2 ms (implicitfast), undelayed: stable" in text
     assert "unstable at 1000 Hz" in text
     assert gains_of(out) == ([2000.0, 360.0], [200.0, 36.0])

@@ -157,8 +157,9 @@ def test_a_session_without_a_program_says_that_there_is_no_report(tmp_path):
     assert "energy" not in done.stdout  # of an arm at rest
 
 
-def test_sources_beside_an_installed_package_are_said_to_be_sources(tmp_path):
-    """As in the folder of a clone after `pip install .`: what is installed is not taken there."""
+@pytest.fixture
+def clone(tmp_path):
+    """The folder of a clone after `pip install .` elsewhere; runs code there: lines of stderr."""
     root = Path(hc.__file__).parents[1]
     for place in ("clone", "site"):
         (tmp_path / place).mkdir()
@@ -172,12 +173,38 @@ def test_sources_beside_an_installed_package_are_said_to_be_sources(tmp_path):
     info = tmp_path / "site" / "hapticclay-9.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: hapticclay\nVersion: 9\n")
-    code = "from hapticclay.simulation.engines import made_by; print(made_by())"
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path / "clone",
-        env=dict(os.environ, PYTHONPATH=str(tmp_path / "site")),
-    )
-    assert "these are the sources: run outside" in done.stdout, done
+
+    def said(code):
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            capture_output=True,
+            text=True,
+            cwd=tmp_path / "clone",
+            env=dict(os.environ, PYTHONPATH=str(tmp_path / "site")),
+        )
+        assert done.returncode == 0, done
+        return done.stderr.splitlines()
+
+    return said
+
+
+RUN = "import hapticclay as hc; hc.simulate(hc.free(t_max=0.01)); hc.simulate(hc.free(t_max=0.01))"
+
+
+@pytest.mark.parametrize("code", ["import hapticclay", RUN])
+def test_a_program_in_a_clone_that_was_not_built_is_told_so_once(clone, code):
+    """It takes the sources there, and not what is installed."""
+    (line,) = clone(code)
+    assert "no compiled kernel (not built); these are the sources: run outside" in line
+    assert "pip install -e" in line
+
+
+def test_a_program_in_a_clone_whose_sources_have_changed_is_told_so_once(clone, tmp_path):
+    native = tmp_path / "clone/hapticclay/native"
+    native.mkdir()
+    (native / "__init__.py").touch()
+    (native / "built.py").write_text("LACKED = ''\nSOURCES = {'kernel/path.py': 1}\nMODULES = {}\n")
+    (line,) = clone(RUN)
+    assert "built from other sources" in line and "pip install -e" in line
+    (native / "built.py").write_text("LACKED = 'HAPTICCLAY_NATIVE=no'\n")
+    assert clone(RUN) == []  # as asked for, and the run is short

@@ -248,6 +248,17 @@ def straight(method):
     )  # fmt: skip
 
 
+def pulled_apart(method):
+    """A hand pulls a closed chain to where it cannot be closed: an end of the run, no error."""
+    arm = hc.MjcfArm("five_bar")
+    n, parts = len(arm.names), dict(arm=arm, force=(0.0, -30.0), stop_when_unstable=False)
+    law = hc.JointPD((0.5,) * n, (0.01,) * n)
+    return {
+        f"{Ts:g}": hc.Scenario(controller=law, Ts=Ts, dt=Ts, t_max=30 * Ts, render=method, **parts)
+        for Ts in (1e-3, 5e-3)
+    }
+
+
 FINE = Profile(
     tuple(round(1e-4 * i - 0.01, 6) for i in range(300)),
     tuple(100.0 + 100.0 * (i % 2) for i in range(301)),
@@ -266,6 +277,7 @@ THROWN = {
     "accurate: over many borders": thrown("accurate", (3.0, -9.0), 0.02),
 }
 KINDS = THROWN | {
+    "held: plain chains pulled apart": pulled_apart("held"),
     "held: plain arms": arms("held"), "physical: plain arms": arms("physical"),
     "fast: plain": {name: dataclasses.replace(s, dt=2 * TS) for name, s in NEAR.items()} | MORE,
     "accurate: plain": {

@@ -1,5 +1,7 @@
 """SimulationBatch: each run gives the numbers of a Simulation under the same actions."""
 
+import os
+import signal
 from dataclasses import replace
 
 import numpy as np
@@ -26,6 +28,23 @@ KINDS = {
     ],
     "groove": [GROOVE, replace(GROOVE, clay=hc.Clay.of_groove(replace(SOFT, cells=(90, 54))))],
 }
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_fork_has_threads_of_its_own():
+    """Those of its parent do not survive, and would be waited for in vain."""
+    batch, alone = (hc.SimulationBatch([CUT] * 4, workers=2) for _ in range(2))
+    batch.advance(10)
+    alone.advance(20)
+    child = os.fork()
+    if child == 0:
+        signal.alarm(60)
+        batch.advance(10)
+        os._exit(0 if np.array_equal(batch.numbers(), alone.numbers()) else 1)
+    assert os.waitpid(child, 0)[1] == 0
+    batch.advance(10)
+    assert np.array_equal(batch.numbers(), alone.numbers())
 
 
 def assert_alike(batch, single):

@@ -493,6 +493,24 @@ def test_a_snapshot_of_another_scenario_is_refused_and_changes_nothing(name, eng
     same(sim.record(), twin.record())
 
 
+@pytest.mark.parametrize("what", ["state", "before", "rows"])
+def test_a_damaged_snapshot_is_refused_and_changes_nothing(what):
+    sim, twin = hc.Simulation(CUT), hc.Simulation(CUT)
+    for each in (sim, twin):
+        each.advance(37)
+    x = sim.snapshot()
+    damaged = {
+        "state": x._replace(saved=x.saved._replace(state=x.saved.state[:-8])),
+        "before": x._replace(before=x.before._replace(arrays=x.before.arrays[:-1])),
+        "rows": x._replace(rows=np.zeros((10_000, 16))),
+    }[what]
+    with pytest.raises(hc.ParameterError, match="must be as it was taken"):
+        sim.restore(damaged)
+    for each in (sim, twin):
+        each.advance(100)
+    same(sim.record(), twin.record())
+
+
 def test_torques_given_in_steps_return_with_a_snapshot():
     """Those in effect when it was taken; not into a simulation without any."""
     scene = replace(CUT, control="sampled")

@@ -378,7 +378,7 @@ def test_bad_input_is_refused(kw, field):
 
 
 def test_command_line(capsys, tmp_path):
-    args = ["identify", "--axis", "x", "--quick", "--noise", "--out", str(tmp_path)]
+    args = ["identify", "--simulated", "--axis", "x", "--quick", "--noise", "--out", str(tmp_path)]
     assert app.main([*args, "--style", "print", "--dpi", "40", "--data", "--format", "svg"]) == 0
     out, err = capsys.readouterr()
     assert err == "" and "damping [1/s]" in out and "95 % interval" in out
@@ -404,8 +404,11 @@ def test_command_line(capsys, tmp_path):
     [
         (["identify", "--axis", "z"], ["--axis"]),
         (["identfy"], ["did you mean 'identify'"]),
-        (["identify", "--seed", "-1"], ["seed = -1"]),
-        (["identify", "--out", "/proc/x"], ["out = '/proc/x'"]),
+        (["identify"], ["file = None", "the log of a device", "--simulated"]),
+        (["identify", "--quick"], ["quick", "give --simulated too"]),
+        (["identify", "--simulated", "a.csv"], ["simulated", "leave it out with a file"]),
+        (["identify", "--simulated", "--seed", "-1"], ["seed = -1"]),
+        (["identify", "--simulated", "--out", "/proc/x"], ["out = '/proc/x'"]),
     ],
 )
 def test_command_line_refuses(capsys, tmp_path, monkeypatch, args, words):

@@ -323,3 +323,39 @@ def test_an_error_of_two_sines_has_gains(second):
     for name in ("P", "D"):
         half = 0.5 * (found[name].high - found[name].low)
         assert 0.0 < half < 0.02 * found[name].value
+
+
+@pytest.mark.parametrize("by_row", [True, False])
+@pytest.mark.parametrize(
+    "rate, delay, lag", [(30.0, 0.1, 0.08), (50.0, 0.04, 0.15), (100.0, 0, 0.05)]
+)
+def test_a_follower_whose_torque_is_unknown_is_late_and_lags(by_row, rate, delay, lag, tmp_path):
+    """A filter once a row, or a lag in continuous time behind sines, in closed form."""
+    rng = np.random.default_rng(3)
+    t = np.arange(int(20.0 * rate)) / rate
+    f, phase = rng.uniform(0.1, 1.5, 6), rng.uniform(0.0, 6.28, 6)
+    waves = np.exp(2j * np.pi * np.outer(t, f) + 1j * phase)
+    leader = 0.3 * waves.sum(axis=1).real
+    if by_row:
+        a, late = np.exp(-1.0 / (rate * lag)), round(delay * rate)
+        u = np.concatenate((np.full(late, leader[0]), leader))[: len(t)]
+        follower = np.full(len(t), leader[0])
+        for i in range(1, len(t)):
+            follower[i] = a * follower[i - 1] + (1.0 - a) * u[i]
+    else:
+        s = 2j * np.pi * f
+        follower = 0.3 * (waves @ (np.exp(-s * delay) / (1.0 + s * lag))).real
+    follower = 0.1 + follower + 1e-4 * rng.standard_normal(len(t))
+    path = tmp_path / "a.csv"
+    columns = np.column_stack((t, np.degrees(leader), np.degrees(follower)))
+    head = "timestamp,leader [deg],follower [deg]"
+    np.savetxt(path, columns, "%.9g", ",", header=head, comments="")
+    assert hc.studies.log_report(hc.Log.read(path)).commands == (f"hapticclay pair --data {path}",)
+    found = hc.studies.identify_pair(hc.studies.PairLog.load(path))
+    # lines between rows, of sines up to 1.5 Hz at 30 rows a second; splines of a leader by row
+    for name, true in (("delay", delay), ("lag", lag), ("scale", 1.0), ("offset", 0.1)):
+        assert found[name].value == pytest.approx(true, abs=1e-3 + 0.01 * true), name
+    assert found["explained"].value > 0.99
+    assert "s late and lags by" in found.headline()
+    assert any("no torque of the follower was logged" in x for x in found.warnings)
+    assert found.plot().axes

@@ -147,8 +147,24 @@ def test_friction_outweighs_the_encoder_up_to_the_limit_of_abbott_and_okamura():
     # above it half a quantum of force moves the device: it buzzes, if B is large enough for the
     # motion to exceed 1 um
     above = [replace(ROUGH, K=1.1 * limit, B=2.0)]
-    assert come_to_rest(above) == [False]
+    assert come_to_rest(above, Press(still=1e-6)) == [False]
     assert come_to_rest(above, Press(still=1e-4)) == [True]
+
+
+@pytest.mark.parametrize("quantum, rest", [(0.0, 1e-6), (1e-7, 1e-6), (5e-5, 5e-5)])
+def test_by_default_rest_is_what_the_encoder_can_see(quantum, rest):
+    """A micrometre, or a count that is larger; a bound that is stated is taken, and said."""
+    assert Press().rest(quantum) == rest and Press(still=1e-6).rest(quantum) == 1e-6
+    wall = replace(ROUGH, device=replace(ROUGH.device, quantum=quantum), K=440.0, B=2.0)
+    by_default, stated = (zwidth(wall, B=(2.0,), press=x) for x in (Press(), Press(still=rest)))
+    assert by_default.regions[0].K == stated.regions[0].K
+    said = " ".join(by_default.remarks())
+    assert f"back and forth by {1e6 * rest:g} um" in said
+    assert ("(a count of the encoder)" in said) is (quantum > 1e-6)
+    if quantum > 1e-6:
+        less = zwidth(wall, B=(2.0,), press=Press(still=1e-6))
+        assert less.regions[0].K[0] < by_default.regions[0].K[0]
+        assert "(less than a count, 50 um)" in " ".join(less.remarks())
 
 
 def test_a_buzz_without_friction_is_that_of_a_relay():

@@ -205,7 +205,7 @@ def test_the_self_test_sees_a_bit(monkeypatch):
 
 
 def test_a_short_run_in_python_says_nothing_and_a_long_one_says_it_once(monkeypatch, capsys):
-    monkeypatch.setattr(native, "why_not", lambda: "not built")
+    monkeypatch.setattr(native, "why_not", lambda: "not built: no C compiler (cc)")
     monkeypatch.setattr(engines, "_notice_given", False)
     assert engines.engine_for("auto", 10.0) == "python" and not capsys.readouterr().err
     for _ in range(2):

@@ -17,8 +17,9 @@ import hapticclay as hc
 from benchmarks import arm_integrators
 from hapticclay.arms.mechanism import Linear
 from hapticclay.theory import joint_crossings
+from hapticclay.theory.joint_delays import delay_left
 from hapticclay.theory.joint_families import Circle, Family
-from hapticclay.theory.joint_gains import Study, delay_crossing, joint_loop
+from hapticclay.theory.joint_gains import Study, joint_loop
 from hapticclay.theory.wall_limits import stiffness_band
 from tests.hunt import examples, some
 from tests.oracles import joints
@@ -249,7 +250,7 @@ def test_a_crossing_on_the_grid_is_not_missed():
     """An eigenvalue on the circle is an angle of the grid: its size there is 1 to the bit."""
     damping = np.array(leader().damping) + 1e-3 * np.eye(7)[1]
     study = Study(leader(damping=tuple(damping)), LEADER_LAW, 2e-3, 2e-3)
-    left = delay_crossing(study.loop).change
+    left = delay_left(study.loop).change
     assert study.remade(delay=2e-3 + left * (1.0 - 1e-6)).stable()
     assert not study.remade(delay=2e-3 + left * (1.0 + 1e-6)).stable()
     assert left == pytest.approx(1.3479e-3, rel=1e-4)
@@ -258,7 +259,7 @@ def test_a_crossing_on_the_grid_is_not_missed():
 def test_delay_and_rate_left_are_where_stability_ends():
     study = Study(leader(), LEADER_LAW, 2e-3, 2e-3)
     found = limits_at()
-    left = delay_crossing(study.loop).change
+    left = delay_left(study.loop).change
     assert left == found.delay_left
     for share, stable in ((1 - 1e-6, True), (1 + 1e-6, False)):
         assert study.remade(delay=2e-3 + share * left).stable() is stable
@@ -270,7 +271,7 @@ def test_a_long_delay_is_found_on_the_circle():
     one = np.ones((1, 1))
     linear = Linear(one, 8.0 * one, 0 * one, 0 * one, 0 * one, np.zeros((3, 1)))
     loop = joint_loop(linear, hc.JointPD([9.0], [0.0]), 5e-3, 0.0, False)
-    left = delay_crossing(loop).change
+    left = delay_left(loop).change
     # continuous: P e^{-s T}/(s (s + 8)) with a phase of -pi at |.| = 1; the hold adds Ts/2
     w = math.sqrt((-64.0 + math.sqrt(64.0**2 + 4.0 * 81.0)) / 2.0)
     assert left + 2.5e-3 == pytest.approx((math.pi / 2 - math.atan(w / 8.0)) / w, rel=1e-5)
@@ -287,21 +288,15 @@ def test_a_drive_hardly_limits_its_gains():
     assert found.stable and (found.Kp[:, 1] > 5.0 * host.Kp[:, 1]).all()
 
 
-@pytest.mark.parametrize("Kd", [0.0, 0.1, 1e4, 1e8])
+@pytest.mark.parametrize("Kd", [0.0, 0.1, 1e4, 1e8, 1e9])
 def test_a_drive_of_an_arm_without_weight_holds_nothing_and_is_stable(Kd):
     """No torque of the host, so no delay matters; a slow drive decays by exp(-Kp Ts/Kd)."""
     law = hc.JointPD((5.0, 5.0), (Kd, Kd), runs="drive")
     found = hc.theory.joint_limits(hc.MjcfArm("planar_2r"), law, 1e-3, 1e-3)
     assert found.stable and found.delay_left == found.scale == math.inf
     assert "any factor" in found.headline() and "unstable" not in found.text()
-    if Kd > 1e3:
-        assert found.radius == pytest.approx(math.exp(-5.0 * 1e-3 / Kd), abs=1e-10)
-
-
-def test_a_drive_beyond_all_numbers_is_refused():
-    law = hc.JointPD((5.0, 5.0), (1e9, 1e9), runs="drive")
-    with pytest.raises(hc.ParameterError, match="damping = 1e9|damping = 1000000000"):
-        hc.theory.joint_limits(hc.MjcfArm("planar_2r"), law, 1e-3)
+    if Kd > 1e3:  # a double holds a radius to 1e-16
+        assert 1.0 - found.radius == pytest.approx(-math.expm1(-5e-3 / Kd), rel=1e-3, abs=2e-16)
 
 
 def test_friction_fed_forward_has_a_largest_slope():

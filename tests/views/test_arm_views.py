@@ -9,7 +9,7 @@ import hapticclay as hc
 from hapticclay.cli.app import main
 from hapticclay.scene.text import scenario_rows
 from hapticclay.studies.joint_runs import buzz
-from hapticclay.views import film, record_plots, run_figures
+from hapticclay.views import film, record_plots, run_figures, sticks
 from hapticclay.views.buzz_film import buzz_of
 from hapticclay.views.film import FilmOptions
 from tests.views.test_film import needs_gl
@@ -201,3 +201,12 @@ def test_what_needs_the_closed_form_says_so(tmp_path, capsys, monkeypatch):
         assert main(words) == 2
         error = capsys.readouterr().err
         assert told in error and error.count("\n") == 1
+
+
+def test_an_arm_that_is_one_point_has_a_room():
+    """A slide that carries its handle has no links; cameras see it from some distance."""
+    point = np.zeros((3, 3))
+    model = sticks.room(point, point)
+    for name in sticks.VIEWS:
+        sticks.fit(model, name, point)
+        assert np.linalg.norm(model.cam_pos[model.camera(name).id]) > 1e-3

@@ -11,6 +11,7 @@ import numpy as np
 from ...scene.virtual_wall import Device, VirtualWall
 from ...studies.chart import Chart, curve
 from ...studies.port_energy import passivity_limit
+from ...studies.wall import STILL
 from ...studies.wall_runs import Press, stiffest, unshown
 from ...theory import wall_limits
 from ..ledger import Row, row
@@ -26,11 +27,11 @@ QUANTA, MIDDLE = (5e-6, 2e-5, 4e-5), 2e-5  # [m] counts of encoders; that of the
 NYQUIST = 0.5 / TS  # [Hz] at which "no filter" is drawn
 AROUND, SOFTEST = 3000.0, 100.0  # [N/m] start of searches
 PRESSES = (  # a limit cycle is reached after some pushes and not after others
-    Press(1.0, 0.05),
-    Press(1.0, 0.02),
-    Press(1.0, 0.1),
-    Press(0.5, 0.05),
-    Press(2.0, 0.05),
+    Press(1.0, 0.05, STILL),
+    Press(1.0, 0.02, STILL),
+    Press(1.0, 0.1, STILL),
+    Press(0.5, 0.05, STILL),
+    Press(2.0, 0.05, STILL),
 )
 AREA_B = (0.0, 2.0, 5.0, B, 20.0, 30.0)  # [N.s/m]
 AREA_CUTOFFS: Cutoffs = (10.0, 20.0, 30.0, 50.0, 100.0, None)

@@ -10,7 +10,8 @@ import numpy as np
 from ...scene.virtual_wall import Device, VirtualWall
 from ...studies.chart import Chart, curve
 from ...studies.port_energy import passivity_limit
-from ...studies.wall_runs import Press, come_to_rest
+from ...studies.wall import STILL
+from ...studies.wall_runs import PRESS, Press, come_to_rest
 from ...theory import wall_limits
 from ...theory.roots import bisect
 from ..ledger import Row, row
@@ -51,7 +52,7 @@ def held_speed(wall: VirtualWall) -> float:
     low, high = around / SPAN, around * SPAN
     while high > BRACKET * low:
         middle = math.sqrt(low * high)
-        if come_to_rest([wall], Press(force=0.0, speed=middle))[0]:
+        if come_to_rest([wall], Press(0.0, middle, STILL))[0]:
             low = middle
         else:
             high = middle
@@ -100,7 +101,7 @@ def _stable_but_active(progress: Progress) -> Row:
     return holds(
         "devices operate stably in violation of passivity criteria | abstract | many common "
         "devices do",
-        come_to_rest([stiff])[0],
+        come_to_rest([stiff], PRESS)[0],
         QUOTED,
         f"runs of a hand draw energy above {limit:.4g} N/m; at {stiff.K:.4g} N/m a device of "
         f"b = {ROUGH.damper:g} N.s/m, fc = {ROUGH.friction:g} N, Delta = "
@@ -115,7 +116,7 @@ def _quantum(progress: Progress) -> Row:
     tried = [
         VirtualWall(K=share * edge, B=BUZZ, device=ROUGH) for share in (0.5, 0.9, 0.98, 1.1, 1.3)
     ]
-    rests = come_to_rest(tried)
+    rests = come_to_rest(tried, PRESS)
     words = ", ".join(
         f"{w.K:.4g} N/m {'rests' if rest else 'buzzes'}"
         for w, rest in zip(tried, rests, strict=True)
@@ -138,7 +139,7 @@ def make(quick: bool, progress: Progress) -> Found:
         rows.append(
             holds(
                 "without friction the same wall rests from no speed | none | not stated",
-                not come_to_rest([bare], Press(force=0.0, speed=1e-3))[0],
+                not come_to_rest([bare], Press(0.0, 1e-3, STILL))[0],
                 BESIDE,
                 f"K = {bare.K:g} N/m: a push of 1 mm/s grows",
             )
