@@ -58,10 +58,8 @@ class OneThread(contextlib.ContextDecorator):
 
 def _libraries() -> list[Any]:
     """All that is loaded of BLAS: a search of milliseconds."""
-    try:
-        from threadpoolctl import ThreadpoolController
-    except ImportError:  # an environment from before this dependency: slow, not wrong
-        return []
+    from threadpoolctl import ThreadpoolController
+
     return ThreadpoolController().select(user_api="blas").lib_controllers
 
 
