@@ -514,7 +514,9 @@ class Study:
         """Where else the law may run, the host or drives, and the radius of its loop there."""
         if self.law.runs == "drive":
             at = timing_words(self.Ts, self.delay)
-            return f"in a host at {at}", self.remade(law=replace(self.law, runs="host")).radius()
+            return f"in a host at {at}", self.remade(
+                law=replace(self.law, runs="host", drive_rate=None)
+            ).radius()
         loop = self.remade(law=replace(self.law, runs="drive"))
         return "in drives, whose own loops count as continuous (runs drive)", loop.radius()
 
