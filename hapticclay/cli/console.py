@@ -174,8 +174,10 @@ def deliver(
 ) -> None:
     """Writes a result as NAME.json, its figures and pages, and prints it, or `text` in its place.
 
-    Without `figures` none are drawn; `asked` is the question, which NAME.json repeats.
+    Without `figures` none are drawn; `asked` is the question, which NAME.json repeats. Where
+    files of an earlier result are replaced, it says so.
     """
+    replaced = (out / f"{found.written_as}.json").exists()
     try:
         found.write(out, asked)
         for name, page in (pages or {}).items():
@@ -185,7 +187,7 @@ def deliver(
             save_figures(found.figures(), out, figures)
     finally:  # a full disk must not hide the result
         print(found.text() if text is None else text, end="\n" if text != "" else "")
-    print(f"written to {out}")
+    print(f"written to {out}{', in place of the files that were there' * replaced}")
 
 
 def film_progress(images: Iterable[Any], count: int) -> Iterator[Any]:

@@ -309,6 +309,14 @@ def test_a_reference_is_offered_where_a_command_stands_beside_the_force(tmp_path
     assert any(x.endswith("input=force output=pos reference=ref") for x in commands)
 
 
+def test_files_that_are_replaced_are_said_to_be(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "a.csv", "t,force,pos", T, FORCE, PLACE)
+    for said in ("", ", in place of the files that were there"):
+        assert app.main(["columns", "a.csv"]) == 0
+        assert capsys.readouterr().out.endswith(f"written to out/columns/a{said}\n")
+
+
 # ---- all of these at random
 
 
