@@ -36,7 +36,7 @@ class SampledDrive:
     def controller(self, q: np.ndarray) -> Controller:
         """The controller, from rest at joint positions."""
         sent = np.tile(self._weights(q), (self.kept, 1))
-        return Controller(self, state=[0.0, *sent.ravel(), *q, *np.zeros(self.n)])
+        return Controller(self, state=(0.0, *sent.ravel().tolist(), *q.tolist(), *(0.0,) * self.n))
 
     def __call__(
         self, t: float, q: Any, qd: Any, fh: Any, state: Any, params: Any

@@ -5,17 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ..arms.joint_law import JointPD
 from ..arms.joint_units import of_joint
+from ..arms.mechanism import Linear
+from ..arms.mjcf_arm import MjcfArm
 from ..display import time_words
 from .joint_delays import LATEST
-from .joint_families import Limit
-
-if TYPE_CHECKING:
-    from .joint_gains import Study
+from .joint_families import Family, Limit
+from .joint_loop import JointLoop
 
 UNITS = {"Kp": "N.m/rad", "Kd": "N.m.s/rad"}
 ROOM = 0.7  # of a limit: a value that is recommended
@@ -28,6 +29,30 @@ FACTORS = (0.5, 0.25, 0.1, 0.03, 0.01, 2.0, 4.0, 10.0, 30.0)  # of all Kp, each 
 SPEEDS = np.geomspace(0.5, 1e-4, 24)  # of gains from inertias: rad in the time that torque is late
 DAMPED = 0.7  # their share of critical damping
 LEAST_TS = 1e-6  # [s]
+SAMPLED = 1e3  # [Hz] of drives whose rate is not known, at least
+
+
+class Study(Protocol):
+    """An arm under study, as advice asks it."""
+
+    arm: MjcfArm
+    law: JointPD
+    linear: Linear
+    loop: JointLoop
+    Ts: float
+    delay: float
+
+    def at(self, **changes: Any) -> Study:
+        """The same arm under another law, at another Ts or delay."""
+        ...
+
+    def remade(self, **changes: Any) -> JointLoop:
+        """The loop with another linear arm, law, gains, Ts or delay."""
+        ...
+
+    def family(self, kind: str, joint: int | None = None) -> Family:
+        """Loops of other gains of a joint; of a common factor of all joints for None."""
+        ...
 
 
 class Advice(NamedTuple):
@@ -92,7 +117,7 @@ def _of_stable(study: Study, room: Room) -> Advice:
     if not any(study.law.Kp):
         return Advice(f"nothing: without Kp there is none to buzz{_room_of_Kd(study, room)}", {})
     if math.isinf(scale):
-        return Advice("nothing: no factor of Kp buzzes", {})
+        return Advice(f"nothing: {_unlimited(study)}", {})
     if study.delay:
         shorter = min(study.delay, SHORTER)
         where = f"delay ({time_words(room.left, LATEST)} left)"
@@ -105,6 +130,16 @@ def _of_stable(study: Study, room: Room) -> Advice:
         return Advice(f"nothing: neither less delay nor a higher rate raises {scale:.4g}", {})
     to = "any" if math.isinf(after) else f"{after:.4g}"
     return Advice(f"{where}: {what} raises the factor of all Kp from {scale:.4g} to {to}", change)
+
+
+def _unlimited(study: Study) -> str:
+    """Why no factor of Kp buzzes, and what would limit it."""
+    if study.law.runs == "host" or study.law.drive_rate is not None:
+        return "no factor of Kp buzzes"
+    rate = math.ceil(SAMPLED * study.Ts) / study.Ts  # a whole multiple of the host's
+    sampled = study.at(law=replace(study.law, drive_rate=rate)).family("Kp").limit().high
+    carried = f"sampled at {rate:g} Hz they carry all Kp times {sampled:.4g}"
+    return f"drives without a rate count as continuous and carry any Kp; {carried}: give drive_rate"
 
 
 def _room_of_Kd(study: Study, room: Room) -> str:

@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..display import time_words
+from ..scene.pair import Pair
 from . import roots
-
-if TYPE_CHECKING:
-    from .pair_verdict import Study
 
 STEP, STEPS = math.sqrt(0.5), 14  # factors of gains that are tried: down to 1/128
 RAISED = (1.5, 2.0, 3.0, 5.0, 10.0)  # factors of Kd above 1, and of the rate
@@ -22,6 +20,27 @@ NOTHING = (
     "nothing that was tried brings it back: all Kp or Kd times 1/128 to 1, Kd and rate up to ten "
     "times, no delay of the link"
 )
+
+
+class Study(Protocol):
+    """A pair under study, as advice asks it."""
+
+    pair: Pair
+    build: Any
+
+    def __init__(self, pair: Pair) -> None: ...
+
+    def holds(self, gain: float, friction: tuple[np.ndarray, np.ndarray] | None = None) -> bool:
+        """Whether it is stable with a factor of all Kp, and other friction fed forward."""
+        ...
+
+    def at(self, late: float) -> bool:
+        """Whether it is stable with another delay of the link."""
+        ...
+
+    def delay(self) -> float:
+        """The largest delay of the link [s]."""
+        ...
 
 
 def remedy(study: Study, friction: float) -> str:

@@ -128,3 +128,10 @@ def test_a_scenario_says_how_a_drive_that_samples_is_run():
         hc.Scenario(arm=LEADER, controller=KHZ, Ts=2e-3)
     built = built_scenario(LEADER, KHZ, 2e-3, 0.0)
     assert built.Ts == pytest.approx(1e-3) and built.controller.runs == "host"
+
+
+def test_drives_without_a_rate_are_told_what_one_would_carry():
+    limits = hc.theory.joint_limits(LEADER, replace(KHZ, drive_rate=None), 2e-3, 2e-3)
+    sampled = hc.theory.joint_limits(LEADER, KHZ, 2e-3, 2e-3)
+    assert limits.scale == np.inf
+    assert f"sampled at 1000 Hz they carry all Kp times {sampled.scale:.4g}" in limits.advice()
