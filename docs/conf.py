@@ -71,7 +71,10 @@ nitpick_ignore_regex = [
     ("py:class", r"hapticclay\.model\.traits\.\w+|.*\.Ladder|Service|PairPlant"),  # not public
     ("py:class", r".*\.Exchanged|Chart"),  # what logs and labs hold
     ("py:class", r".*\.(StabilityMap|YieldMap)"),  # made by the command line
-    ("py:class", r".*\.Mechanism|(.*\.)?(Stamps|Table|Progress|Reading)"),  # what arms and logs hold
+    (
+        "py:class",
+        r".*\.Mechanism|(.*\.)?(Stamps|Table|Progress|Reading)",
+    ),  # what arms and logs hold
     ("py:class", r"(.*\.)?Saved"),  # what a snapshot holds
     ("py:class", r"[\d.]+"),  # bounds of one kind of force of several
     ("py:class", r"gymnasium\..*"),  # by their private modules

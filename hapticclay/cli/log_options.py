@@ -29,7 +29,7 @@ class LogOptions:
             x=0.01mm.
         table: Group, topic or sheet to read, where a file has several.
         where: Rows to read, as in episode_index=3.
-        rate: Rows in a second, of a file without a time.
+        rate: Rows in a second, of a file without a time [Hz].
     """
 
     units: tuple[str, ...] = ()

@@ -19,12 +19,12 @@ def test_an_encoder_keeps_a_wall_from_rest_that_its_linear_loop_calls_stable(K, 
     """Both lie below the linear limit, 1001 N/m.
 
     At 500 N/m without friction no K is passive (Abbott, Okamura 2005: K <= 2 fc/Delta). At 30 N/m
-    2 fc/Delta is 4e3 N/m, and the wall is passive.
+    2 fc/Delta is 4e3 N/m, and the wall is passive. Rest is 1 um, far below a count.
     """
     device = hc.Device(**DEVICE, quantum=5e-5, friction=0.1 if rests else 0.0)
     wall = hc.VirtualWall(K=K, device=device)
     assert hc.walls.stable_wall(wall)
-    assert hc.walls.settles(wall) == rests
+    assert hc.walls.settles(wall, hc.walls.Press(still=1e-6)) == rests
 
 
 def test_another_push_is_refused_by_name():
