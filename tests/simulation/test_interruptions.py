@@ -20,6 +20,9 @@ from tests.hunt import some
 from tests.interruptions import interrupted, lines_of, signals_within
 from tests.kernel.test_engines import ALL, same, yields
 
+# where ctypes calls a law, it reports an interruption before dropping it, and the run notes it
+pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+
 native = pytest.mark.skipif(not is_there(), reason="needs the compiled kernel")
 FORCE, LATER = (2.0, 0.2), (1.0, -0.1)
 # borders every 0.2 mm, where a check of the monitor is due as well
@@ -183,7 +186,6 @@ def test_ctrl_c_itself_waits_for_the_end_of_a_step(engine):
 
 
 @native  # Python itself says what it drops
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_ctrl_c_within_the_terms_of_a_chain_is_not_dropped():
     """Python computes them for compiled steps, which would go on with those of the step before."""
     arm = hc.MjcfArm("five_bar")
