@@ -55,22 +55,15 @@ class Table(Cells, Protocol):
 
 
 @dataclass(frozen=True)
-class Chosen(Cells):
-    """Some rows of another table: those in which columns have given values."""
+class Over(Cells):
+    """A view of another table, of the same file."""
 
     table: Table
-    rows_kept: np.ndarray
-    notes: tuple[str, ...]
 
     @property
     def path(self) -> Path:
         """The file."""
         return self.table.path
-
-    @property
-    def heads(self) -> Sequence[Head]:
-        """Names and units of the columns."""
-        return self.table.heads
 
     @property
     def form(self) -> str:
@@ -80,11 +73,29 @@ class Chosen(Cells):
     @property
     def rows(self) -> int:
         """Number of rows."""
-        return len(self.rows_kept)
+        return self.table.rows
 
     def refusal(self, bound: str) -> ParameterError:
         """An error that names the file."""
         return self.table.refusal(bound)
+
+
+@dataclass(frozen=True)
+class Chosen(Over):
+    """Some rows of another table: those in which columns have given values."""
+
+    rows_kept: np.ndarray
+    notes: tuple[str, ...]
+
+    @property
+    def heads(self) -> Sequence[Head]:
+        """Names and units of the columns."""
+        return self.table.heads
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(self.rows_kept)
 
     def is_missing(self, row: int, place: int) -> bool:
         """Whether a cell stands for a number that is not there."""
@@ -100,32 +111,12 @@ class Chosen(Cells):
 
 
 @dataclass(frozen=True)
-class Picked(Cells):
+class Picked(Over):
     """Some columns of another table, with heads of their own."""
 
-    table: Table
     kept: tuple[int, ...]
     heads: tuple[Head, ...]
     notes: tuple[str, ...]
-
-    @property
-    def path(self) -> Path:
-        """The file."""
-        return self.table.path
-
-    @property
-    def form(self) -> str:
-        """The format, in words."""
-        return self.table.form
-
-    @property
-    def rows(self) -> int:
-        """Number of rows."""
-        return self.table.rows
-
-    def refusal(self, bound: str) -> ParameterError:
-        """An error that names the file."""
-        return self.table.refusal(bound)
 
     def is_missing(self, row: int, place: int) -> bool:
         """Whether a cell stands for a number that is not there."""
@@ -141,10 +132,9 @@ class Picked(Cells):
 
 
 @dataclass(frozen=True)
-class Clocked(Cells):
+class Clocked(Over):
     """Another table with a time of its rows, behind its own columns, by a rate that is stated."""
 
-    table: Table
     rate: float  # [Hz]
 
     @property
@@ -153,33 +143,14 @@ class Clocked(Cells):
         return f"rows at {self.rate:.6g} Hz"
 
     @property
-    def path(self) -> Path:
-        """The file."""
-        return self.table.path
-
-    @property
     def heads(self) -> Sequence[Head]:
         """Names and units of the columns."""
         return (*self.table.heads, Head(self.clock, "s"))
 
     @property
-    def form(self) -> str:
-        """The format, in words."""
-        return self.table.form
-
-    @property
     def notes(self) -> Sequence[str]:
         """What was passed over, in words."""
         return self.table.notes
-
-    @property
-    def rows(self) -> int:
-        """Number of rows."""
-        return self.table.rows
-
-    def refusal(self, bound: str) -> ParameterError:
-        """An error that names the file."""
-        return self.table.refusal(bound)
 
     def is_missing(self, row: int, place: int) -> bool:
         """Whether a cell stands for a number that is not there."""
