@@ -71,8 +71,9 @@ def _frictions(pair: Pair, i: int) -> list[float]:
     """Coulomb friction of the joints of an arm [N.m]."""
     arm, hardware, n = pair.arms[i], pair.hardware[i], pair.n
     of_arm = np.broadcast_to(getattr(arm, "friction", 0.0), n)
-    of_hardware = hardware.friction if hardware else (0.0,) * n
-    return [max(x) for x in zip(of_arm.tolist(), of_hardware, strict=False)]
+    rubs = hardware is not None and any(hardware.friction)  # of the two-link arm alone
+    of_hardware = hardware.friction if hardware is not None and rubs else (0.0,) * n
+    return [max(x) for x in zip(of_arm.tolist(), of_hardware, strict=True)]
 
 
 def _without_friction(pair: Pair) -> Pair | None:
