@@ -15,7 +15,7 @@ from . import joint_scan, roots
 from .joint_crossings import Crossing
 from .joint_loop import JointLoop
 from .pair_delays import Delays, Edge
-from .rest import Rest
+from .rest import Rest, Resting
 
 LATEST = 2.0  # [s] largest added delay that is looked for
 SHARES = 8  # of a sample that are looked at, evenly
@@ -32,7 +32,7 @@ def delay_left(loop: JointLoop) -> Crossing:
 
 
 @dataclass(frozen=True, eq=False)
-class Late:
+class Late(Resting):
     """Joints behind whole samples of delay, as messages on their way.
 
     Attributes:
@@ -84,19 +84,6 @@ class Late:
             return out
 
         return Rest(equations, self.structural)
-
-    @property
-    def free(self) -> int:
-        """Directions of rest in which nothing resists steady motion."""
-        return self._rest.free
-
-    def drag(self) -> np.ndarray:
-        """Resistance to steady motion."""
-        return self._rest.drag
-
-    def steady_trend(self) -> int:
-        """What one more sample does where drag is singular."""
-        return self._rest.trend(self.between(self.there + 1, self.back)._rest)
 
 
 class _Unstable(NamedTuple):

@@ -17,13 +17,13 @@ from .. import matrices
 from ..errors import ParameterError
 from .joint_loop import MOST_STATES, is_stable
 from .pair_end import End
-from .rest import FREE, Rest, balanced
+from .rest import FREE, Rest, Resting, balanced
 
 BESIDE, SINGULAR = 1e-4, 1e-5  # of an eigenvalue: a distance, and the size of equations there
 
 
 @dataclass(frozen=True, eq=False)
-class PairLoop:
+class PairLoop(Resting):
     """Two ends and whole samples between them.
 
     Attributes:
@@ -200,19 +200,6 @@ class PairLoop:
         beside = [balanced(self.equations(x, abs(z) < 1.0))[0] for x in (z, z * (1.0 + BESIDE))]
         sizes = matrices.singular_values(np.array(beside))[:, -1]
         return bool(sizes[0] < SINGULAR * sizes[1])
-
-    @property
-    def free(self) -> int:
-        """Directions of rest in which nothing resists steady motion: eigenvalues 1 once more."""
-        return self._rest.free
-
-    def drag(self) -> np.ndarray:
-        """Resistance to steady motion: singular where a direction of rest has none."""
-        return self._rest.drag
-
-    def steady_trend(self) -> int:
-        """What one more sample does where drag is singular: 1 if the real eigenvalue 1 leaves."""
-        return self._rest.trend(self.between(self.there + 1, self.back)._rest)
 
     def drift(self) -> np.ndarray:
         """Measured rates per constant torque in steady motion [rad/(N.m.s)], shape (n, n).

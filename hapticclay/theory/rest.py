@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -109,6 +110,31 @@ class Rest:
         L, R = self._vectors
         moved = R @ matrices.least_squares(self.drag, L.T @ inputs, NO_DRAG)
         return moved, self._beside(inputs - self._slope() @ moved)
+
+
+class Resting:
+    """What a loop behind whole samples of delay says of its rest and steady motion."""
+
+    there: float
+    back: float
+    _rest: Any  # a Rest, which the loop keeps
+
+    def between(self, there: float, back: float) -> Any:
+        """The same loop behind other whole samples."""
+        raise NotImplementedError
+
+    @property
+    def free(self) -> int:
+        """Directions of rest in which nothing resists steady motion: eigenvalues 1 once more."""
+        return self._rest.free
+
+    def drag(self) -> np.ndarray:
+        """Resistance to steady motion: singular where a direction of rest has none."""
+        return self._rest.drag
+
+    def steady_trend(self) -> int:
+        """What one more sample does where drag is singular: 1 if the real eigenvalue 1 leaves."""
+        return self._rest.trend(self.between(self.there + 1, self.back)._rest)
 
 
 def balanced(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
