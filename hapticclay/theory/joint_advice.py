@@ -138,8 +138,10 @@ def _unlimited(study: Study) -> str:
         return "no factor of Kp buzzes"
     rate = math.ceil(SAMPLED * study.Ts) / study.Ts  # a whole multiple of the host's
     sampled = study.at(law=replace(study.law, drive_rate=rate)).family("Kp").limit().high
-    carried = f"sampled at {rate:g} Hz they carry all Kp times {sampled:.4g}"
-    return f"drives without a rate count as continuous and carry any Kp; {carried}: give drive_rate"
+    carried = "any Kp" if math.isinf(sampled) else f"all Kp times {sampled:.4g}"
+    carried = "no Kp, with these Kd" if math.isnan(sampled) else carried
+    at_rate = f"sampled at {rate:g} Hz they carry {carried}"
+    return f"drives without a rate count as continuous and carry any Kp; {at_rate}: give drive_rate"
 
 
 def _room_of_Kd(study: Study, room: Room) -> str:
