@@ -63,6 +63,17 @@ def to_end(sim, end=END):
     return sim
 
 
+def eight_samples(sim):
+    """A snapshot at sample 200, where the simulation is left, and the record of eight more."""
+    sim.advance(200)
+    start = sim.snapshot()
+    sim.advance(8)
+    want = sim.record()
+    sim.reset()
+    sim.restore(start)
+    return start, want
+
+
 def places(call, least=20):
     """Lines at which a call is interrupted: some, from the first to the last; in a hunt all."""
     n = lines_of(call)
@@ -147,12 +158,7 @@ def test_within_a_step_an_error_says_so_or_nothing_is_lost(scene, engine):
         SCENES[scene], clay=LAYERS if scene == "crossings" else SCENES[scene].clay
     )
     sim = hc.Simulation(s, engine=engine)
-    sim.advance(200)
-    start = sim.snapshot()
-    sim.advance(8)
-    want = sim.record()
-    sim.reset()
-    sim.restore(start)
+    start, want = eight_samples(sim)
     told = 0
     for k in places(lambda: sim.advance(8)):
         sim.reset()
@@ -172,12 +178,7 @@ def test_within_a_step_an_error_says_so_or_nothing_is_lost(scene, engine):
 def test_ctrl_c_itself_waits_for_the_end_of_a_step(engine):
     """So that nothing is lost in CPython, either."""
     sim = hc.Simulation(SCENES["crossings"], engine=engine)
-    sim.advance(200)
-    start = sim.snapshot()
-    sim.advance(8)
-    want = sim.record()
-    sim.reset()
-    sim.restore(start)
+    start, want = eight_samples(sim)
     for k in places(lambda: sim.advance(8)):
         sim.reset()
         sim.restore(start)
