@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
+import numpy as np
+
 from ..arguments import checked, part
 from ..errors import Bound, ParameterError, Real
 from . import gain_files
@@ -195,6 +197,12 @@ def rate_filter(cutoff: float | None, Ts: float) -> tuple[float, float]:
     if cutoff is None:
         return 0.0, 1.0 / Ts
     return 1.0 / (1.0 + cutoff * Ts), cutoff / (1.0 + cutoff * Ts)
+
+
+def fed_friction(law: JointPD, w: np.ndarray) -> np.ndarray:
+    """The friction torque that the host feeds forward at measured rates w [N.m], shape (n,)."""
+    Fc, k, Fv = np.array(law._frictions).T
+    return Fc * np.tanh(k * w) + Fv * w
 
 
 def compensated(arm: Any, law: JointPD | None) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arms.joint_law import compensated, rate_filter
+from ..arms.joint_law import compensated, fed_friction, rate_filter
 from ..scene import pair as pairs
 from ..scene.pair import Pair
 from ..theory.architectures import ARCHITECTURES
@@ -80,8 +80,7 @@ class Host:
         if self.acts and self.law.runs == "host":
             out -= self.Kp * q + self.Kd * v
         if self.law.friction is not None:
-            Fc, k, Fv = np.array(self.law.friction).T
-            out += Fc * np.tanh(k * v) + Fv * v
+            out += fed_friction(self.law, v)
         return out
 
     @property

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arms.joint_law import JointPD, compensated, rate_filter
+from ..arms.joint_law import JointPD, compensated, fed_friction, rate_filter
 from ..arms.mjcf_arm import MjcfArm
 from ..model.sampled_controller import Controller
 
@@ -29,7 +29,6 @@ class SampledDrive:
         self.arm, self.law, self.mechanism, self.n = arm, law, arm.mechanism, len(arm.names)
         self.weighs = compensated(arm, law)
         self.Kp, self.Kd, self.reference = np.array(law.Kp), np.array(law.Kd), reference
-        self.friction = np.array(law.friction or [(0.0, 0.0, 0.0)] * self.n).T
         self.kept = self.late // self.samples + 2
         self.estimate = rate_filter(law.cutoff, Ts)
 
@@ -49,14 +48,11 @@ class SampledDrive:
             keep, gain = self.estimate
             rate = qd if self.law.velocity == "exact" else keep * rate + gain * (q - past)
             past = q
-            sent = np.vstack([self._fed(q, rate), sent[:-1]])
+            fed = self._weights(q) + fed_friction(self.law, rate)
+            sent = np.vstack([fed, sent[:-1]])
         arrived = host - (k - self.late) // self.samples
         torque = self.Kp * (self.reference - q) - self.Kd * qd + sent[min(arrived, self.kept - 1)]
         return torque.tolist(), [k + 1.0, *sent.ravel(), *past, *rate]
-
-    def _fed(self, q: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        Fc, slope, Fv = self.friction
-        return self._weights(q) + Fc * np.tanh(slope * rate) + Fv * rate
 
     def _weights(self, q: np.ndarray) -> np.ndarray:
         """Torques that hold the arm against gravity, where the host feeds them."""
